@@ -5,10 +5,11 @@ use lumiris::film::Film;
 use lumiris::imaging::Image;
 use lumiris::render::output::{Aov, layers};
 use lumiris::render::parts::{Extent, Merged, PartError, Stored, merge as merge_parts};
-use pyo3::exceptions::{PyFileNotFoundError, PyValueError};
+use lumiris_formats::output::check_destination;
+use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use std::io;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::time::Duration;
 
 /// Options of a rendering that is divided, interrupted or continued.
@@ -57,13 +58,7 @@ impl PartOptions {
         });
         let checkpoint = checkpoint.transpose()?;
         let files = checkpoint.iter().map(|(path, _)| path).chain(&self.part_file);
-        for path in files {
-            let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-            if !folder.is_dir() {
-                let text = format!("{}: folder {} does not exist", path.display(), folder.display());
-                return Err(PyFileNotFoundError::new_err(text));
-            }
-        }
+        files.map(|path| check_destination(path).map(drop)).collect::<io::Result<()>>()?;
         Ok(Parts { extent, file: self.part_file, checkpoint, resume: self.resume })
     }
 }

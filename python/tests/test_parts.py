@@ -121,6 +121,16 @@ def test_what_cannot_be_divided_or_continued_is_said(
     assert list(tmp_path.iterdir()) == []
 
 
+def test_a_read_only_file_is_refused_before_rendering(tmp_path: pathlib.Path) -> None:
+    path = tmp_path / "a.film"
+    path.write_text("of yesterday")
+    path.chmod(0o444)
+    for options in ({"checkpoint": path}, {"part": (1, 2), "part_file": path}):
+        with pytest.raises(PermissionError, match="a.film: is read-only"):
+            lumiris.render("none.pbrt", **options)
+    assert path.read_text() == "of yesterday"
+
+
 def test_damaged_parts_are_said(tmp_path: pathlib.Path) -> None:
     path = tmp_path / "a.part"
     lumiris.render(SCENE, spp=1, estimator="mis", part_file=path)

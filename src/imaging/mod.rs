@@ -1,9 +1,10 @@
 //! Images: pixels with named channels, their encodings, pyramids for filtered lookups, and metrics of their difference.
 //!
-//! Reading order: [`color`], [`view_transform`], [`mod@file`], [`oiio`], [`tiles`], `level`, `file_tiles`, [`mipmap`], [`face_map`],
+//! Reading order: [`color`], [`view_transform`], [`mod@file`], [`color_layers`], [`oiio`], [`tiles`], `level`, `file_tiles`, [`mipmap`], [`face_map`],
 //! [`file_parts`], [`oidn`], [`metrics`], [`compare`], [`heat`].
 
 pub mod color;
+pub mod color_layers;
 pub mod compare;
 pub mod face_map;
 pub mod file;
@@ -61,10 +62,11 @@ impl Image {
         self.data[i] = value;
     }
 
-    /// The channels to read as colour: R, G and B (in any case of letters) if all are there, otherwise Y or the first
-    /// channel alone. `None` if there are no channels.
+    /// The channels to read as colour, as [`color_layers::choose`] has them. `None` if there are no channels, or several
+    /// images among them.
     pub fn color_channels(&self) -> Option<ColorChannels> {
-        ColorChannels::of(&self.channels)
+        let header = file::PartHeader { name: String::new(), channels: self.channels.clone(), size: [0; 2] };
+        color_layers::choose(&[header], None).ok().map(|layer| layer.channels)
     }
 }
 
@@ -106,16 +108,6 @@ pub enum ColorChannels {
 }
 
 impl ColorChannels {
-    /// Those of channels with these names, as [`Image::color_channels`] has them.
-    pub fn of(names: &[String]) -> Option<Self> {
-        let find = |name: &str| names.iter().position(|c| c.eq_ignore_ascii_case(name));
-        match (find("R"), find("G"), find("B")) {
-            (Some(r), Some(g), Some(b)) => Some(ColorChannels::Rgb([r, g, b])),
-            _ if names.is_empty() => None,
-            _ => Some(ColorChannels::Grey(find("Y").unwrap_or(0))),
-        }
-    }
-
     /// The positions as a slice of one or three.
     pub fn as_slice(&self) -> &[usize] {
         match self {

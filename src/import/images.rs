@@ -1,10 +1,12 @@
 //! Image files as scenes ask for them, and how they are read.
 
+use crate::imaging::color_layers::ColorLayer;
 use crate::imaging::oiio::{self, FilePyramid, ImageError, ReadLimits};
 use crate::imaging::tiles::TileStore;
 use crate::imaging::{ColorChannels, ColorEncoding, Filter, MipMap, Wrap};
 use crate::textures::Udim;
 use lumiris_formats::color_space::{Chromaticities, Colored, is_rec709, rec709_from};
+use lumiris_formats::names::nfc;
 use lumiris_numbers::math::{Mat3, Rgb, Vec3};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -57,11 +59,11 @@ const CHROMATICITIES: &str = "chromaticities";
 const SMALL: usize = 128;
 
 impl ImageRequest {
-    /// The same with channels that are known, by the names of those of the image, and by whether channel `a` is 1 everywhere.
-    fn resolved(&self, names: &[String], is_opaque: impl Fn(usize) -> bool) -> ImageRequest {
+    /// The same with channels that are known, by those of the image, and by whether channel `a` is 1 everywhere.
+    fn resolved(&self, layer: &ColorLayer, is_opaque: impl Fn(usize) -> bool) -> ImageRequest {
         // The opacity of Targa files is no number of theirs in pbrt-v4
         let is_targa = self.path.extension().is_some_and(|e| e.eq_ignore_ascii_case("tga"));
-        let alpha = names.iter().position(|name| name == "A").filter(|_| !is_targa);
+        let alpha = layer.alpha.filter(|_| !is_targa);
         let channels = match (self.channels, alpha) {
             (ImageChannels::Number, Some(a)) if !is_opaque(a) => ImageChannels::Alpha,
             (ImageChannels::Number, _) => ImageChannels::Color,
@@ -89,13 +91,14 @@ pub fn tiles(path: &Path) -> Vec<(u32, PathBuf)> {
     let name = path.file_name().and_then(|name| name.to_str()).unwrap_or_default();
     let Some((before, after)) = name.split_once(UDIM) else { return Vec::new() };
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let [before, after] = [before, after].map(nfc);
     let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
     let number = |name: &str| {
-        let digits = name.strip_prefix(before)?.strip_suffix(after)?;
+        let digits = name.strip_prefix(&*before)?.strip_suffix(&*after)?;
         let is_number = digits.len() == 4 && digits.bytes().all(|b| b.is_ascii_digit());
         digits.parse().ok().filter(|&number| is_number && Udim::is_number(number))
     };
-    let tile = |entry: std::fs::DirEntry| Some((number(entry.file_name().to_str()?)?, entry.path()));
+    let tile = |entry: std::fs::DirEntry| Some((number(&nfc(entry.file_name().to_str()?))?, entry.path()));
     let mut tiles: Vec<(u32, PathBuf)> = entries.filter_map(tile).collect();
     tiles.sort();
     tiles
@@ -129,20 +132,20 @@ pub fn load_tiled_map(request: &ImageRequest, store: &Arc<TileStore>) -> Result<
 
 /// The pyramid of an image.
 fn image_map(request: &ImageRequest) -> Result<MipMap, ImageError> {
-    let mut read = oiio::read_image(&request.path, &ReadLimits::default())?;
+    let (mut read, layer) = oiio::read_colors(&request.path, &ReadLimits::default())?;
     let image = &mut read.image;
     let count = image.channels.len();
     let is_opaque = |a: usize| image.data.iter().skip(a).step_by(count).all(|&alpha| alpha >= 1.0);
-    let resolved = request.resolved(&image.channels, is_opaque);
+    let resolved = request.resolved(&layer, is_opaque);
     let chromaticities = read.metadata.get(CHROMATICITIES).filter(|_| read.encoding == ColorEncoding::Linear);
     let matrix = rec709_of(chromaticities.map(String::as_str), request.channels, Colored::Factor);
-    if let (Some(matrix), Some(ColorChannels::Rgb(rgb))) = (matrix, image.color_channels()) {
+    if let (Some(matrix), ColorChannels::Rgb(rgb)) = (matrix, layer.channels) {
         for pixel in image.data.chunks_exact_mut(count) {
             let color = matrix * Vec3::from_array(rgb.map(|c| pixel[c]));
             rgb.iter().zip(color.to_array()).for_each(|(&c, value)| pixel[c] = value);
         }
     }
-    let (channels, encoding) = meaning(&resolved, &read.image.channels, read.encoding);
+    let (channels, encoding) = meaning(&resolved, &layer, read.encoding);
     let how = (request.wrap, request.filter, encoding);
     Ok(channels.map_or_else(|| without_channels(request), |channels| MipMap::of_channels(&read.image, &channels, how)))
 }
@@ -152,23 +155,21 @@ fn file_map(file: FilePyramid, request: &ImageRequest, store: Option<&Arc<TileSt
     // A level of few texels tells whether all are opaque
     let small = file.sizes().iter().position(|size| size[0].max(size[1]) <= SMALL).unwrap_or(0);
     let is_opaque = |a| file.level(small, &[a]).is_ok_and(|level| level.iter().all(|&alpha| alpha >= 1.0));
-    let request = &request.resolved(file.channels(), is_opaque);
-    let (channels, encoding) = meaning(request, file.channels(), file.encoding());
+    let request = &request.resolved(file.layer(), is_opaque);
+    let (channels, encoding) = meaning(request, file.layer(), file.encoding());
     let how = (request.wrap, request.filter, encoding);
     channels.map_or_else(|| Ok(without_channels(request)), |channels| MipMap::of_file(file, channels, how, store))
 }
 
-/// Positions of the channels that are asked for, if there are any, and how they are encoded, by the names of all channels and the
-/// usual encoding of the file.
-fn meaning(request: &ImageRequest, names: &[String], usual: ColorEncoding) -> (Option<Vec<usize>>, ColorEncoding) {
+/// Positions of the channels that are asked for, if there are any, and how they are encoded, by those of the image and the usual
+/// encoding of the file.
+fn meaning(request: &ImageRequest, layer: &ColorLayer, usual: ColorEncoding) -> (Option<Vec<usize>>, ColorEncoding) {
     let channels = match request.channels {
         // Opacity is stored linear
         ImageChannels::Alpha => {
-            return (names.iter().position(|name| name == "A").map(|a| vec![a]), ColorEncoding::Linear);
+            return (layer.alpha.map(|a| vec![a]), ColorEncoding::Linear);
         }
-        ImageChannels::Color | ImageChannels::Number => {
-            ColorChannels::of(names).map(|channels| channels.as_slice().to_vec())
-        }
+        ImageChannels::Color | ImageChannels::Number => Some(layer.channels.as_slice().to_vec()),
     };
     let encoding = match request.encoding {
         // Floats are light already, whatever the scene says: pbrt-v4 decodes integers only.
@@ -189,12 +190,11 @@ fn without_channels(request: &ImageRequest) -> MipMap {
 
 /// Reads an image as linear RGB, rows from the top, with its size.
 pub fn load_rgb(path: &Path) -> Result<RgbImage, ImageError> {
-    let read = oiio::read_image(path, &ReadLimits::default())?;
+    let (read, layer) = oiio::read_colors(path, &ReadLimits::default())?;
     let image = &read.image;
-    let channels = match image.color_channels() {
-        Some(ColorChannels::Rgb(rgb)) => rgb,
-        Some(ColorChannels::Grey(y)) => [y; 3],
-        None => return Err(ImageError::Unreadable { path: path.to_owned(), reason: "has no channels".to_owned() }),
+    let channels = match layer.channels {
+        ColorChannels::Rgb(rgb) => rgb,
+        ColorChannels::Grey(y) => [y; 3],
     };
     let pixels = image.data.chunks_exact(image.channels.len());
     let chromaticities = read.metadata.get(CHROMATICITIES).map(String::as_str);
@@ -450,6 +450,29 @@ mod tests {
                 near(numbers.texel(0, x as i64, 0), stored);
             }
         }
+    }
+
+    #[test]
+    fn an_image_that_is_a_layer_is_found_and_of_several_the_names_are_told() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("layers.exr");
+        let write = |names: &[&str], values: &[f32]| {
+            let part = oiio::Part::linear(1, 1, names.iter().map(|&name| name.to_owned()).collect(), values.to_vec());
+            oiio::write_image(&path, &[part]).unwrap();
+        };
+        // Beside a depth, and in the order of files
+        let names = ["Depth.Z", "View.Combined.A", "View.Combined.B", "View.Combined.G", "View.Combined.R"];
+        write(&names, &[9.0, 0.25, 1.0, 0.5, 0.125]);
+        let texel = |channels| load_map(&request(&path, channels)).unwrap().texel(0, 0, 0).to_array();
+        assert_eq!(texel(ImageChannels::Color), [0.125, 0.5, 1.0]);
+        assert_eq!(texel(ImageChannels::Alpha), [0.25; 3]);
+        assert_eq!(load_rgb(&path).unwrap().0, [Rgb::new(0.125, 0.5, 1.0)]);
+
+        write(&["left.R", "left.G", "left.B", "right.R", "right.G", "right.B"], &[1.0; 6]);
+        let expected = "layers.exr: has several images, none of which is plain R G B: left, right";
+        let map = load_map(&request(&path, ImageChannels::Color)).map(drop).unwrap_err().to_string();
+        assert!(map.ends_with(expected), "{map}");
+        assert_eq!(load_rgb(&path).unwrap_err().to_string(), map);
     }
 
     #[test]

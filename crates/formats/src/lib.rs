@@ -4,13 +4,15 @@
 //! User input never panics. Errors are collected with their positions in [`diagnostic::Diagnostics`]. The meaning of
 //! directives is not decided here: the renderer builds its scene from them.
 //!
-//! Reading order: [`source`], [`diagnostic`], [`number`], [`pbrt`], [`ply`], [`ptex`], [`nanovdb`], [`gltf`], [`spectra`],
+//! Reading order: `gzip`, [`source`], [`names`], [`diagnostic`], [`number`], [`pbrt`], [`ply`], [`ptex`], [`nanovdb`], [`gltf`], [`spectra`],
 //! [`upsampling`], [`bsdf_file`], [`color_space`], [`output`].
 
 pub mod bsdf_file;
 pub mod color_space;
 pub mod diagnostic;
 pub mod gltf;
+mod gzip;
+pub mod names;
 pub mod nanovdb;
 pub mod number;
 pub mod output;

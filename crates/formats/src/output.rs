@@ -1,44 +1,157 @@
 //! Atomic writing of files: either the whole file appears under its name, or the old one stays.
+//!
+//! A name that is a symbolic link stands for the link's target, which is what is replaced. The new file has the owner and
+//! the mode of the old one, as far as the user may give them. A file without write permission is not replaced, though the
+//! folder would allow it: it was protected on purpose. What is no file (a pipe, a terminal, `/dev/stdout`) gets the bytes.
 
-use std::fs::File;
-use std::io::{self, Write};
-use std::path::Path;
+use std::fs::{File, Metadata};
+use std::io::{self, ErrorKind, Write};
+use std::path::{Path, PathBuf};
 use tempfile::{Builder, NamedTempFile};
+
+/// Symbolic links that may lead from one to the next, as many as Linux follows.
+const MAX_LINKS: usize = 40;
+
+/// What a name of an output stands for.
+#[derive(Debug)]
+pub struct Destination {
+    path: PathBuf,
+    /// Of the file that is there already.
+    earlier: Option<Metadata>,
+    /// True for what is no file, and is written to as it is.
+    is_stream: bool,
+}
+
+impl Destination {
+    /// Follows symbolic links. Fails for a file without write permission, for a folder, and where there is none to write to.
+    pub fn of(path: &Path) -> io::Result<Destination> {
+        let wrong = |kind, text: &str| Err(io::Error::new(kind, text));
+        let (target, is_descriptor) = followed(path)?;
+        let earlier = target.metadata().ok();
+        match &earlier {
+            Some(earlier) if earlier.is_dir() => return wrong(ErrorKind::IsADirectory, "is a folder"),
+            Some(earlier) if earlier.is_file() && !is_descriptor => {
+                // The mode counts even for root, whom the system would let write
+                if earlier.permissions().readonly() {
+                    return wrong(ErrorKind::PermissionDenied, "is read-only");
+                }
+                File::options().write(true).open(&target)?;
+            }
+            Some(_) => {}
+            None if folder_of(&target).is_dir() => {}
+            None => {
+                return wrong(ErrorKind::NotFound, &format!("folder {} does not exist", folder_of(&target).display()));
+            }
+        }
+        let is_stream = is_descriptor || earlier.as_ref().is_some_and(|earlier| !earlier.is_file());
+        Ok(Destination { path: target, earlier, is_stream })
+    }
+
+    /// The file, or what else it is, behind all links.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// True for what is no file: a pipe, a terminal, a device.
+    pub fn is_stream(&self) -> bool {
+        self.is_stream
+    }
+
+    /// Makes the file `partial`, whose content is complete, ready to take the place of the earlier one: all of it is on the
+    /// disk, lest a crash leaves an empty file in place of a good one, and it has the owner and the mode of the other.
+    fn prepare(&self, partial: &Path) -> io::Result<()> {
+        // Opened anew, for whoever wrote it by its name may have made it anew
+        File::open(partial)?.sync_all()?;
+        let Some(earlier) = &self.earlier else { return Ok(()) };
+        #[cfg(unix)]
+        {
+            use std::os::unix::fs::{MetadataExt, chown};
+            let now = partial.metadata()?;
+            if (now.uid(), now.gid()) != (earlier.uid(), earlier.gid()) {
+                // Only root may give a file away; the group may be another one of the user's
+                let _ = chown(partial, Some(earlier.uid()), Some(earlier.gid()))
+                    .or_else(|_| chown(partial, None, Some(earlier.gid())));
+            }
+        }
+        std::fs::set_permissions(partial, earlier.permissions())
+    }
+
+    /// Gives the place to a file beside it when all of that is on the disk, and waits until the disk knows the name, where
+    /// that can be.
+    pub fn replace_by(&self, partial: &Path) -> io::Result<()> {
+        self.prepare(partial)?;
+        std::fs::rename(partial, &self.path)?;
+        // Some file systems refuse that for folders
+        let _ = File::open(folder_of(&self.path)).and_then(|folder| folder.sync_all());
+        Ok(())
+    }
+
+    /// A file for what is on its way here, with the same extension: beside it, or in the temporary folder for a stream.
+    fn partial(&self) -> io::Result<NamedTempFile> {
+        let suffix = self.path.extension().map_or_else(String::new, |e| format!(".{}", e.to_string_lossy()));
+        let mut builder = Builder::new();
+        builder.prefix(".partial-").suffix(&suffix);
+        #[cfg(unix)]
+        builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
+        if self.is_stream { builder.tempfile() } else { builder.tempfile_in(folder_of(&self.path)) }
+    }
+}
+
+/// The folder of a file.
+fn folder_of(path: &Path) -> &Path {
+    path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
+}
+
+/// Where the symbolic links from `path` on end, whether something is there or not; true if that is an open file of a process,
+/// such as `/dev/stdout`: it has no name to rename another one to.
+fn followed(path: &Path) -> io::Result<(PathBuf, bool)> {
+    let mut path = path.to_owned();
+    for _ in 0..MAX_LINKS {
+        let Ok(next) = path.read_link() else { return Ok((path, false)) };
+        let folder = folder_of(&path).canonicalize()?;
+        if folder.starts_with("/proc") {
+            return Ok((path, true));
+        }
+        path = folder.join(next);
+    }
+    Err(io::Error::other("too many symbolic links"))
+}
+
+/// Fails for an output that [`Destination::of`] refuses. The error names the file.
+pub fn check_destination(path: &Path) -> io::Result<Destination> {
+    Destination::of(path).map_err(|error| io::Error::new(error.kind(), format!("{}: {error}", path.display())))
+}
+
+/// Fails if an output cannot be written, before time is spent on making it. The error names the file.
+pub fn check_writable(path: &Path) -> io::Result<()> {
+    let destination = check_destination(path)?;
+    // As the file itself will be written; this one is gone at once
+    destination.partial().map(drop).map_err(|error| {
+        let folder = folder_of(&destination.path).display();
+        io::Error::new(error.kind(), format!("{}: nothing can be written to {folder}: {error}", path.display()))
+    })
+}
 
 /// Writes a file. `write` gets another one beside it with the same extension, which takes the name when all of it is on
 /// the disk, and is removed if anything fails.
 pub fn write_whole(path: &Path, write: impl FnOnce(&mut NamedTempFile) -> io::Result<()>) -> io::Result<()> {
-    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let suffix = path.extension().map_or_else(String::new, |extension| format!(".{}", extension.to_string_lossy()));
-    let mut builder = Builder::new();
-    builder.prefix(".partial-").suffix(&suffix);
-    #[cfg(unix)]
-    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
-    let mut partial = builder.tempfile_in(folder)?;
+    let destination = Destination::of(path)?;
+    let mut partial = destination.partial()?;
     write(&mut partial)?;
-    // On the disk before it takes the name, lest a crash leaves an empty file in place of a good one. It is opened
-    // anew, for whoever wrote it by its name may have made it anew.
-    File::open(partial.path())?.sync_all()?;
-    partial.persist(path)?;
-    Ok(())
-}
-
-/// Gives a file its name when all of it is on the disk, and waits until the disk knows the name, where that can be.
-pub fn sync_and_rename(partial: &Path, path: &Path) -> io::Result<()> {
-    File::open(partial)?.sync_all()?;
-    std::fs::rename(partial, path)?;
-    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    // Some file systems refuse that for folders
-    let _ = File::open(folder).and_then(|folder| folder.sync_all());
-    Ok(())
-}
-
-/// Writes a text, as [`write_whole`]; what is no file (a pipe, a terminal) gets it directly.
-pub fn write_text(path: &Path, text: &str) -> io::Result<()> {
-    match path.metadata() {
-        Ok(is) if !is.is_file() && !is.is_dir() => std::fs::write(path, text),
-        _ => write_whole(path, |file| file.write_all(text.as_bytes())),
+    if destination.is_stream {
+        // Opened anew, as below
+        let mut stream = File::options().append(true).open(&destination.path)?;
+        io::copy(&mut File::open(partial.path())?, &mut stream)?;
+        return Ok(());
     }
+    destination.prepare(partial.path())?;
+    partial.persist(&destination.path)?;
+    Ok(())
+}
+
+/// Writes a text, as [`write_whole`].
+pub fn write_text(path: &Path, text: &str) -> io::Result<()> {
+    write_whole(path, |file| file.write_all(text.as_bytes()))
 }
 
 #[cfg(test)]
@@ -74,5 +187,75 @@ mod tests {
         std::fs::write(&plain, "").unwrap();
         let mode = |path: &Path| path.metadata().unwrap().permissions().mode();
         assert_eq!(mode(&ours), mode(&plain));
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn the_target_of_a_symbolic_link_is_replaced_and_the_link_stays() {
+        use std::os::unix::fs::symlink;
+        let folder = tempfile::tempdir().unwrap();
+        let path = |name: &str| folder.path().join(name);
+        std::fs::create_dir(path("far")).unwrap();
+        // One after the other, one of them relative, and the last without a file
+        symlink("b.txt", path("a.txt")).unwrap();
+        symlink(path("far/c.txt"), path("b.txt")).unwrap();
+        for text in ["first", "second"] {
+            check_writable(&path("a.txt")).unwrap();
+            write_text(&path("a.txt"), text).unwrap();
+            assert_eq!(std::fs::read_to_string(path("far/c.txt")).unwrap(), text);
+            assert!(["a.txt", "b.txt"].iter().all(|name| path(name).is_symlink()));
+        }
+        assert_eq!(std::fs::read_dir(path("far")).unwrap().count(), 1);
+
+        symlink("gone/d.txt", path("d.txt")).unwrap();
+        let error = check_writable(&path("d.txt")).unwrap_err();
+        assert!(error.kind() == ErrorKind::NotFound && error.to_string().contains("gone does not exist"), "{error}");
+        symlink("e.txt", path("e.txt")).unwrap();
+        assert!(check_writable(&path("e.txt")).unwrap_err().to_string().contains("too many symbolic links"));
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_file_keeps_its_mode_and_one_that_is_read_only_its_content() {
+        use std::os::unix::fs::{MetadataExt, PermissionsExt, chown};
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.txt");
+        let mode = |mode| std::fs::set_permissions(&path, PermissionsExt::from_mode(mode)).unwrap();
+        std::fs::write(&path, "first").unwrap();
+        mode(0o640);
+        // Root gives files away
+        let is_root = chown(&path, Some(1234), Some(1235)).is_ok();
+        write_text(&path, "second").unwrap();
+        let now = path.metadata().unwrap();
+        assert_eq!(now.permissions().mode() & 0o777, 0o640);
+        assert!(!is_root || (now.uid(), now.gid()) == (1234, 1235));
+
+        mode(0o444);
+        for error in [check_writable(&path).unwrap_err(), write_text(&path, "third").unwrap_err()] {
+            assert!(
+                error.kind() == ErrorKind::PermissionDenied && error.to_string().ends_with("is read-only"),
+                "{error}"
+            );
+        }
+        assert_eq!(std::fs::read_to_string(&path).unwrap(), "second");
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
+    }
+
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn devices_and_open_files_are_written_to_and_not_replaced() {
+        use std::os::fd::AsRawFd;
+        let folder = tempfile::tempdir().unwrap();
+        let [full, file] = ["full", "file"].map(|name| folder.path().join(name));
+        std::os::unix::fs::symlink("/dev/full", &full).unwrap();
+        check_writable(&full).unwrap();
+        assert_eq!(write_text(&full, "text").unwrap_err().kind(), ErrorKind::StorageFull);
+
+        // As `/dev/stdout` is where a shell sends it to a file
+        let open = File::create(&file).unwrap();
+        let descriptor = format!("/dev/fd/{}", open.as_raw_fd());
+        write_text(Path::new(&descriptor), "text").unwrap();
+        assert_eq!(std::fs::read_to_string(&file).unwrap(), "text");
+        assert_eq!(open.metadata().unwrap().len(), 4, "it is still the same file");
     }
 }

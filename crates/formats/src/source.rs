@@ -1,6 +1,6 @@
 //! The source texts of an import, and positions in them.
 
-use flate2::read::GzDecoder;
+use crate::gzip;
 use std::fmt;
 use std::fs::File;
 use std::io::{self, Read};
@@ -91,7 +91,7 @@ impl SourceMap {
         (self.files.len() - 1) as FileId
     }
 
-    /// Reads a file, decompressing it if it is a gzip file.
+    /// Reads a file, decompressing it if it is a gzip file, of one member or several.
     pub fn read(&mut self, path: &Path) -> io::Result<FileId> {
         let bytes = read_maybe_gzip(path)?;
         Ok(self.add_text(path.display().to_string(), bytes))
@@ -153,9 +153,9 @@ fn read_maybe_gzip(path: &Path) -> io::Result<Vec<u8>> {
 pub fn read_bytes(input: impl Read, expected: usize) -> io::Result<Vec<u8>> {
     let mut bytes = Vec::with_capacity(expected);
     input.take(MAX_BYTES + 1).read_to_end(&mut bytes)?;
-    if bytes.starts_with(&[0x1f, 0x8b]) {
+    if bytes.starts_with(&gzip::MAGIC) {
         let mut text = Vec::new();
-        GzDecoder::new(bytes.as_slice()).take(MAX_BYTES + 1).read_to_end(&mut text)?;
+        gzip::Members::new(bytes.as_slice()).take(MAX_BYTES + 1).read_to_end(&mut text)?;
         bytes = text;
     }
     let too_large = || io::Error::new(io::ErrorKind::InvalidData, "larger than 4 GiB");
@@ -179,6 +179,13 @@ mod tests {
         assert_eq!(sources.bytes(file), b"WorldBegin\n# \xc3\xa4 b");
         let place = sources.locate(Span { file, start: 16, end: 17 });
         assert_eq!(place.position, Position::Text { line: 2, column: 5 });
+        // Two members, as bgzip and `cat a.gz b.gz` write them; so on the standard input
+        let compressed = std::fs::read(&path).unwrap();
+        let twice = compressed.repeat(2);
+        std::fs::write(&path, &twice).unwrap();
+        let (file, stream) = (sources.read(&path).unwrap(), read_bytes(twice.as_slice(), 0).unwrap());
+        assert_eq!(sources.bytes(file), b"WorldBegin\n# \xc3\xa4 bWorldBegin\n# \xc3\xa4 b");
+        assert_eq!(sources.bytes(file), stream);
         std::fs::write(&path, [0x1f, 0x8b, 8, 0, 1, 2]).unwrap();
         assert!(sources.read(&path).is_err());
     }

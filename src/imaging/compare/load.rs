@@ -4,7 +4,7 @@
 //! display windows of one size; what is compared is the rectangle for which all of them have pixels, so that a crop can
 //! be compared with a whole reference.
 
-use super::layers::{choose, remark};
+use crate::imaging::color_layers::{choose, remark};
 use crate::imaging::metrics::Pixel;
 use crate::imaging::metrics::flip::MAX_PIXELS;
 use crate::imaging::oiio::{ReadImage, ReadLimits, Window, read_headers, read_part};
@@ -148,7 +148,8 @@ pub fn read(path: &Path, layer: Option<&str>) -> Result<Raw, String> {
     let remarks = remark(&headers, &chosen).into_iter().collect();
     let variance = if chosen.name.is_empty() { variance(&read) } else { None };
     let encoding = read.encoding;
-    let pixels = pixels(&read, &chosen.channels).into_iter().map(|p| p.map(|v| encoding.to_linear(v))).collect();
+    let pixels =
+        pixels(&read, chosen.channels.as_slice()).into_iter().map(|p| p.map(|v| encoding.to_linear(v))).collect();
     let layer = chosen.title().to_owned();
     let shown =
         Shown { path: path.to_owned(), name: String::new(), layer, remarks, pixels, variance, is_half: read.is_half };

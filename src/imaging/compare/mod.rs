@@ -1,10 +1,9 @@
 //! Comparison of images with a reference: files and arrays to pixels of one size, and all metrics by name.
 //!
-//! Reading order: [`layers`] (which channels of a file are the image), [`mod@load`] (images of one size), [`metric`] (names
-//! of metrics), [`scores`] (metrics), [`columns`] (metrics by name).
+//! Reading order: [`mod@load`] (images of one size), [`metric`] (names of metrics), [`scores`] (metrics), [`columns`]
+//! (metrics by name).
 
 pub mod columns;
-pub mod layers;
 pub mod load;
 pub mod metric;
 pub mod scores;

@@ -5,11 +5,12 @@
 //! that a failure never leaves a partial image under the name. Equal images give equal files: a date is written only if
 //! the caller gives one (`DateTime`), since OpenImageIO would fill in the current time.
 //!
-//! Reading order: [`part`] (what is written), [`shim`] (calls and strings), [`read`], [`pyramid`], [`mod@write`], [`ocio`].
+//! Reading order: [`part`] (what is written), [`shim`] (calls and strings), [`radiance`], [`read`], [`pyramid`], [`mod@write`], [`ocio`].
 
 mod ocio;
 mod part;
 mod pyramid;
+mod radiance;
 mod read;
 mod shim;
 mod write;
@@ -23,5 +24,5 @@ pub use openimageio_sys::is_loaded;
 pub use part::{MetaValue, Part, Storage};
 pub use pyramid::FilePyramid;
 pub(super) use read::{Input, read_failure};
-pub use read::{ReadImage, read_headers, read_image, read_metadata, read_part, texture_bytes};
+pub use read::{ReadImage, read_colors, read_headers, read_image, read_metadata, read_part, texture_bytes};
 pub use write::{ROWS_AT_ONCE, RowSource, write_image, write_rows};

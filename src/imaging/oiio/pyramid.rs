@@ -2,6 +2,7 @@
 
 use super::read::{Input, read_failure, usual_encoding};
 use crate::imaging::ColorEncoding;
+use crate::imaging::color_layers::ColorLayer;
 use crate::imaging::file::{ImageError, ReadLimits};
 use openimageio_sys as sys;
 use std::path::{Path, PathBuf};
@@ -10,14 +11,15 @@ use std::sync::{Mutex, PoisonError};
 /// Most pixels of a tile: the headers of damaged files ask for more, and OpenImageIO would allocate them.
 const MAX_TILE: u64 = 1 << 22;
 
-/// A file open for reading, whose first part has all levels from the image to one pixel, each of half the size of the one before,
+/// A file open for reading, whose image has all levels from the whole to one pixel, each of half the size of the one before,
 /// rounded down.
 pub struct FilePyramid {
     /// One thread at a time reads.
     input: Mutex<Input>,
     path: PathBuf,
     sizes: Vec<[usize; 2]>,
-    channels: Vec<String>,
+    layer: ColorLayer,
+    channels: u64,
     encoding: ColorEncoding,
     is_bytes: bool,
     chromaticities: Option<String>,
@@ -32,14 +34,15 @@ impl std::fmt::Debug for FilePyramid {
 impl FilePyramid {
     /// Opens a file; `None` if it is an image without all levels. Reads no pixels.
     pub fn open(path: &Path) -> Result<Option<Self>, ImageError> {
-        let input = Input::open(path, 0)?;
+        let (input, layer) = Input::open_colors(path)?;
         let failed = |failure| read_failure(path, failure);
         let spec = input.spec().map_err(failed)?;
         let Some(sizes) = all_levels(&input) else { return Ok(None) };
         Ok(Some(FilePyramid {
             path: path.to_owned(),
             sizes,
-            channels: input.channels(spec.nchannels).map_err(failed)?,
+            layer,
+            channels: u64::try_from(spec.nchannels).unwrap_or(0),
             encoding: usual_encoding(&spec),
             is_bytes: spec.format == sys::OIIO_FORMAT_U8,
             chromaticities: input.metadata(spec.attributes).remove("chromaticities"),
@@ -57,9 +60,9 @@ impl FilePyramid {
         &self.sizes
     }
 
-    /// Names of the channels.
-    pub fn channels(&self) -> &[String] {
-        &self.channels
+    /// Where the colours are among the channels.
+    pub fn layer(&self) -> &ColorLayer {
+        &self.layer
     }
 
     /// The usual encoding of such a file.
@@ -80,7 +83,7 @@ impl FilePyramid {
     /// Some channels of all pixels of a level, interleaved, the top row first.
     pub fn level(&self, level: usize, channels: &[usize]) -> Result<Vec<f32>, ImageError> {
         let size = self.sizes[level];
-        let bytes = size.iter().fold(4 * self.channels.len() as u64, |bytes, &n| bytes.saturating_mul(n as u64));
+        let bytes = size.iter().fold(4 * self.channels, |bytes, &n| bytes.saturating_mul(n as u64));
         let limit = ReadLimits::default().bytes_for(self.path.metadata().map_or(0, |m| m.len()));
         if bytes > limit {
             let [width, height] = size;

@@ -2,7 +2,9 @@
 #![allow(unsafe_code)]
 
 use super::part::{MetaValue, Storage};
+use super::radiance;
 use super::shim::{api, c_path, call, text};
+use crate::imaging::color_layers::{ColorLayer, choose};
 use crate::imaging::file::{ImageError, PartHeader, ReadLimits, Window};
 use crate::imaging::{ColorEncoding, Image};
 use openimageio_sys as sys;
@@ -32,6 +34,8 @@ pub(in crate::imaging) struct Input {
     api: &'static sys::Api,
     handle: *mut sys::OiioInput,
     part: i32,
+    /// How the pixels of a Radiance picture are stored, if otherwise than others.
+    stored: Option<radiance::Storage>,
 }
 
 // SAFETY: a handle may go from thread to thread, if one at a time uses it.
@@ -55,7 +59,17 @@ impl Input {
         // textures must not be multiplied by it in 8 bits.
         call(|e, n| unsafe { (api.input_open)(name.as_ptr(), 1, &mut handle, e, n) })
             .map_err(|(_, m)| unreadable(m))?;
-        Ok(Input { api, handle, part })
+        Ok(Input { api, handle, part, stored: radiance::Storage::of(path) })
+    }
+
+    /// Opens a file at the part that is the image, and says where in it the colours are.
+    pub(super) fn open_colors(path: &Path) -> Result<(Self, ColorLayer), ImageError> {
+        let mut input = Input::open(path, 0)?;
+        let headers = input.headers().map_err(|failure| read_failure(path, failure))?;
+        let unreadable = |reason| ImageError::Unreadable { path: path.to_owned(), reason };
+        let layer = choose(&headers, None).map_err(unreadable)?;
+        input.part = i32::try_from(layer.part).unwrap_or(i32::MAX);
+        Ok((input, layer))
     }
 
     /// A level of the part, if there is one.
@@ -110,6 +124,10 @@ impl Input {
         let mut spec = sys::OiioSpec::default();
         // SAFETY: as above.
         call(|e, n| unsafe { (self.api.input_spec)(self.handle, self.part, &mut spec, e, n) })?;
+        if self.stored.is_some_and(|stored| stored.is_by_columns) {
+            std::mem::swap(&mut spec.width, &mut spec.height);
+            std::mem::swap(&mut spec.full_width, &mut spec.full_height);
+        }
         Ok(spec)
     }
 
@@ -127,6 +145,22 @@ impl Input {
     /// How the channels of the part are stored.
     pub(in crate::imaging) fn storage(&self) -> Result<Vec<Storage>, (i32, String)> {
         (0..self.spec()?.nchannels).map(|i| self.channel(i).map(|(_, storage)| storage)).collect()
+    }
+
+    /// The headers of all parts.
+    fn headers(&mut self) -> Result<Vec<PartHeader>, (i32, String)> {
+        let first = self.part;
+        let mut headers = Vec::new();
+        for part in 0..self.parts()? {
+            self.part = i32::try_from(part).unwrap_or(i32::MAX);
+            let spec = self.spec()?;
+            let channels = self.channels(spec.nchannels)?;
+            let name = self.metadata(spec.attributes).remove("oiio:subimagename").unwrap_or_default();
+            let size = [spec.width, spec.height].map(|n| usize::try_from(n).unwrap_or(0));
+            headers.push(PartHeader { name, channels, size });
+        }
+        self.part = first;
+        Ok(headers)
     }
 
     /// The metadata of the part whose types [`MetaValue`] has.
@@ -181,7 +215,10 @@ impl Input {
         let mut pixels = vec![0.0; count as usize];
         // SAFETY: `pixels` holds `count` floats.
         call(|e, n| unsafe { (self.api.input_read)(self.handle, self.part, pixels.as_mut_ptr(), count, e, n) })?;
-        Ok(pixels)
+        let Some(stored) = self.stored else { return Ok(pixels) };
+        let spec = self.spec()?;
+        let [width, height] = [spec.width, spec.height].map(|n| usize::try_from(n).unwrap_or(0));
+        Ok(stored.arranged(&pixels, if stored.is_by_columns { [height, width] } else { [width, height] }))
     }
 }
 
@@ -197,9 +234,20 @@ pub fn read_image(path: &Path, limits: &ReadLimits) -> Result<ReadImage, ImageEr
     read_part(path, 0, limits)
 }
 
+/// Reads the part of a file that is the image, and says where in it the colours are: what is read wherever an image is
+/// asked for, and no layer. `Err` if that is not clear.
+pub fn read_colors(path: &Path, limits: &ReadLimits) -> Result<(ReadImage, ColorLayer), ImageError> {
+    let (input, layer) = Input::open_colors(path)?;
+    Ok((read(&input, path, layer.part, limits)?, layer))
+}
+
 /// Reads a part of an image, counted from 0.
 pub fn read_part(path: &Path, part: usize, limits: &ReadLimits) -> Result<ReadImage, ImageError> {
-    let input = Input::open(path, i32::try_from(part).unwrap_or(i32::MAX))?;
+    read(&Input::open(path, i32::try_from(part).unwrap_or(i32::MAX))?, path, part, limits)
+}
+
+/// Reads the part at which the file is open.
+fn read(input: &Input, path: &Path, part: usize, limits: &ReadLimits) -> Result<ReadImage, ImageError> {
     let failed = |failure| read_failure(path, failure);
     let parts = input.parts().map_err(failed)?;
     if part >= parts {
@@ -236,29 +284,17 @@ pub fn read_metadata(path: &Path) -> Result<BTreeMap<String, String>, ImageError
 
 /// Reads the headers of all parts of an image, and no pixels.
 pub fn read_headers(path: &Path) -> Result<Vec<PartHeader>, ImageError> {
-    let mut input = Input::open(path, 0)?;
-    let failed = |failure| read_failure(path, failure);
-    let parts = input.parts().map_err(failed)?;
-    let mut headers = Vec::with_capacity(parts);
-    for part in 0..parts {
-        input.part = i32::try_from(part).unwrap_or(i32::MAX);
-        let spec = input.spec().map_err(failed)?;
-        let channels = input.channels(spec.nchannels).map_err(failed)?;
-        let name = input.metadata(spec.attributes).remove("oiio:subimagename").unwrap_or_default();
-        let size = [spec.width, spec.height].map(|n| usize::try_from(n).unwrap_or(0));
-        headers.push(PartHeader { name, channels, size });
-    }
-    Ok(headers)
+    Input::open(path, 0)?.headers().map_err(|failure| read_failure(path, failure))
 }
 
-/// Bytes that the pixels of the first part take as a texture, without coarser levels: one for each 8-bit number, four for any
+/// Bytes that the colours of an image take as a texture, without coarser levels: one for each 8-bit number, four for any
 /// other. Reads no pixels.
 pub fn texture_bytes(path: &Path) -> Result<u64, ImageError> {
-    let input = Input::open(path, 0)?;
+    let (input, layer) = Input::open_colors(path)?;
     let spec = input.spec().map_err(|failure| read_failure(path, failure))?;
-    let [width, height, channels] = [spec.width, spec.height, spec.nchannels].map(|n| u64::try_from(n).unwrap_or(0));
+    let [width, height] = [spec.width, spec.height].map(|n| u64::try_from(n).unwrap_or(0));
     let bytes = if spec.format == sys::OIIO_FORMAT_U8 { 1 } else { 4 };
-    let channels = if channels < 3 { channels.min(1) } else { 3 };
+    let channels = layer.channels.as_slice().len() as u64;
     Ok(width.saturating_mul(height).saturating_mul(channels * bytes))
 }
 

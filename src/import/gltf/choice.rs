@@ -1,6 +1,7 @@
 //! Choices by name or by index.
 
 use lumiris_formats::gltf::Place;
+use lumiris_formats::names::nfc;
 
 /// What may be chosen, by its name or by other names that count only if none has it as its name.
 pub(super) type Names<'d> = Vec<[Option<&'d str>; 2]>;
@@ -18,7 +19,9 @@ pub(super) fn shown(names: &Names<'_>) -> Vec<String> {
 /// The index of what is asked for by a name, or by an index if nothing is called so. `Err` says what there is; `what` is
 /// its name and that of the option.
 pub(super) fn chosen([what, option]: [&str; 2], wanted: &str, names: &Names<'_>) -> Result<usize, String> {
-    let called = |level: usize| (0..names.len()).filter(|&i| names[i][level] == Some(wanted)).collect::<Vec<_>>();
+    let is_wanted = |name: &str| nfc(name) == nfc(wanted);
+    let called =
+        |level: usize| (0..names.len()).filter(|&i| names[i][level].is_some_and(is_wanted)).collect::<Vec<_>>();
     let found = [called(0), called(1)].into_iter().find(|found| !found.is_empty()).unwrap_or_default();
     let index = || wanted.parse().ok().filter(|&i: &usize| i < names.len());
     let problem = match found[..] {
@@ -44,6 +47,8 @@ mod tests {
         let names =
             vec![[Some("1"), Some("a")], [Some("a"), Some("b")], [None, Some("c")], [None, None], [None, Some("c")]];
         let of = |wanted: &str| chosen(["camera", "--camera"], wanted, &names);
+        let accented = vec![[Some("gru\u{308}n"), None]];
+        assert_eq!(chosen(["camera", "--camera"], "gr\u{fc}n", &accented), Ok(0));
         assert_eq!([of("1"), of("a"), of("b"), of("0"), of("3")], [Ok(0), Ok(1), Ok(1), Ok(0), Ok(3)]);
         let all = "cameras: 0 (1), 1 (a), 2 (c), 3, 4 (c)";
         assert_eq!(of("x"), Err(format!("--camera: there is no camera `x`; {all}")));

@@ -90,7 +90,7 @@ impl Builder<'_> {
             match (made, material) {
                 (Ok(made), Some(material)) => {
                     made.warnings.iter().for_each(|w| {
-                        d.warning_once(desc.span, w.clone());
+                        d.warning_first(desc.span, w.clone());
                     });
                     self.place(&mut assembly, desc, made, material, d);
                 }

@@ -2,8 +2,9 @@
 
 use super::checks::positive;
 use crate::cameras::{Aperture, LensElement, LensSystem};
-use crate::imaging::oiio::{ReadLimits, read_image};
+use crate::imaging::oiio::{ReadLimits, read_colors};
 use lumiris_formats::diagnostic::Diagnostics;
+use lumiris_formats::names::file_in;
 use lumiris_formats::number::numbers_of_text;
 use lumiris_formats::pbrt::params::ParamSet;
 use std::path::{Path, PathBuf};
@@ -16,7 +17,7 @@ pub(super) fn files(p: &ParamSet, folder: &Path) -> Vec<PathBuf> {
     // What is wrong with the parameters has been said
     let d = &mut Diagnostics::new();
     let aperture = p.string("aperture", d).filter(|name| Aperture::named(name).is_none());
-    p.string("lensfile", d).into_iter().chain(aperture).map(|name| folder.join(name)).collect()
+    p.string("lensfile", d).into_iter().chain(aperture).map(|name| file_in(folder, name)).collect()
 }
 
 /// The lenses in front of a film of a diagonal (m), in focus.
@@ -25,7 +26,7 @@ pub(super) fn realistic(p: &ParamSet, folder: &Path, diagonal: f32, d: &mut Diag
         d.error(p.span, "camera `realistic` needs `string lensfile`");
         return None;
     };
-    let (path, span) = (folder.join(name), p.span_of("lensfile"));
+    let (path, span) = (file_in(folder, name), p.span_of("lensfile"));
     let text = match std::fs::read(&path) {
         Ok(bytes) => String::from_utf8_lossy(&bytes).into_owned(),
         Err(error) => {
@@ -92,12 +93,13 @@ fn aperture(p: &ParamSet, folder: &Path, d: &mut Diagnostics) -> Option<Aperture
         super::checks::unknown(name, span, "aperture", &Aperture::NAMES, d);
         return None;
     }
-    let path = folder.join(name);
-    match read_image(&path, &ReadLimits::default()) {
-        Ok(read) => {
+    let path = file_in(folder, name);
+    match read_colors(&path, &ReadLimits::default()) {
+        Ok((read, layer)) => {
             let image = read.image;
             let channels = image.channels.len();
-            let mean = |texel: &[f32]| texel.iter().take(3).sum::<f32>() / texel.len().min(3) as f32;
+            let colors = layer.channels.as_slice();
+            let mean = |texel: &[f32]| colors.iter().map(|&c| texel[c]).sum::<f32>() / colors.len() as f32;
             let texels = image.data.chunks_exact(channels).map(mean).collect();
             Some(Aperture::Image(texels, [image.width, image.height]))
         }

@@ -9,6 +9,7 @@ use crate::lights::spot::spot_solid_angle;
 use crate::lights::{EnvironmentFilter, EnvironmentMap, EnvironmentMapping, Light, Portal, PortalLight};
 use lumiris_formats::color_space::Colored;
 use lumiris_formats::diagnostic::Diagnostics;
+use lumiris_formats::names::{file_in, nfc};
 use lumiris_formats::pbrt::directive::Name;
 use lumiris_formats::pbrt::params::{ParamSet, ParamType};
 use lumiris_formats::source::Span;
@@ -130,7 +131,7 @@ impl Builder<'_> {
         world_from_light: &Affine3A,
         scale: f32,
     ) -> Light {
-        let (path, index) = (self.folder.join(name), self.lights.len());
+        let (path, index) = (file_in(&self.folder, name), self.lights.len());
         let world_from_light = *world_from_light;
         self.environments.push(EnvironmentDesc { path, span, image_use, world_from_light, scale, index });
         Light::InfiniteConstant { l: Rgb::BLACK }
@@ -184,7 +185,7 @@ impl Builder<'_> {
         let color = self.color_param(p, "L", SpectrumUse::Illuminant, d);
         let two_sided = p.boolean("twosided", d).unwrap_or(false);
         let power = p.float("power", d).unwrap_or(0.0);
-        let image = file_name(p, "filename", d).map(|f| (self.folder.join(f), p.span_of("filename")));
+        let image = file_name(p, "filename", d).map(|f| (file_in(&self.folder, f), p.span_of("filename")));
         if color.is_some() && image.is_some() {
             d.error(p.span_of("L"), "an area light has `L` or `filename`, not both");
         }
@@ -225,8 +226,8 @@ fn image_of(p: &ParamSet, kind: &str, d: &mut Diagnostics) -> Option<String> {
 
 /// `lightgroup`: the layer of the image that the light has.
 fn light_group(p: &ParamSet, d: &mut Diagnostics) -> Option<Arc<str>> {
-    let name = p.string("lightgroup", d)?;
-    match fault_of_name(name) {
+    let name = nfc(p.string("lightgroup", d)?).into_owned();
+    match fault_of_name(&name) {
         Some(reason) => {
             d.error(p.span_of("lightgroup"), reason);
             None

@@ -11,6 +11,7 @@ use crate::materials::{
 };
 use crate::textures::{Filter, FloatTexture, RgbTexture, RgbTextureId, Wrap};
 use lumiris_formats::diagnostic::{Diagnostics, did_you_mean};
+use lumiris_formats::names::{file_in, nfc};
 use lumiris_formats::pbrt::directive::Name;
 use lumiris_formats::pbrt::params::{Input, ParamSet, ParamType, SpectrumValue};
 use lumiris_formats::source::Span;
@@ -92,7 +93,7 @@ impl Builder<'_> {
     fn normal_map(&mut self, p: &ParamSet, d: &mut Diagnostics) -> Option<NormalMap> {
         let name = file_name(p, "normalmap", d)?;
         let request = ImageRequest {
-            path: self.folder.join(name),
+            path: file_in(&self.folder, name),
             channels: ImageChannels::Color,
             encoding: ImageEncoding::Linear,
             wrap: Wrap::Repeat,
@@ -406,7 +407,7 @@ impl Builder<'_> {
 
     /// The material of a name, when all names are known.
     fn named_material(&self, name: &str, span: Span, d: &mut Diagnostics) -> Option<MaterialId> {
-        let found = self.named_materials.get(name).map(|(id, _)| *id);
+        let found = self.named_materials.get(&*nfc(name)).map(|(id, _)| *id);
         if found.is_none() {
             let near = did_you_mean(name, self.named_materials.keys().map(String::as_str)).map(str::to_owned);
             let diagnostic = d.error(span, format!("unknown material `{name}`"));

@@ -8,6 +8,7 @@ use crate::import::measured::MeasuredError;
 use crate::materials::Material;
 use lumiris_formats::bsdf_file::BsdfFileError;
 use lumiris_formats::diagnostic::Diagnostics;
+use lumiris_formats::names::file_in;
 use lumiris_formats::pbrt::directive::Name;
 use lumiris_formats::pbrt::params::ParamSet;
 use lumiris_formats::source::Span;
@@ -23,7 +24,7 @@ impl Builder<'_> {
                 .help("a file `.bsdf` of the RGL material database, or of the same form");
             return Material::Interface;
         };
-        let (path, span) = (self.folder.join(name), p.span_of("filename"));
+        let (path, span) = (file_in(&self.folder, name), p.span_of("filename"));
         let known = self.measured_files.iter().position(|(file, _)| *file == path);
         let tables = known.unwrap_or_else(|| {
             self.measured_files.push((path, span));

@@ -8,6 +8,7 @@ use crate::import::face_maps::FaceMapRequest;
 use crate::import::images::ImageEncoding;
 use crate::textures::FaceTexture;
 use lumiris_formats::diagnostic::Diagnostics;
+use lumiris_formats::names::file_in;
 use lumiris_formats::pbrt::params::ParamSet;
 use lumiris_formats::ptex::PtexError;
 use lumiris_formats::source::Span;
@@ -31,7 +32,7 @@ impl Builder<'_> {
             d.error(p.span, "a texture `ptex` needs a `string filename`");
             return None;
         };
-        let (request, span) = (FaceMapRequest { path: self.folder.join(name), encoding }, p.span_of("filename"));
+        let (request, span) = (FaceMapRequest { path: file_in(&self.folder, name), encoding }, p.span_of("filename"));
         let known = self.face_maps.iter().position(|(known, _)| *known == request);
         let map = known.unwrap_or_else(|| {
             self.face_maps.push((request, span));

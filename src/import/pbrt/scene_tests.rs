@@ -63,6 +63,33 @@ fn wrong_options_are_errors_that_say_what_is_possible() {
 }
 
 #[test]
+fn a_name_is_the_same_in_every_unicode_normal_form() {
+    // `ü` as one character and as two; each name is defined in one form and used in the other
+    for [a, b] in [["gr\u{fc}n", "gru\u{308}n"], ["gru\u{308}n", "gr\u{fc}n"]] {
+        let head = format!("MakeNamedMedium \"{a}\" \"string type\" \"homogeneous\"\nCoordinateSystem \"{a}\"");
+        let world = format!(
+            r#"CoordSysTransform "{b}"
+               Texture "{a}" "float" "constant" "float value" 0.5
+               Texture "{a}" "spectrum" "constant" "rgb value" [ 1 0 0 ]
+               MakeNamedMaterial "{a}" "string type" "diffuse" "texture reflectance" "{b}"
+               MakeNamedMaterial "mixed" "string type" "mix" "string materials" [ "{b}" "{a}" ] "texture amount" "{b}"
+               NamedMaterial "{b}"
+               MediumInterface "{b}" ""
+               ObjectInstance "{b}"
+               ObjectBegin "{a}" Shape "sphere" "texture alpha" "{b}" ObjectEnd
+               ObjectInstance "{b}"
+               AreaLightSource "diffuse" "string lightgroup" "{a}" Shape "disk"
+               AreaLightSource "diffuse" "string lightgroup" "{b}" Shape "sphere""#
+        );
+        let loaded = load_with(&head, &world).unwrap_or_else(|report| panic!("{report}"));
+        assert_eq!(loaded.scene.lights.layers.names(), ["other", "gr\u{fc}n"]);
+        let twice = format!("MakeNamedMaterial \"{a}\" \"string type\" \"diffuse\"\n").replace(a, b);
+        let error = load_with("", &(twice.replace(b, a) + &twice)).unwrap_err();
+        assert!(error.contains("is defined twice"), "{error}");
+    }
+}
+
+#[test]
 fn transform_end_restores_all_as_attribute_end_does() {
     let world = r#"Material "diffuse" TransformBegin Material "interface" Scale 2 2 2 TransformEnd Shape "disk""#;
     let loaded = load_with("", world).unwrap();

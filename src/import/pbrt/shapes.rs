@@ -10,6 +10,7 @@ use crate::geometry::loop_subdiv::loop_subdivide;
 use crate::geometry::{BilinearMesh, DisplacedMesh, Quadric, QuadricKind, Shape, TriangleMesh};
 use crate::textures::{FloatTexture, TextureContext, TextureSet};
 use lumiris_formats::diagnostic::Diagnostics;
+use lumiris_formats::names::file_in;
 use lumiris_formats::pbrt::directive::Name;
 use lumiris_formats::pbrt::params::{Input, ParamSet, ParamType};
 use lumiris_formats::ply::{PlyError, PlyMesh};
@@ -57,7 +58,7 @@ impl Builder<'_> {
             "plymesh" => match file_name(&p, "filename", d) {
                 Some(file) => {
                     name = file.to_owned();
-                    let path = self.folder.join(file);
+                    let path = file_in(&self.folder, file);
                     Some(ShapeSource::Ply(path))
                 }
                 None => {

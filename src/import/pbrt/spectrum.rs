@@ -3,6 +3,7 @@
 use super::state::Builder;
 use lumiris_formats::color_space::Colored;
 use lumiris_formats::diagnostic::Diagnostics;
+use lumiris_formats::names::file_in;
 use lumiris_formats::pbrt::params::SpectrumValue;
 use lumiris_formats::source::Span;
 use lumiris_formats::spectra::{self, Spectrum};
@@ -94,7 +95,7 @@ impl Builder<'_> {
         if let Some(rgb) = spectra::illuminant_rgb(name) {
             return Some(Resolved::Rgb(rgb));
         }
-        let path = self.folder.join(name);
+        let path = file_in(&self.folder, name);
         match Spectrum::read(&path) {
             Ok(Ok(curve)) => {
                 self.spectrum_files.borrow_mut().push(path);

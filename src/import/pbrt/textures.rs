@@ -11,6 +11,7 @@ use crate::textures::{
     NoiseKind, NoiseTexture, Octaves, RgbTexture, RgbTextureId, Udim, UdimId, Wrap,
 };
 use lumiris_formats::diagnostic::Diagnostics;
+use lumiris_formats::names::file_in;
 use lumiris_formats::pbrt::directive::Name;
 use lumiris_formats::pbrt::params::{Input, ParamSet, ParamType, SpectrumValue};
 use lumiris_formats::source::Span;
@@ -246,7 +247,7 @@ impl Builder<'_> {
             d.error(p.span, "an image texture needs a `string filename`");
             return None;
         };
-        let (path, span) = (self.folder.join(name), p.span_of("filename"));
+        let (path, span) = (file_in(&self.folder, name), p.span_of("filename"));
         let request = ImageRequest { path, channels, encoding, wrap, filter };
         let (image, udim) = if name.contains(UDIM) {
             let (first, udim) = self.udim(&request, span, d)?;

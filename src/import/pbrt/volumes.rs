@@ -8,6 +8,7 @@ use crate::import::cache::FileCache;
 use crate::import::volumes::{Volume, VolumeRequest, VolumeUse};
 use crate::media::{Field, Heterogeneous, Medium, Scalars, SparseSamples, UniformGrid};
 use lumiris_formats::diagnostic::Diagnostics;
+use lumiris_formats::names::file_in;
 use lumiris_formats::nanovdb::{GridClass, NanoError};
 use lumiris_formats::pbrt::params::ParamSet;
 use lumiris_formats::source::Span;
@@ -55,7 +56,7 @@ impl Builder<'_> {
         };
         let [sigma_a, sigma_s] = coefficients?;
         Some(VolumeDesc {
-            path: self.folder.join(name),
+            path: file_in(&self.folder, name),
             span: p.span_of("filename"),
             density: (density, p.span_of("gridname")),
             temperature: (le_scale > 0.0).then_some(temperature),

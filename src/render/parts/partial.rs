@@ -4,7 +4,7 @@
 //! or a command that is given twice. Each of them replaces the whole file, so the last one stays; what they may not do is
 //! write into one another's half of a file, hence the lock.
 
-use lumiris_formats::output::sync_and_rename;
+use lumiris_formats::output::Destination;
 use std::fs::{File, TryLockError, remove_file};
 use std::io;
 use std::path::{Path, PathBuf};
@@ -17,7 +17,7 @@ const ATTEMPTS: u32 = 100;
 pub(super) struct Partial {
     file: File,
     name: PathBuf,
-    path: PathBuf,
+    destination: Destination,
 }
 
 impl Partial {
@@ -35,7 +35,11 @@ impl Partial {
 
     /// An empty file.
     fn create(path: &Path) -> io::Result<Partial> {
-        let name = partial_path(path);
+        let destination = Destination::of(path)?;
+        if destination.is_stream() {
+            return Err(io::Error::new(io::ErrorKind::InvalidInput, "is no regular file"));
+        }
+        let name = partial_path(destination.path());
         for _ in 0..ATTEMPTS {
             let file = File::options().write(true).create(true).truncate(false).open(&name)?;
             match file.try_lock() {
@@ -49,7 +53,7 @@ impl Partial {
             }
             if has_name(&file, &name)? {
                 file.set_len(0)?;
-                return Ok(Partial { file, name, path: path.to_owned() });
+                return Ok(Partial { file, name, destination });
             }
         }
         Err(io::Error::new(io::ErrorKind::ResourceBusy, "other processes are writing it"))
@@ -57,7 +61,7 @@ impl Partial {
 
     /// Gives the file its name when all of it is on the disk.
     pub(super) fn end(self) -> io::Result<()> {
-        let ended = sync_and_rename(&self.name, &self.path);
+        let ended = self.destination.replace_by(&self.name);
         if ended.is_err() {
             self.remove();
         }

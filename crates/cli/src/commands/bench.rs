@@ -11,7 +11,7 @@ use lumiris::render::bench_frame::{FrameReport, measure_frame};
 use lumiris::render::bench_photons::{PhotonReport, measure_photons};
 use lumiris::render::plan::Preparation;
 use lumiris::scene::{AccelKind, RenderJob};
-use lumiris_formats::output::write_text;
+use lumiris_formats::output::{check_writable, write_text};
 use serde_json::json;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -64,6 +64,7 @@ pub(super) fn run(args: &BenchArgs) -> anyhow::Result<ExitCode> {
     if args.scene.accel != AccelKind::Embree {
         bail!("bench measures Embree; leave out --accel");
     }
+    args.json.as_deref().map_or(Ok(()), check_writable)?;
     let (mut job, times) = load_job(&args.scene)?;
     plan(&args.scene, &mut job, &Preparation::default(), false)?;
     let asked = |subject| args.subject == subject || args.subject == Subject::All;
@@ -76,12 +77,10 @@ pub(super) fn run(args: &BenchArgs) -> anyhow::Result<ExitCode> {
         packet_width: args.scene.packet_width,
         tile_size: args.scene.tile_size,
     };
-    let frame = if asked(Subject::Frame) { Some(frame(args, &job)?) } else { None };
+    let frame = || measure_frame(&job, args.scene.tile_size, args.rays as usize, args.runs);
+    let frame = if asked(Subject::Frame) { Some(frame()?) } else { None };
     let photons = if asked(Subject::Photons) { photons(args, &job)? } else { None };
     let report = measure(job, &settings)?;
-    if settings.intersect || settings.t1 || settings.t2 {
-        progress::print(&table(&report));
-    }
     if let Some(path) = &args.json {
         let mut value = serde_json::to_value(&report)?;
         let name = args.scene.scene.display().to_string();
@@ -93,12 +92,15 @@ pub(super) fn run(args: &BenchArgs) -> anyhow::Result<ExitCode> {
         write_text(path, &serde_json::to_string_pretty(&value)?)
             .with_context(|| format!("cannot write {}", path.display()))?;
     }
+    frame.iter().try_for_each(|report| progress::print(frame_table(report).trim_end()))?;
+    photons.iter().try_for_each(|report| progress::print(&photon_table(report)))?;
+    if settings.intersect || settings.t1 || settings.t2 {
+        progress::print(&table(&report))?;
+    }
     Ok(ExitCode::SUCCESS)
 }
 
-/// Measures a frame and prints the results.
-fn frame(args: &BenchArgs, job: &RenderJob) -> anyhow::Result<FrameReport> {
-    let report = measure_frame(job, args.scene.tile_size, args.rays as usize, args.runs)?;
+fn frame_table(report: &FrameReport) -> String {
     let mut text =
         format!("{} camera samples, one thread\n{:<22}{:>10}\n", report.camera_samples, "ns per camera sample", "");
     let mut line = |name: &str, value: f64| text += &format!("{name:<22}{value:>10.1}\n");
@@ -113,17 +115,13 @@ fn frame(args: &BenchArgs, job: &RenderJob) -> anyhow::Result<FrameReport> {
         text +=
             &format!("{:<22}{:>10.3}{:>10}{:>10.1}\n", rays.name, rays.per_camera_sample, rays.width, rays.ns_per_ray);
     }
-    progress::print(text.trim_end());
-    Ok(report)
+    text
 }
 
-/// Measures photon tracing and prints the results; `all` skips it for a scene without photons.
+/// Measures photon tracing; `all` skips it for a scene without photons.
 fn photons(args: &BenchArgs, job: &RenderJob) -> anyhow::Result<Option<PhotonReport>> {
     match measure_photons(job, args.scene.threads.map(|t| t as usize), args.runs) {
-        Ok(report) => {
-            progress::print(&photon_table(&report));
-            Ok(Some(report))
-        }
+        Ok(report) => Ok(Some(report)),
         Err(e) if args.subject == Subject::All => {
             progress::say(&format!("photons: {e}"));
             Ok(None)

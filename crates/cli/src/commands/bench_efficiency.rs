@@ -191,14 +191,15 @@ pub(super) fn efficiency(scene_args: &SceneArgs, own: &EfficiencyArgs, json: Opt
                 rows,
                 left_out,
             };
-            progress::print(&text(&table));
+            let shown = text(&table);
             tables.push(table);
             write(&tables)?;
+            progress::print(&shown)?;
         }
     }
     for variant in variants_and_none() {
         if let Some(text) = summary(&tables, variant, |row| variant_of(&row.name) == variant) {
-            progress::print(&text);
+            progress::print(&text)?;
         }
     }
     Ok(())

@@ -5,7 +5,7 @@ use super::progress;
 use anyhow::{Context, anyhow, bail};
 use lumiris::film::PixelBounds;
 use lumiris::imaging::ColorChannels;
-use lumiris::imaging::oiio::{Part, ReadLimits, read_image, write_image};
+use lumiris::imaging::oiio::{Part, ReadLimits, read_colors, write_image};
 use lumiris::import::fingerprint::SceneFiles;
 use lumiris::render::RenderSettings;
 use lumiris::render::efficiency::{Colors, reference_image, reference_settings};
@@ -79,7 +79,8 @@ impl<'a> References<'a> {
 
 /// Reads a reference of these pixels.
 fn read(path: &Path, bounds: &PixelBounds) -> anyhow::Result<Colors> {
-    let image = read_image(path, &ReadLimits::default())?.image;
+    let (read, layer) = read_colors(path, &ReadLimits::default())?;
+    let image = read.image;
     let asked = [bounds.width() as usize, bounds.height() as usize];
     if [image.width, image.height] != asked {
         let [width, height] = asked;
@@ -90,7 +91,7 @@ fn read(path: &Path, bounds: &PixelBounds) -> anyhow::Result<Colors> {
             image.height
         );
     }
-    let Some(ColorChannels::Rgb(rgb)) = image.color_channels() else {
+    let ColorChannels::Rgb(rgb) = layer.channels else {
         bail!("{} is no reference: it has no channels R, G and B", path.display());
     };
     let pixels = image.data.chunks_exact(image.channels.len());

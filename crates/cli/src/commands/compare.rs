@@ -1,13 +1,13 @@
 //! `lumiris compare`
 
 use super::progress;
-use crate::compare::write_page;
+use crate::compare::{check_page, write_page};
 use anyhow::{Context, bail};
 use clap::{Args, ValueEnum};
 use lumiris::imaging::compare::columns::{column, shown_columns};
 use lumiris::imaging::compare::{COLUMNS, Column, Compared, ImageSet, Metric, Scores, Settings, Shown, compare, load};
 use lumiris::imaging::metrics::bias::Z_95;
-use lumiris_formats::output::write_text;
+use lumiris_formats::output::{check_writable, write_text};
 use serde_json::{Map, Value, json};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -129,6 +129,7 @@ fn limit(text: &str) -> Result<Limit, String> {
 }
 
 pub(super) fn run(args: &CompareArgs) -> anyhow::Result<ExitCode> {
+    check_files(args)?;
     let set = load(&args.images, &args.reference, args.layer.as_deref())?;
     let settings = settings(args);
     let compared = compare(&set, &settings);
@@ -139,21 +140,28 @@ pub(super) fn run(args: &CompareArgs) -> anyhow::Result<ExitCode> {
 
     let report = report(args, &set, &settings, &compared, &failures);
     let text = serde_json::to_string_pretty(&report)? + "\n";
-    match args.json.as_deref() {
-        Some(path) if path == Path::new("-") => progress::print(text.trim_end()),
-        Some(path) => {
-            write_text(path, &text).with_context(|| format!("cannot write {}", path.display()))?;
-            progress::print(&table(&set, &settings, &compared));
-        }
-        None => progress::print(&table(&set, &settings, &compared)),
+    let file = args.json.as_deref().filter(|path| *path != Path::new("-"));
+    if let Some(path) = file {
+        write_text(path, &text).with_context(|| format!("cannot write {}", path.display()))?;
     }
     if let Some(folder) = &args.html {
         let page = write_page(folder, &set, &settings, &compared)
             .with_context(|| format!("cannot write the page into {}", folder.display()))?;
         progress::say(&format!("The page is in {}", page.display()));
     }
+    // Files first: they are there whether the standard output is or not
+    let is_printed = args.json.is_some() && file.is_none();
+    progress::print(&if is_printed { text.trim_end().to_owned() } else { table(&set, &settings, &compared) })?;
     failures.iter().for_each(|f| progress::say(f));
     Ok(if failures.is_empty() { ExitCode::SUCCESS } else { ExitCode::from(1) })
+}
+
+/// Refuses files that cannot be written.
+fn check_files(args: &CompareArgs) -> anyhow::Result<()> {
+    let json = args.json.as_deref().filter(|path| *path != Path::new("-"));
+    json.map_or(Ok(()), check_writable)?;
+    args.html.as_deref().map_or(Ok(()), check_page)?;
+    Ok(())
 }
 
 /// Selected metrics, and those that limits refer to.

@@ -12,9 +12,9 @@ use lumiris::render::crosscheck::{EDGE_ULPS, Report, T_TOLERANCE_ULPS, crosschec
 use lumiris::render::plan::Preparation;
 use lumiris::render::{output, render};
 use lumiris::scene::{AccelKind, RenderJob, World};
-use lumiris_formats::output::write_text;
+use lumiris_formats::output::{check_writable, write_text};
 use serde::Serialize;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -25,6 +25,9 @@ const MAX_DIFFERENT_PIXELS: f64 = 0.005;
 const PIXEL_TOLERANCE: f64 = 0.01;
 /// Allowed relative difference of the images' means.
 const MEAN_TOLERANCE: f64 = 1e-3;
+
+/// Images that `--images` stores.
+const IMAGES: [&str; 3] = ["embree", "bvh", "difference"];
 
 /// `lumiris crosscheck`
 #[derive(Args, Clone, Debug)]
@@ -62,6 +65,7 @@ pub(super) fn run(args: &CrosscheckArgs) -> anyhow::Result<ExitCode> {
     if args.scene.accel != AccelKind::Embree {
         bail!("crosscheck always compares Embree with the BVH; leave out --accel");
     }
+    check_files(args)?;
 
     // Rays
     let (mut job, _) = load_job(&args.scene)?;
@@ -69,21 +73,12 @@ pub(super) fn run(args: &CrosscheckArgs) -> anyhow::Result<ExitCode> {
     let bvh: Box<dyn Accel> =
         Box::new(Bvh::new(Arc::clone(&job.world.scene.geometry), Some(Arc::clone(&job.world.scene.textures) as _)));
     let report = crosscheck(&job, &*bvh, args.rays);
-    progress::print(&table(&report));
 
     // Images
     let embree_image = image(args, &job)?;
     job.world = World::new(job.world.scene, AccelKind::Bvh, None)?;
     let bvh_image = image(args, &job)?;
     let images = compare(&embree_image, &bvh_image);
-    progress::print(&format!(
-        "images: {} of {} pixels bit-identical, {} off by more than {} %, means differ by {:.2e}",
-        images.identical,
-        images.pixels,
-        images.different,
-        PIXEL_TOLERANCE * 100.0,
-        images.relative_mean_difference
-    ));
     if let Some(folder) = &args.images {
         write_images(folder, &job, &embree_image, &bvh_image)?;
     }
@@ -92,9 +87,27 @@ pub(super) fn run(args: &CrosscheckArgs) -> anyhow::Result<ExitCode> {
         write_text(path, &text).with_context(|| format!("cannot write {}", path.display()))?;
     }
 
+    progress::print(&table(&report))?;
+    progress::print(&format!(
+        "images: {} of {} pixels bit-identical, {} off by more than {} %, means differ by {:.2e}",
+        images.identical,
+        images.pixels,
+        images.different,
+        PIXEL_TOLERANCE * 100.0,
+        images.relative_mean_difference
+    ))?;
     let agree = report.disagreements() == 0 && images.agrees();
-    progress::print(if agree { "Embree and the BVH agree" } else { "Embree and the BVH DISAGREE" });
+    progress::print(if agree { "Embree and the BVH agree" } else { "Embree and the BVH DISAGREE" })?;
     Ok(ExitCode::from(u8::from(!agree)))
+}
+
+/// Refuses files that cannot be written.
+fn check_files(args: &CrosscheckArgs) -> anyhow::Result<()> {
+    // The folder is made if it is not there
+    let folder = args.images.as_ref().filter(|folder| folder.exists());
+    let images = folder.into_iter().flat_map(|folder| IMAGES.map(|name| image_in(folder, name)));
+    images.chain(args.json.clone()).try_for_each(|path| check_writable(&path))?;
+    Ok(())
 }
 
 fn table(report: &Report) -> String {
@@ -139,14 +152,18 @@ fn compare(a: &[f32], b: &[f32]) -> ImageReport {
     ImageReport { pixels: a.len() / 3, identical, different, relative_mean_difference }
 }
 
-fn write_images(folder: &std::path::Path, job: &RenderJob, a: &[f32], b: &[f32]) -> anyhow::Result<()> {
+fn image_in(folder: &Path, name: &str) -> PathBuf {
+    folder.join(format!("{name}.exr"))
+}
+
+fn write_images(folder: &Path, job: &RenderJob, a: &[f32], b: &[f32]) -> anyhow::Result<()> {
     std::fs::create_dir_all(folder).with_context(|| format!("cannot create {}", folder.display()))?;
     let bounds = job.world.scene.film.bounds;
     let difference: Vec<f32> = a.iter().zip(b).map(|(x, y)| (x - y).abs()).collect();
-    for (name, data) in [("embree", a), ("bvh", b), ("difference", &difference)] {
+    for (name, data) in IMAGES.into_iter().zip([a, b, &difference]) {
         let names = ["R", "G", "B"].map(str::to_owned).to_vec();
         let part = Part::linear(bounds.width() as usize, bounds.height() as usize, names, data.to_vec());
-        oiio::write_image(&folder.join(format!("{name}.exr")), &[part])?;
+        oiio::write_image(&image_in(folder, name), &[part])?;
     }
     Ok(())
 }

@@ -7,11 +7,13 @@ use super::part_args::is_part;
 use super::pictures::{check_outputs, is_exr, write_display};
 use super::progress;
 use super::rescue::write_or_rescue;
-use anyhow::{Context, bail};
+use anyhow::{anyhow, bail};
 use clap::Args;
+use lumiris::imaging::ColorChannels;
+use lumiris::imaging::color_layers::{ColorLayer, choose};
 use lumiris::imaging::file_parts::{FilePart, read_file_parts};
 use lumiris::imaging::oidn::NoisyImage;
-use lumiris::imaging::oiio::{MetaValue, ReadLimits, Storage, write_image};
+use lumiris::imaging::oiio::{MetaValue, PartHeader, ReadLimits, Storage, write_image};
 use std::ops::Range;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -50,11 +52,11 @@ pub(super) fn run(args: &DenoiseFileArgs) -> anyhow::Result<ExitCode> {
     }
     let denoiser = open(args.oidn_library.as_deref(), args.threads)?;
 
-    // Denoise the image of the first part that has one
     let mut parts = read_file_parts(&args.input, &ReadLimits::default())?;
     drop_earlier_result(&mut parts);
-    let main = main_part(&parts).with_context(|| format!("{}: has no channels R, G and B", args.input.display()))?;
-    let image = noisy_image(&parts, main, |text| progress::say(&format!("{}: {text}", args.input.display())));
+    let layer = image_of(&parts).map_err(|reason| anyhow!("{}: {reason}", args.input.display()))?;
+    let main = layer.part;
+    let image = noisy_image(&parts, &layer, |text| progress::say(&format!("{}: {text}", args.input.display())));
     let denoised = Denoised::new(&denoiser, image)?;
 
     let mut misplaced = Vec::new();
@@ -62,7 +64,7 @@ pub(super) fn run(args: &DenoiseFileArgs) -> anyhow::Result<ExitCode> {
     for path in &args.output {
         let write = |path: &std::path::Path| {
             if is_exr(path) {
-                let parts = with_layer(parts.clone(), main, &denoised);
+                let parts = with_layer(parts.clone(), &layer, &denoised);
                 let parts: Vec<_> = parts.into_iter().map(FilePart::into_part).collect();
                 return Ok(write_image(path, &parts)?);
             }
@@ -95,9 +97,18 @@ fn drop_earlier_result(parts: &mut Vec<FilePart>) {
     parts.retain(|part| !part.image.channels.is_empty());
 }
 
-/// The first part with an image.
-fn main_part(parts: &[FilePart]) -> Option<usize> {
-    parts.iter().position(|part| ["R", "G", "B"].iter().all(|name| part.image.channel(name).is_some()))
+/// Where the image is.
+fn image_of(parts: &[FilePart]) -> Result<ColorLayer, String> {
+    let header = |part: &FilePart| PartHeader {
+        name: part.name.clone(),
+        channels: part.image.channels.clone(),
+        size: [part.image.width, part.image.height],
+    };
+    let layer = choose(&parts.iter().map(header).collect::<Vec<_>>(), None)?;
+    match layer.channels {
+        ColorChannels::Rgb(_) => Ok(layer),
+        ColorChannels::Grey(_) => Err("has no channels R, G and B".to_owned()),
+    }
 }
 
 /// Three channels of a part, side by side.
@@ -107,8 +118,8 @@ fn layer(part: &FilePart, channels: [usize; 3]) -> Vec<f32> {
 }
 
 /// The image and its guides, where they have its size; warns of those that are missing.
-fn noisy_image(parts: &[FilePart], main: usize, warn: impl Fn(&str)) -> NoisyImage {
-    let part = &parts[main];
+fn noisy_image(parts: &[FilePart], image: &ColorLayer, warn: impl Fn(&str)) -> NoisyImage {
+    let part = &parts[image.part];
     let is_beside = |other: &&FilePart| {
         let size = |p: &FilePart| (p.image.width, p.image.height, p.origin);
         size(other) == size(part)
@@ -130,7 +141,8 @@ fn noisy_image(parts: &[FilePart], main: usize, warn: impl Fn(&str)) -> NoisyIma
         }
         (None, None) => warn("warning: has neither albedo nor normal: denoised by colour, which loses detail"),
     }
-    let rgb = ["R", "G", "B"].map(|name| part.image.channel(name).unwrap_or(0));
+    let at = image.channels.as_slice();
+    let rgb = std::array::from_fn(|c| at[c.min(at.len() - 1)]);
     let normal = normal.filter(|_| albedo.is_some());
     let (width, height) = (part.image.width, part.image.height);
     NoisyImage { width, height, color: layer(part, rgb), albedo, normal }
@@ -148,9 +160,9 @@ fn position(part: &FilePart, name: &str) -> Option<usize> {
 }
 
 /// The file with the layer: a part of its own, where layers are parts.
-fn with_layer(mut parts: Vec<FilePart>, main: usize, denoised: &Denoised) -> Vec<FilePart> {
-    let red = parts[main].image.channel("R").unwrap_or(0);
-    let storage = parts[main].storage.get(red).copied().unwrap_or(Storage::Float);
+fn with_layer(mut parts: Vec<FilePart>, image: &ColorLayer, denoised: &Denoised) -> Vec<FilePart> {
+    let (main, channels) = (image.part, image.channels.as_slice());
+    let storage = channels.first().and_then(|&red| parts[main].storage.get(red)).copied().unwrap_or(Storage::Float);
     let layer = parts[main].beside(LAYER, &DENOISED, denoised.pixels.clone(), storage);
     if parts.len() > 1 {
         parts.push(layer);

@@ -120,7 +120,7 @@ pub(super) fn run(args: &FarmArgs) -> anyhow::Result<ExitCode> {
         submit(&folder)?;
     } else {
         let script = quoted(&text(&folder.join("submit.sh"))?);
-        progress::print(&format!("{} is ready; this submits it:\n{script}", folder.display()));
+        progress::print(&format!("{} is ready; this submits it:\n{script}", folder.display()))?;
     }
     Ok(ExitCode::SUCCESS)
 }
@@ -305,7 +305,7 @@ fn submit(folder: &Path) -> anyhow::Result<()> {
     if !err.is_empty() {
         progress::say(err.trim_end());
     }
-    progress::print(out.trim_end());
+    progress::print(out.trim_end())?;
     Ok(())
 }
 

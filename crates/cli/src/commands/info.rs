@@ -44,11 +44,11 @@ pub(super) fn run(args: &InfoArgs) -> anyhow::Result<ExitCode> {
         }
     };
     if args.json {
-        progress::print(&serde_json::to_string_pretty(&facts)?);
+        progress::print(&serde_json::to_string_pretty(&facts)?)?;
     } else {
         let mut text = String::new();
         list(&facts, (0, false), &mut text);
-        progress::print(text.trim_end());
+        progress::print(text.trim_end())?;
     }
     Ok(ExitCode::SUCCESS)
 }

@@ -1,7 +1,8 @@
 //! The command line: one file per subcommand.
 //!
 //! Exit codes: 0 success, 1 a check failed (`crosscheck` found a disagreement, `compare` a number beyond a limit),
-//! 2 wrong usage, 3 bad input or failed output, 130 a rendering stopped by Ctrl-C, which was written nevertheless.
+//! 2 wrong usage, 3 bad input or failed output, 130 a rendering stopped by Ctrl-C, which was written nevertheless. A reader
+//! of the standard output that has closed its pipe ends nothing: the command finishes, with the code that it has anyway.
 
 mod args;
 mod bench;
@@ -39,6 +40,7 @@ mod typed_options;
 mod watch_args;
 
 use clap::{CommandFactory, Parser, Subcommand};
+use std::io::{self, Write};
 use std::process::ExitCode;
 
 /// Offline CPU renderer for lighting integrals that are hard to sample.
@@ -87,7 +89,10 @@ struct UsageError(String);
 
 /// Parses the command line, runs the command, and returns the exit code.
 pub(crate) fn run() -> ExitCode {
-    let cli = Cli::parse();
+    let cli = match Cli::try_parse() {
+        Ok(cli) => cli,
+        Err(error) => return code_of(answer(&error)),
+    };
     let result = match &cli.command {
         Command::Render(args) => match &args.frames {
             Some(list) => frames::run(args, list),
@@ -106,6 +111,18 @@ pub(crate) fn run() -> ExitCode {
         Command::Completions(args) => shell::completions(args, Cli::command()),
         Command::Man(args) => shell::man(args, Cli::command()),
     };
+    code_of(result)
+}
+
+/// Prints help, the version, or what is wrong with the command line.
+fn answer(error: &clap::Error) -> anyhow::Result<ExitCode> {
+    let printed = progress::printed(error.print().and_then(|()| io::stdout().flush()));
+    // Without standard error, the exit code still tells of wrong usage
+    printed.or_else(|failed| if error.use_stderr() { Ok(()) } else { Err(failed) })?;
+    Ok(ExitCode::from(u8::try_from(error.exit_code()).unwrap_or(2)))
+}
+
+fn code_of(result: anyhow::Result<ExitCode>) -> ExitCode {
     match result {
         Ok(code) => code,
         Err(error) => {

@@ -5,14 +5,13 @@ use super::args::RenderArgs;
 use super::part_args::{PartArgs, is_part};
 use super::plan_file::PlanFile;
 use super::progress;
-use anyhow::bail;
 use lumiris::film::PixelBounds;
 use lumiris::import::fingerprint::SceneFiles;
 use lumiris::render::RenderSettings;
 use lumiris::render::parts::{Asked, Checkpoints, Extent, ExtentError, FilmFile, Storage, Stored};
 use lumiris::scene::RenderJob;
 use lumiris::settings::Settings;
-use std::path::Path;
+use lumiris_formats::output::check_destination;
 use std::time::Duration;
 
 impl From<ExtentError> for UsageError {
@@ -43,15 +42,8 @@ pub(super) fn check(args: &RenderArgs) -> anyhow::Result<()> {
         return usage("--cryptomatte needs the whole image, not a part");
     }
     // Of frames, the names are not known yet
-    for path in parts.checkpoint.iter().map(|(path, _)| path).filter(|_| args.frames.is_none()) {
-        let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-        if !folder.is_dir() {
-            bail!("{}: folder {} does not exist", path.display(), folder.display());
-        }
-        if path.is_dir() {
-            bail!("{} is a folder", path.display());
-        }
-    }
+    let checkpoint = parts.checkpoint.as_ref().filter(|_| args.frames.is_none());
+    checkpoint.map_or(Ok(()), |(path, _)| check_destination(path).map(drop))?;
     Ok(())
 }
 

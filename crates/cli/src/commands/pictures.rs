@@ -9,7 +9,6 @@ use super::part_args::{extension, is_part};
 use super::plan_file::PlanFile;
 use super::progress;
 use super::rescue::write_or_rescue;
-use anyhow::{Context, bail};
 use lumiris::film::Film;
 use lumiris::imaging::oiio::{self, Part, ROWS_AT_ONCE};
 use lumiris::render::Rendering;
@@ -17,6 +16,7 @@ use lumiris::render::cryptomatte::Layer;
 use lumiris::render::output::{self, Aov};
 use lumiris::render::parts::{CameraMatrices, FilmReader};
 use lumiris::scene::{RenderJob, SampleCountMap};
+use lumiris_formats::output::check_writable;
 use std::borrow::Cow;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -75,23 +75,6 @@ pub(super) fn check_outputs(outputs: &[PathBuf]) -> anyhow::Result<()> {
 /// True if a file of this name can be written, by its extension.
 pub(super) fn is_output(path: &Path) -> bool {
     is_exr(path) || is_part(path) || DISPLAY_TYPES.contains(&extension(path).as_str())
-}
-
-/// Refuses a file that cannot be written.
-pub(super) fn check_writable(path: &Path) -> anyhow::Result<()> {
-    let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    if !folder.is_dir() {
-        bail!("{}: folder {} does not exist", path.display(), folder.display());
-    }
-    if path.is_dir() {
-        bail!("{} is a folder", path.display());
-    }
-    // As the file itself will be written; this one is gone at once
-    tempfile::Builder::new()
-        .prefix(".partial-")
-        .tempfile_in(folder)
-        .with_context(|| format!("{}: nothing can be written to {}", path.display(), folder.display()))?;
-    Ok(())
 }
 
 /// True if all these images and parts are there, and none of them was cut short by Ctrl-C. (Files appear under their names

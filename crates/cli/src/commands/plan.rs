@@ -8,7 +8,7 @@ use clap::Args;
 use lumiris::render::auto::{AutoChoice, Trial};
 use lumiris::render::plan::Preparation;
 use lumiris::render::processor_time;
-use lumiris_formats::output::write_text;
+use lumiris_formats::output::{check_writable, write_text};
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -23,18 +23,19 @@ pub(super) struct PlanArgs {
 }
 
 pub(super) fn run(args: &PlanArgs) -> anyhow::Result<ExitCode> {
+    check_writable(&args.output)?;
     let before = processor_time::of_process();
     let (mut job, _) = load_job(&args.scene)?;
     let loading = processor_time::of_process().saturating_sub(before);
     let file = plan(&args.scene, &mut job, &Preparation { loading, ..Preparation::default() }, true)?;
-    if let Ok(auto) = serde_json::from_value::<AutoChoice>(file.auto.clone()) {
-        progress::print(&table(&auto));
-    }
-    for (key, value) in &file.settings {
-        progress::print(&format!("{key} = {value}"));
-    }
     write_text(&args.output, &serde_json::to_string_pretty(&file)?)
         .with_context(|| format!("cannot write {}", args.output.display()))?;
+    if let Ok(auto) = serde_json::from_value::<AutoChoice>(file.auto.clone()) {
+        progress::print(&table(&auto))?;
+    }
+    for (key, value) in &file.settings {
+        progress::print(&format!("{key} = {value}"))?;
+    }
     Ok(ExitCode::SUCCESS)
 }
 

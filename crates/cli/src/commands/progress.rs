@@ -1,21 +1,28 @@
 //! Terminal output while the program runs; the only place that writes to the terminal.
 #![allow(clippy::print_stdout, clippy::print_stderr)]
 
+use anyhow::Context;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use lumiris::render::Progress;
+use std::io::{self, Write};
 
 /// Prints a line to standard error; that nobody reads it is no reason to lose a rendering.
 pub(super) fn say(text: &str) {
-    use std::io::Write;
     let _ = writeln!(std::io::stderr().lock(), "{text}");
 }
 
-/// Prints a line to standard output; a closed pipe is not an error.
-pub(super) fn print(text: &str) {
-    use std::io::Write;
+/// Prints a line to standard output. A closed pipe is not an error: its reader, such as `head`, has all that it wants.
+pub(super) fn print(text: &str) -> anyhow::Result<()> {
     let mut out = std::io::stdout().lock();
-    // A reader such as `head` may have closed the pipe; the error is ignored.
-    let _ = writeln!(out, "{text}");
+    printed(writeln!(out, "{text}").and_then(|()| out.flush()))
+}
+
+/// What became of printing.
+pub(super) fn printed(result: io::Result<()>) -> anyhow::Result<()> {
+    match result {
+        Err(error) if error.kind() == io::ErrorKind::BrokenPipe => Ok(()),
+        result => result.context("cannot write to the standard output"),
+    }
 }
 
 /// A relative standard error as text; it is unknown where no pixel has two samples.

@@ -1,6 +1,7 @@
 //! `lumiris reproduce`
 
 use super::progress;
+use crate::compare::check_page;
 use clap::{Args, ValueEnum};
 use lumiris_lab::reproduce::{Observer, Options, ReproduceError, fan, keller_wald, talbot};
 use std::path::PathBuf;
@@ -48,6 +49,7 @@ enum Paper {
 }
 
 pub(super) fn run(args: &ReproduceArgs) -> anyhow::Result<ExitCode> {
+    check_page(&args.out)?;
     let stop = Arc::new(AtomicBool::new(false));
     super::render::stop_at_ctrl_c(&stop)?;
     let options = Options {
@@ -71,7 +73,7 @@ pub(super) fn run(args: &ReproduceArgs) -> anyhow::Result<ExitCode> {
     };
     match page {
         Ok(page) => {
-            progress::print(&page.display().to_string());
+            progress::print(&page.display().to_string())?;
             Ok(ExitCode::SUCCESS)
         }
         Err(ReproduceError::Stopped) => Ok(ExitCode::from(super::render::INTERRUPTED)),

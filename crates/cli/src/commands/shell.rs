@@ -28,7 +28,7 @@ pub(super) fn completions(args: &CompletionsArgs, mut program: Command) -> anyho
     let name = program.get_name().to_owned();
     let mut script = Vec::new();
     clap_complete::generate(args.shell, &mut program, name, &mut script);
-    progress::print(String::from_utf8_lossy(&script).trim_end());
+    progress::print(String::from_utf8_lossy(&script).trim_end())?;
     Ok(ExitCode::SUCCESS)
 }
 

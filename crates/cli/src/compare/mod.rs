@@ -3,4 +3,4 @@
 
 mod page;
 
-pub(crate) use page::write_page;
+pub(crate) use page::{check_page, write_page};

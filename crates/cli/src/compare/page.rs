@@ -13,7 +13,7 @@ use lumiris::imaging::compare::load::{ImageSet, Shown};
 use lumiris::imaging::compare::scores::{Compared, Scores, Settings};
 use lumiris::imaging::heat::{BLUE_RED, HEAT, Stops};
 use lumiris::imaging::metrics::Pixel;
-use lumiris_formats::output::write_whole;
+use lumiris_formats::output::{check_writable, write_whole};
 use minijinja::{Environment, Value as Safe, context};
 use serde_json::{Value, json};
 use std::io::{self, BufWriter, Write};
@@ -24,6 +24,16 @@ const STYLE: &str = include_str!("viewer/style.css");
 const IMAGES: &str = include_str!("viewer/images.js");
 const VIEWER: &str = include_str!("viewer/viewer.js");
 
+/// The page in a folder.
+fn page_in(folder: &Path) -> PathBuf {
+    folder.join("index.html")
+}
+
+/// Fails if the page of a folder cannot be written; the folder is made later if it is not there.
+pub(crate) fn check_page(folder: &Path) -> io::Result<()> {
+    if folder.exists() { check_writable(&page_in(folder)) } else { Ok(()) }
+}
+
 /// Writes `index.html` into a folder, which is made if it is not there. Says where the page is.
 pub(crate) fn write_page(
     folder: &Path,
@@ -32,7 +42,7 @@ pub(crate) fn write_page(
     compared: &[Compared],
 ) -> io::Result<PathBuf> {
     std::fs::create_dir_all(folder)?;
-    let path = folder.join("index.html");
+    let path = page_in(folder);
     write_whole(&path, |file| {
         let mut out = BufWriter::new(file);
         write(&mut out, set, settings, compared)?;

@@ -104,7 +104,7 @@ fn a_frame_that_fails_does_not_stop_the_others_and_the_table_says_why() {
     assert!(text.contains("4 of 5 frames failed"), "{text}");
     let row = |frame: &str| text.lines().find(|l| l.trim_start().starts_with(&format!("{frame}  failed:")));
     assert!(row("1").is_none() && row("2").is_some(), "{text}");
-    assert!(row("4").is_some_and(|row| row.contains("f.4.exr is a folder")), "{text}");
+    assert!(row("4").is_some_and(|row| row.contains("f.4.exr: is a folder")), "{text}");
     let results: Vec<_> = stats(&path("s.json")).iter().map(|f| f["result"].as_str().unwrap().to_owned()).collect();
     assert_eq!(results, ["done", "failed", "failed", "failed", "failed"]);
     assert!(path("f.1.exr").exists() && !path("f.2.exr").exists());

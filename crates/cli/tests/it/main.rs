@@ -13,6 +13,7 @@ mod light_groups;
 mod looks;
 mod lost_output;
 mod messages;
+mod outputs;
 mod parts;
 mod plan;
 mod program;

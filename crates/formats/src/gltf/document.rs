@@ -3,6 +3,7 @@
 use super::container::chunks;
 use super::place::{GltfError, Place};
 use super::schema;
+use crate::names::file_in;
 use base64::engine::{DecodePaddingMode, GeneralPurpose, GeneralPurposeConfig};
 use base64::{Engine, alphabet};
 use serde_json::Value;
@@ -122,7 +123,7 @@ impl Document {
         let uri = place.key("uri").text().ok_or_else(|| place.error("has neither a URI nor a buffer view"))?;
         match data_uri(uri) {
             Some(bytes) => bytes.map(Content::Bytes).map_err(|message| place.key("uri").error(message)),
-            None => Ok(Content::File(self.folder.join(percent_decoded(uri)))),
+            None => Ok(Content::File(file_in(&self.folder, &percent_decoded(uri)))),
         }
     }
 

@@ -4,6 +4,7 @@ use super::directive::{ActiveTimes, AttributeTarget, DirectiveKind, KEYWORDS, Na
 use super::lexer::{LexError, Lexer, Token, TokenKind, shorten};
 use super::params::{Param, ParamSet, ParamType, Values};
 use crate::diagnostic::{Diagnostics, did_you_mean};
+use crate::names::nfc;
 use crate::source::Span;
 
 /// An error that is in the diagnostics already.
@@ -106,8 +107,14 @@ impl Arguments<'_> {
         Ok(DirectiveKind::MediumInterface { inside, outside })
     }
 
-    /// A string argument.
+    /// A name: a string argument in normal form C, so that names compare whatever form they are written in.
     pub fn name(&mut self, lexer: &mut Lexer<'_>, keyword: &str) -> Result<Name, Reported> {
+        let Name { text, span } = self.verbatim_name(lexer, keyword)?;
+        Ok(Name { text: nfc(&text).into_owned(), span })
+    }
+
+    /// A string argument as it is written, such as the name of a file.
+    pub fn verbatim_name(&mut self, lexer: &mut Lexer<'_>, keyword: &str) -> Result<Name, Reported> {
         let position = lexer.position();
         let token = self.next(lexer, "a string")?;
         if token.kind != TokenKind::Quoted {
@@ -226,7 +233,11 @@ impl Arguments<'_> {
     ) -> Result<Values, Reported> {
         let by_name = ty == ParamType::Spectrum && self.peek(lexer)?.is_some_and(|t| t.kind == TokenKind::Quoted);
         match ty {
-            ParamType::String | ParamType::Texture => self.strings(lexer, name, bracketed).map(Values::Strings),
+            ParamType::String => self.strings(lexer, name, bracketed).map(Values::Strings),
+            ParamType::Texture => {
+                let names = self.strings(lexer, name, bracketed)?;
+                Ok(Values::Strings(names.iter().map(|name| nfc(name).into_owned()).collect()))
+            }
             ParamType::Spectrum if by_name => self.strings(lexer, name, bracketed).map(Values::Strings),
             ParamType::Bool => self.bools(lexer, bracketed).map(Values::Bools),
             ParamType::Integer => {

@@ -9,6 +9,7 @@ use super::directive::{Directive, DirectiveKind, KEYWORDS, Name};
 use super::lexer::{Lexer, Token, TokenKind, shorten};
 use super::params::ParamSet;
 use crate::diagnostic::{Diagnostics, did_you_mean};
+use crate::names::file_in;
 use crate::source::{FileId, SourceMap, Span};
 use std::path::{Path, PathBuf};
 
@@ -335,8 +336,8 @@ impl Parser<'_> {
     }
 
     fn include(&mut self, lexer: &mut Lexer<'_>, keyword: &str, span: Span) -> Result<(), Reported> {
-        let name = self.arguments().name(lexer, keyword)?;
-        let path = self.folder.join(&name.text);
+        let name = self.arguments().verbatim_name(lexer, keyword)?;
+        let path = file_in(&self.folder, &name.text);
         let identity = identity(&path);
         if self.open.contains(&identity) {
             return self.fail(name.span, format!("`{}` includes itself", name.text));

@@ -3,12 +3,17 @@
 use super::header::{Element, Property, Scalar};
 use super::numbers::{ByteOrder, Numbers, number_at};
 use super::stream::{MAX_FILL, Stream};
+use super::wedges::{self, NONE};
 use super::{Place, PlyError, PlyMesh};
-use lumiris_numbers::math::Vec3;
-use std::iter::repeat_n;
+use lumiris_numbers::math::{Vec2, Vec3};
 
 /// The property that has the number of a face.
 const NUMBER: &str = "face_indices";
+/// The list that has u and v of each corner, and the number of their texture among several.
+const TEXCOORD: &str = "texcoord";
+const TEXTURE: &str = "texnumber";
+/// Properties of colours and textures that are read.
+pub(super) const READ: [&str; 2] = [TEXCOORD, TEXTURE];
 /// Ends a strip and begins another inside one list.
 const RESTART: i64 = -1;
 
@@ -16,13 +21,36 @@ const RESTART: i64 = -1;
 #[derive(Default)]
 pub(super) struct Faces {
     vertices: u64,
-    triangles: Vec<[u32; 3]>,
-    quads: Vec<[u32; 4]>,
-    /// Numbers of the faces that triangles and quads are, if the file has any.
-    triangle_numbers: Vec<u32>,
-    quad_numbers: Vec<u32>,
+    triangles: FaceList<3>,
+    quads: FaceList<4>,
     polygons: u64,
     degenerate: u64,
+    /// Faces whose list of texture coordinates has another length than it should.
+    odd_uvs: u64,
+    /// Smallest and largest number of a texture.
+    textures: Option<[i64; 2]>,
+}
+
+/// Faces of `N` corners.
+#[derive(Default)]
+struct FaceList<const N: usize> {
+    indices: Vec<[u32; N]>,
+    /// Numbers of the faces that these are, if the file has any.
+    numbers: Vec<u32>,
+    /// Texture coordinates of the corners, up to the last face that has some.
+    uvs: Vec<[Vec2; N]>,
+}
+
+impl<const N: usize> FaceList<N> {
+    /// Adds the face of the corners `at` of a face, and its number.
+    fn push(&mut self, (corners, uvs): (&[u32], &[[f32; 2]]), at: [usize; N], number: Option<u32>) {
+        if !uvs.is_empty() {
+            self.uvs.resize(self.indices.len(), [NONE; N]);
+            self.uvs.push(at.map(|i| Vec2::from(uvs[i])));
+        }
+        self.indices.push(at.map(|i| corners[i]));
+        self.numbers.extend(number);
+    }
 }
 
 impl Faces {
@@ -38,7 +66,7 @@ impl Faces {
         };
         let list = &element.properties[column];
         let triangle = N::size(list.list.unwrap_or(list.ty)) + 3 * N::size(list.ty);
-        self.triangles.reserve_exact(numbers.stream().trusted_items(element.count, triangle));
+        self.triangles.indices.reserve_exact(numbers.stream().trusted_items(element.count, triangle));
         let mut row = 0;
         while row < element.count {
             // Runs of triangles in blocks; what stops them, and other layouts, face by face.
@@ -66,14 +94,27 @@ impl Faces {
         rows: std::ops::Range<u64>,
         numbers: &mut impl Numbers<'a>,
     ) -> Result<(), PlyError> {
-        let mut corners = Vec::new();
-        let number_column = element.scalar(NUMBER);
+        let (mut corners, mut uvs) = (Vec::new(), Vec::new());
+        let [number_column, texture_column] = [NUMBER, TEXTURE].map(|name| element.scalar(name));
+        let uv_column = element.properties.iter().position(|p| p.list.is_some() && p.name == TEXCOORD);
         for row in rows {
             let mut number = None;
             for (i, property) in element.properties.iter().enumerate() {
                 match property.list {
                     None if Some(i) == number_column => {
                         number = Some(numbers.integer(property.ty, &element.name)? as u32)
+                    }
+                    None if Some(i) == texture_column => {
+                        let texture = numbers.integer(property.ty, &element.name)?;
+                        let [least, most] = self.textures.unwrap_or([texture; 2]);
+                        self.textures = Some([least.min(texture), most.max(texture)]);
+                    }
+                    Some(count_type) if Some(i) == uv_column => {
+                        let count = numbers.list_length(count_type, property.ty, &element.name)?;
+                        uvs.clear();
+                        for _ in 0..count {
+                            uvs.push(numbers.float(property.ty, &element.name)?);
+                        }
                     }
                     Some(count_type) if i == column => {
                         let count = numbers.list_length(count_type, property.ty, &element.name)?;
@@ -87,7 +128,7 @@ impl Faces {
                     Some(_) | None => numbers.skip_property(property, &element.name)?,
                 }
             }
-            self.push(&corners, number);
+            self.push(&corners, &uvs, number);
         }
         Ok(())
     }
@@ -104,44 +145,41 @@ impl Faces {
             let available = stream.fill(rows.stride)?;
             let faces = available.chunks_exact(rows.stride).take(usize::try_from(left - done).unwrap_or(usize::MAX));
             let block = faces.take_while(|face| face[rows.offset] == 3).count();
-            let before = self.triangles.len();
+            let before = self.triangles.indices.len();
             let mut largest = 0_u32;
-            self.triangles.extend(available[..block * rows.stride].chunks_exact(rows.stride).map(|face| {
+            self.triangles.indices.extend(available[..block * rows.stride].chunks_exact(rows.stride).map(|face| {
                 let face = &face[rows.offset..rows.offset + TriangleRows::LIST];
                 let t = [number_at!(u32, BIG, face, 1), number_at!(u32, BIG, face, 5), number_at!(u32, BIG, face, 9)];
                 largest = largest.max(t[0]).max(t[1]).max(t[2]);
                 t
             }));
             if block == 0 || u64::from(largest) >= self.vertices {
-                self.triangles.truncate(before);
+                self.triangles.indices.truncate(before);
                 return Ok(done);
             }
             if let Some(number) = rows.number {
                 let faces = available[..block * rows.stride].chunks_exact(rows.stride);
-                self.triangle_numbers.extend(faces.map(|face| number_at!(u32, BIG, face, number)));
+                self.triangles.numbers.extend(faces.map(|face| number_at!(u32, BIG, face, number)));
             }
             stream.consume(block * rows.stride);
             done += block as u64;
         }
     }
 
-    /// Adds the face of some vertices, all in range, and its number.
-    fn push(&mut self, corners: &[u32], number: Option<u32>) {
-        match *corners {
-            [a, b, c] => {
-                self.triangles.push([a, b, c]);
-                self.triangle_numbers.extend(number);
-            }
-            [a, b, c, d] => {
-                self.quads.push([a, b, c, d]);
-                self.quad_numbers.extend(number);
-            }
-            [first, ref rest @ ..] if rest.len() > 3 => {
+    /// Adds the face of some vertices, all in range, with u and v of each corner or without, and its number.
+    fn push(&mut self, corners: &[u32], uvs: &[f32], number: Option<u32>) {
+        let is_whole = uvs.len() == 2 * corners.len();
+        self.odd_uvs += u64::from(!is_whole && !uvs.is_empty());
+        let uvs = if is_whole { uvs.as_chunks::<2>().0 } else { &[] };
+        let face = (corners, uvs);
+        match corners.len() {
+            0..3 => self.degenerate += 1,
+            3 => self.triangles.push(face, [0, 1, 2], number),
+            4 => self.quads.push(face, [0, 1, 2, 3], number),
+            count => {
                 self.polygons += 1;
-                self.triangles.extend(rest.windows(2).map(|pair| [first, pair[0], pair[1]]));
-                self.triangle_numbers.extend(number.iter().flat_map(|&number| repeat_n(number, rest.len() - 1)));
+                (1..count - 1).for_each(|i| self.triangles.push(face, [0, i, i + 1], number));
             }
-            _ => self.degenerate += 1,
         }
     }
 
@@ -186,7 +224,7 @@ impl Faces {
             }
             let c = self.check(index, row, place)?;
             if length >= 2 && a != b && b != c && c != a {
-                self.triangles.push(if length % 2 == 0 { [a, b, c] } else { [b, a, c] });
+                self.triangles.indices.push(if length % 2 == 0 { [a, b, c] } else { [b, a, c] });
             }
             (a, b) = (b, c);
             length += 1;
@@ -205,13 +243,28 @@ impl Faces {
     /// Hands all faces to the mesh, whose vertices are complete.
     pub(super) fn finish(mut self, mesh: &mut PlyMesh) {
         // Memory was taken for as many triangles as there are faces.
-        self.triangles.shrink_to_fit();
-        mesh.triangles = self.triangles;
-        mesh.quads = self.quads;
+        self.triangles.indices.shrink_to_fit();
+        let has_uvs = !self.triangles.uvs.is_empty() || !self.quads.uvs.is_empty();
+        mesh.triangles = self.triangles.indices;
+        mesh.quads = self.quads.indices;
+        if has_uvs {
+            self.triangles.uvs.resize(mesh.triangles.len(), [NONE; 3]);
+            self.quads.uvs.resize(mesh.quads.len(), [NONE; 4]);
+            wedges::apply(mesh, &self.triangles.uvs, &self.quads.uvs);
+        }
         // Strips have no numbers
         let all = |numbers: Vec<u32>, faces: usize| if numbers.len() == faces { numbers } else { Vec::new() };
-        mesh.triangle_numbers = all(self.triangle_numbers, mesh.triangles.len());
-        mesh.quad_numbers = all(self.quad_numbers, mesh.quads.len());
+        mesh.triangle_numbers = all(self.triangles.numbers, mesh.triangles.len());
+        mesh.quad_numbers = all(self.quads.numbers, mesh.quads.len());
+        if self.odd_uvs > 0 {
+            let n = self.odd_uvs;
+            mesh.warnings
+                .push(format!("{n} faces have a `{TEXCOORD}` that is not two numbers for each corner; it is not used"));
+        }
+        if self.textures.is_some_and(|[least, most]| least < most) {
+            let text = "faces have different textures (`texnumber`), but all of them get that of the material";
+            mesh.warnings.push(text.to_owned());
+        }
         if self.polygons > 0 {
             let n = self.polygons;
             mesh.warnings.push(format!("{n} faces have more than four vertices; each becomes a fan of triangles"));
@@ -222,7 +275,7 @@ impl Faces {
         if mesh.triangles.is_empty() && mesh.quads.is_empty() {
             mesh.warnings.push("there are no faces".to_owned());
         }
-        drop_broken_vertices(mesh);
+        drop_broken_vertices(mesh, self.vertices as usize);
     }
 }
 
@@ -255,19 +308,24 @@ impl TriangleRows {
             is_common && number.is_none_or(|i| matches!(element.properties[i].ty, Scalar::I32 | Scalar::U32));
         let bytes = |property: &Property| if property.list.is_some() { Self::LIST } else { property.ty.size() };
         let number = number.map(|i| element.properties[..i].iter().map(bytes).sum());
-        (is_common && others == 1 && stride <= MAX_FILL).then_some(TriangleRows { offset, stride, number })
+        let has_textures = element.scalar(TEXTURE).is_some();
+        (is_common && others == 1 && !has_textures && stride <= MAX_FILL).then_some(TriangleRows {
+            offset,
+            stride,
+            number,
+        })
     }
 }
 
-/// Removes faces of vertices that are not finite, and replaces such vertices by the origin.
-fn drop_broken_vertices(mesh: &mut PlyMesh) {
+/// Removes faces of vertices that are not finite, and replaces such vertices by the origin. The file has the first `vertices`.
+fn drop_broken_vertices(mesh: &mut PlyMesh, vertices: usize) {
     // A sum of products with zero is zero only if all are finite: one pass without branches finds the common case.
     let probe: f32 = mesh.positions.iter().map(|p| (p.x + p.y + p.z) * 0.0).sum();
     if probe == 0.0 {
         return;
     }
     let broken: Vec<bool> = mesh.positions.iter().map(|p| !p.is_finite()).collect();
-    let count = broken.iter().filter(|&&b| b).count();
+    let count = broken.iter().take(vertices).filter(|&&b| b).count();
     if count == 0 {
         return;
     }

@@ -3,28 +3,28 @@
 //! The file is streamed through a small buffer: that is faster than mapping it (no page faults), needs no `unsafe`, and
 //! allocates only the mesh. Counts in the header are compared with the size of the file before anything is allocated,
 //! and every index is checked. Faces with three vertices become triangles, faces with four become quads (bilinear
-//! patches in pbrt), larger ones triangle fans; triangle strips are expanded.
+//! patches in pbrt), larger ones triangle fans; triangle strips are expanded. Where corners of faces have texture
+//! coordinates, vertices at seams are split.
 //!
-//! Reading order: `header`, `stream`, `numbers`, `vertices`, `faces`.
+//! Reading order: `header`, `stream`, `numbers`, `vertices`, `faces`, `wedges`, `unread`.
 
 mod faces;
 mod header;
 mod numbers;
 mod stream;
+mod unread;
 mod vertices;
+mod wedges;
 
-use flate2::read::MultiGzDecoder;
+use crate::gzip;
 use header::{Encoding, Header};
 use lumiris_numbers::math::{Vec2, Vec3};
 use numbers::{Ascii, Binary, Numbers};
 use std::fmt;
 use std::fs::File;
-use std::io::{self, Read};
+use std::io::{self, BufReader, Read};
 use std::path::{Path, PathBuf};
 use stream::Stream;
-
-/// The first bytes of a gzip file.
-const GZIP_MAGIC: [u8; 2] = [0x1f, 0x8b];
 
 /// What a PLY file holds.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -182,10 +182,10 @@ fn open(path: &Path) -> io::Result<(File, u64)> {
 fn read_any(mut reader: impl Read, size: u64) -> Result<PlyMesh, PlyError> {
     let mut magic = Vec::new();
     reader.by_ref().take(2).read_to_end(&mut magic)?;
-    let is_gzip = magic == GZIP_MAGIC;
+    let is_gzip = magic == gzip::MAGIC;
     let mut whole = io::Cursor::new(magic).chain(reader);
     if is_gzip {
-        let mut decoder = MultiGzDecoder::new(whole);
+        let mut decoder = gzip::Members::new(BufReader::new(whole));
         let mut stream = Stream::inflated(&mut decoder, size);
         let mesh = read_stream(&mut stream)?;
         stream.drain()?;
@@ -208,7 +208,7 @@ fn read_stream(stream: &mut Stream<'_>) -> Result<PlyMesh, PlyError> {
 fn read_body<'a>(header: &Header, numbers: &mut impl Numbers<'a>) -> Result<PlyMesh, PlyError> {
     let vertices =
         header.element("vertex").ok_or_else(|| PlyError::header(header.lines, "there is no `vertex` element"))?;
-    let mut mesh = PlyMesh::default();
+    let mut mesh = PlyMesh { warnings: unread::warning(header).into_iter().collect(), ..PlyMesh::default() };
     let mut faces = faces::Faces::new(vertices.count);
     for element in &header.elements {
         match element.name.as_str() {

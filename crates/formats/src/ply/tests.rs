@@ -293,6 +293,85 @@ fn polygons_become_fans_and_faces_without_area_are_left_out() {
 }
 
 #[test]
+fn corners_of_faces_have_texture_coordinates_of_their_own() {
+    // A triangle, a quad, a polygon, and one with none; before the indices and behind them
+    let faces: [&[f64]; 4] = [&[0., 1., 2.], &[0., 1., 2., 3.], &[0., 1., 2., 3., 4.], &[2., 3., 4.]];
+    let uv = |face: usize, corner: usize| match face {
+        // The triangle and the quad share a seam at the corners 1 and 2, and agree at 0
+        0 | 1 => [corner as f64 / 8.0 + if corner > 0 { face as f64 } else { 0.0 }, 0.5],
+        _ => [corner as f64, 2.0],
+    };
+    for format in FORMATS {
+        for is_first in [false, true] {
+            let lists = ["property list uchar int vertex_indices", "property list uchar float texcoord"];
+            let [a, b] = if is_first { [lists[1], lists[0]] } else { lists };
+            let mut w = Writer::new(format);
+            w.head("element vertex 5").head(XYZ).head("property float nx\nproperty float ny\nproperty float nz");
+            w.head("property float s\nproperty float t\nelement face 4").head(a).head("property int texnumber").head(b);
+            for (i, c) in CORNERS.iter().enumerate() {
+                w.numbers(F32, c).numbers(F32, &[i as f64, 0., 0.]).numbers(F32, &[10. + i as f64, 0.]).end_row();
+            }
+            for (f, face) in faces.iter().enumerate() {
+                let uvs: Vec<f64> = if f == 3 { vec![] } else { (0..face.len()).flat_map(|c| uv(f, c)).collect() };
+                if is_first {
+                    w.list(U8, F32, &uvs).number(I32, 0.).list(U8, I32, face).end_row();
+                } else {
+                    w.list(U8, I32, face).number(I32, 0.).list(U8, F32, &uvs).end_row();
+                }
+            }
+            let mesh = parse_ply(&w.bytes()).unwrap();
+            assert_is_sound(&mesh);
+            let check = |vertex: u32, face: usize, corner: usize| {
+                let [v, source] = [vertex as usize, faces[face][corner] as usize];
+                let expected = if face == 3 { [10. + source as f64, 0.] } else { uv(face, corner) };
+                assert_eq!(mesh.uvs[v].to_array(), expected.map(|x| x as f32), "{format} face {face}, corner {corner}");
+                assert_eq!(mesh.positions[v], Vec3::from(CORNERS[source].map(|x| x as f32)));
+                assert_eq!(mesh.normals[v].x, source as f32);
+            };
+            let fans = [(0, [0, 1, 2]), (2, [0, 1, 2]), (2, [0, 2, 3]), (2, [0, 3, 4]), (3, [0, 1, 2])];
+            assert_eq!((mesh.triangles.len(), mesh.quads.len()), (5, 1));
+            for (triangle, (face, corners)) in mesh.triangles.iter().zip(fans) {
+                triangle.iter().zip(corners).for_each(|(&v, corner)| check(v, face, corner));
+            }
+            mesh.quads[0].iter().enumerate().for_each(|(corner, &v)| check(v, 1, corner));
+            // Pairs of a vertex and its coordinates: 3 + 3 of the quad (one is shared) + 5 + 3
+            assert_eq!(mesh.positions.len(), 14, "{format}");
+            assert!(mesh.positions.capacity() > mesh.positions.len());
+            assert_eq!(mesh.warnings, ["1 faces have more than four vertices; each becomes a fan of triangles"]);
+        }
+    }
+}
+
+#[test]
+fn colours_and_textures_that_are_not_read_are_named_once() {
+    let head = "element face 3\nproperty list uchar int vertex_indices\nproperty list uchar float texcoord\n\
+                property int texnumber\nproperty uchar red\nelement multi_texture_vertex 1\nproperty float tx\n\
+                element edge 0\nproperty uchar blue";
+    let bytes = with_faces("ascii", head, |w| {
+        w.list(U8, I32, &[0., 1., 2.]).list(U8, F32, &[0.; 5]).numbers(I32, &[0., 255.]).end_row();
+        w.list(U8, I32, &[0., 1., 2.]).list(U8, F32, &[]).numbers(I32, &[0., 255.]).end_row();
+        w.list(U8, I32, &[0., 1., 2.]).list(U8, F32, &[0.; 6]).numbers(I32, &[1., 255.]).end_row();
+        w.number(F32, 0.5).end_row();
+    });
+    let with_colors =
+        String::from_utf8(bytes).unwrap().replacen("float z", "float z\nproperty uchar Red\nproperty float u", 1);
+    let with_colors = CORNERS.iter().fold(with_colors, |text, c| {
+        let row = format!("{} {} {} \n", c[0], c[1], c[2]);
+        text.replacen(&row, &row.replace('\n', "255 0\n"), 1)
+    });
+    let mesh = parse_ply(with_colors.as_bytes()).unwrap();
+    let expected = [
+        "colours and textures are those of the material; not read: `Red`, `u` of `vertex`; `red` of `face`; \
+         `multi_texture_vertex`",
+        "1 faces have a `texcoord` that is not two numbers for each corner; it is not used",
+        "faces have different textures (`texnumber`), but all of them get that of the material",
+    ];
+    assert_eq!(mesh.warnings, expected);
+    assert_eq!(mesh.uvs.len(), mesh.positions.len());
+    assert!(parse_ply(&sample("ascii")).unwrap().warnings.is_empty());
+}
+
+#[test]
 fn strips_keep_their_orientation_and_restart() {
     for format in FORMATS {
         let bytes = with_faces(format, "element tristrips 2\nproperty list int int vertex_indices", |w| {
@@ -548,6 +627,14 @@ fn damaged_files_never_panic() {
         w.list(I32, I32, &[0., 1., 3., 2., 4.]);
     });
     let mut samples: Vec<Vec<u8>> = FORMATS.map(sample).into();
+    let wedges = with_faces(
+        "binary_big_endian",
+        "element face 1\nproperty list uchar int vertex_indices\nproperty list uchar float texcoord",
+        |w| {
+            w.list(U8, I32, &[0., 1., 3., 2., 4.]).list(U8, F32, &[0.5; 10]);
+        },
+    );
+    samples.push(wedges);
     samples.extend([compressed(&sample("binary_little_endian")), compressed(&sample("ascii")), strips]);
     let mut random = pcg32([20, 0, 0]);
     let mut accepted = 0;

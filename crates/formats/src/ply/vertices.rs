@@ -25,6 +25,19 @@ pub(super) fn read<'a, N: Numbers<'a>>(element: &Element, numbers: &mut N, mesh:
     Ok(())
 }
 
+/// Names of texture coordinates.
+const UVS: [[&str; 2]; 4] = [["u", "v"], ["s", "t"], ["texture_u", "texture_v"], ["texture_s", "texture_t"]];
+
+/// The texture coordinates that a table of vertices has.
+fn uvs_of(element: &Element) -> Option<[&'static str; 2]> {
+    UVS.into_iter().find(|pair| pair.iter().all(|name| element.scalar(name).is_some()))
+}
+
+/// True if a property of vertices is their texture coordinates.
+pub(super) fn reads(element: &Element, name: &str) -> bool {
+    uvs_of(element).is_some_and(|pair| pair.contains(&name))
+}
+
 /// Which columns are used.
 struct Columns {
     position: [usize; 3],
@@ -36,8 +49,7 @@ impl Columns {
     /// `None` if there are no positions.
     fn new(element: &Element) -> Option<Self> {
         let three = |[x, y, z]: [&str; 3]| Some([element.scalar(x)?, element.scalar(y)?, element.scalar(z)?]);
-        let pairs = [["u", "v"], ["s", "t"], ["texture_u", "texture_v"], ["texture_s", "texture_t"]];
-        let uv = pairs.iter().find_map(|&[u, v]| Some([element.scalar(u)?, element.scalar(v)?]));
+        let uv = uvs_of(element).and_then(|[u, v]| Some([element.scalar(u)?, element.scalar(v)?]));
         Some(Columns { position: three(["x", "y", "z"])?, normal: three(["nx", "ny", "nz"]), uv })
     }
 

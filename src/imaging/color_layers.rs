@@ -1,32 +1,35 @@
-//! Which channels of a file are the image.
+//! Which channels of a file are the image: of textures, environment maps, comparisons and files to be denoised alike.
 //!
 //! Programs name them in many ways: `R G B` (pbrt, Mitsuba, Lumiris), `rgb.R` (Mitsuba with several films),
 //! `Combined.R` or `ViewLayer.Combined.R` (Cycles), parts of one file that all have `R G B` (then the name of the part
-//! counts). A **layer** is a set of red, green and blue under one name.
+//! counts). A **layer** is a set of red, green and blue under one name. The image is the layer without a name, or else the
+//! only one whose name says so, or else the only one; where none of that holds, it is for the user to say.
 
-use crate::imaging::file::PartHeader;
+use super::ColorChannels;
+use super::file::PartHeader;
 
 /// Channels that make a colour.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Layer {
+pub struct ColorLayer {
     /// Part of the file, from 0.
     pub part: usize,
     /// What stands before the channels' last dot, or the name of the part; empty for plain `R G B`.
     pub name: String,
-    /// Positions in the part: three, or one that is grey.
-    pub channels: Vec<usize>,
+    /// Positions in the part.
+    pub channels: ColorChannels,
+    /// Position of its opacity, if it has one.
+    pub alpha: Option<usize>,
 }
 
 /// Names that stand for the image itself, not for a part of its light or a feature.
 const IMAGE_NAMES: [&str; 10] =
     ["combined", "beauty", "rgb", "rgba", "color", "colour", "image", "main", "final", "default"];
 
-impl Layer {
+impl ColorLayer {
     /// 0 for the name that most surely means the image.
     fn rank(&self) -> u8 {
         let last = self.name.rsplit('.').next().unwrap_or_default().to_ascii_lowercase();
         match () {
-            () if self.channels.len() == 1 => 3,
             () if self.name.is_empty() => 0,
             () if IMAGE_NAMES.contains(&last.as_str()) => 1,
             () => 2,
@@ -60,8 +63,18 @@ fn component(name: &str) -> Option<usize> {
     }
 }
 
+/// True for what opacity is called in a layer.
+fn is_alpha(name: &str) -> bool {
+    matches!(name.to_ascii_lowercase().as_str(), "a" | "alpha")
+}
+
+/// Position of the opacity of a layer in a part.
+fn alpha_of(header: &PartHeader, layer: &str) -> Option<usize> {
+    header.channels.iter().map(|channel| split(channel)).position(|(name, last)| name == layer && is_alpha(last))
+}
+
 /// All colour layers of a file, in its order.
-pub fn color_layers(parts: &[PartHeader]) -> Vec<Layer> {
+pub fn color_layers(parts: &[PartHeader]) -> Vec<ColorLayer> {
     let mut layers = Vec::new();
     for (part, header) in parts.iter().enumerate() {
         let mut names: Vec<&str> = Vec::new();
@@ -79,42 +92,56 @@ pub fn color_layers(parts: &[PartHeader]) -> Vec<Layer> {
                 }
             }
             if let [Some(r), Some(g), Some(b)] = rgb {
-                let name = if name.is_empty() && parts.len() > 1 { header.name.as_str() } else { name };
-                layers.push(Layer { part, name: name.to_owned(), channels: vec![r, g, b] });
+                let title = if name.is_empty() && parts.len() > 1 { header.name.as_str() } else { name };
+                layers.push(ColorLayer {
+                    part,
+                    name: title.to_owned(),
+                    channels: ColorChannels::Rgb([r, g, b]),
+                    alpha: alpha_of(header, name),
+                });
             }
         }
     }
     layers
 }
 
-/// The layer that is the image, or the one called `wanted` (a single channel as well). `Err` says what there is.
-pub fn choose(parts: &[PartHeader], wanted: Option<&str>) -> Result<Layer, String> {
+/// The layer that is the image, or the one called `wanted` (a single channel as well). `Err` says what there is. Of a file
+/// without colours, the image is the channel Y, or the first that is not opacity.
+pub fn choose(parts: &[PartHeader], wanted: Option<&str>) -> Result<ColorLayer, String> {
     let layers = color_layers(parts);
     let channels =
         || parts.iter().enumerate().flat_map(|(p, h)| h.channels.iter().enumerate().map(move |(c, n)| (p, c, n)));
-    let grey = |(part, c, name): (usize, usize, &String)| Layer { part, name: name.clone(), channels: vec![c] };
+    let grey = |(part, c, name): (usize, usize, &String)| {
+        let alpha = alpha_of(&parts[part], split(name).0);
+        ColorLayer { part, name: name.clone(), channels: ColorChannels::Grey(c), alpha }
+    };
     if let Some(wanted) = wanted {
         let found = layers.iter().find(|l| l.is_called(wanted)).cloned();
         let single = || channels().find(|(.., n)| n.eq_ignore_ascii_case(wanted)).map(grey);
         return found.or_else(single).ok_or_else(|| {
-            let mut names: Vec<&str> = layers.iter().map(Layer::title).collect();
+            let mut names: Vec<&str> = layers.iter().map(ColorLayer::title).collect();
             names.extend(channels().map(|(.., n)| n.as_str()).filter(|n| component(split(n).1).is_none()));
             format!("has no layer `{wanted}`; it has {}", names.join(", "))
         });
     }
-    if let Some(best) = layers.into_iter().min_by_key(Layer::rank) {
-        return Ok(best);
+    if let Some(best) = layers.iter().min_by_key(|layer| layer.rank()) {
+        // Parts without names are pages of one picture
+        let is_only = layers.iter().filter(|other| other.rank() == best.rank()).count() == 1;
+        if is_only || best.name.is_empty() {
+            return Ok(best.clone());
+        }
+        let names: Vec<&str> = layers.iter().map(ColorLayer::title).collect();
+        return Err(format!("has several images, none of which is plain R G B: {}", names.join(", ")));
     }
-    let is_alpha = |n: &str| matches!(split(n).1.to_ascii_lowercase().as_str(), "a" | "alpha");
     let luminance = channels().find(|(.., n)| n.eq_ignore_ascii_case("y"));
-    let first = || channels().find(|(.., n)| !is_alpha(n)).or_else(|| channels().next());
+    let first = || channels().find(|(.., n)| !is_alpha(split(n).1)).or_else(|| channels().next());
     luminance.or_else(first).map(grey).ok_or_else(|| "has no channels".to_owned())
 }
 
 /// What a person should know of the choice; `None` if there was none to make.
-pub fn remark(parts: &[PartHeader], chosen: &Layer) -> Option<String> {
+pub fn remark(parts: &[PartHeader], chosen: &ColorLayer) -> Option<String> {
     let layers = color_layers(parts);
-    let others: Vec<&str> = layers.iter().filter(|l| *l != chosen).map(Layer::title).collect();
+    let others: Vec<&str> = layers.iter().filter(|l| *l != chosen).map(ColorLayer::title).collect();
     let plain = chosen.name.is_empty() && !layers.iter().any(|l| l != chosen && l.name.is_empty());
     if plain || others.is_empty() {
         return None;
@@ -170,9 +197,30 @@ mod tests {
         assert_eq!((chosen.part, chosen.name.as_str()), (1, "beauty"));
         assert_eq!(remark(&parts, &chosen).unwrap(), "colour is `beauty` (also there: albedo)");
         assert_eq!(choose(&parts, Some("Albedo")).unwrap().part, 0);
-        assert_eq!(choose(&parts, Some("Z")).unwrap().channels, [0]);
+        assert_eq!(choose(&parts, Some("Z")).unwrap().channels, ColorChannels::Grey(0));
         let error = choose(&parts, Some("normal")).unwrap_err();
         assert_eq!(error, "has no layer `normal`; it has albedo, beauty, Z");
+    }
+
+    #[test]
+    fn of_several_images_without_a_plain_one_the_names_are_told() {
+        let layer = |name: &str| ["R", "G", "B", "A"].map(|c| format!("{name}.{c}"));
+        let file = |names: &[&str]| {
+            let channels: Vec<String> = names.iter().flat_map(|name| layer(name)).collect();
+            [PartHeader { name: String::new(), channels, size: [1, 1] }]
+        };
+        let only = choose(&file(&["Sky.Light"]), None).unwrap();
+        assert_eq!((only.channels, only.alpha), (ColorChannels::Rgb([0, 1, 2]), Some(3)));
+        let combined = choose(&file(&["View.Albedo", "View.Combined"]), None).unwrap();
+        assert_eq!((combined.channels, combined.alpha), (ColorChannels::Rgb([4, 5, 6]), Some(7)));
+        for names in [["left", "right"], ["View.Combined", "View.001.Combined"]] {
+            let error = choose(&file(&names), None).unwrap_err();
+            assert!(error.ends_with(&format!("none of which is plain R G B: {}", names.join(", "))), "{error}");
+            assert_eq!(choose(&file(&names), Some(names[1])).unwrap().name, names[1]);
+        }
+        // Pages of one picture
+        let rgb = ["R", "G", "B"];
+        assert_eq!(choose(&[part("", &rgb), part("", &rgb)], None).unwrap().part, 0);
     }
 
     #[test]
