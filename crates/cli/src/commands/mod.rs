@@ -1,7 +1,8 @@
 //! The command line: one file per subcommand.
 //!
 //! Exit codes: 0 success, 1 a check failed (`crosscheck` found a disagreement, `compare` a number beyond a limit),
-//! 2 wrong usage, 3 bad input or failed output, 130 a rendering stopped by Ctrl-C, which was written nevertheless.
+//! 2 wrong usage, 3 bad input or failed output, 130 stopped by Ctrl-C, SIGTERM or SIGHUP: a rendering has written the image
+//! so far.
 
 mod args;
 mod bench;
@@ -19,10 +20,12 @@ mod frames;
 mod generate;
 mod info;
 mod info_file;
+mod interrupt;
 mod look;
 mod memory;
 mod merge;
 mod named;
+mod output_options;
 mod part_args;
 mod parts;
 mod pictures;
@@ -88,7 +91,7 @@ struct UsageError(String);
 /// Parses the command line, runs the command, and returns the exit code.
 pub(crate) fn run() -> ExitCode {
     let cli = Cli::parse();
-    let result = match &cli.command {
+    let result = interrupt::watch().and_then(|()| match &cli.command {
         Command::Render(args) => match &args.frames {
             Some(list) => frames::run(args, list),
             None => render::run(args),
@@ -105,7 +108,7 @@ pub(crate) fn run() -> ExitCode {
         Command::Generate(args) => generate::run(args),
         Command::Completions(args) => shell::completions(args, Cli::command()),
         Command::Man(args) => shell::man(args, Cli::command()),
-    };
+    });
     match result {
         Ok(code) => code,
         Err(error) => {

@@ -3,11 +3,21 @@
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use lumiris::render::Progress;
+use std::collections::BTreeSet;
+use std::sync::{Mutex, PoisonError};
 
 /// Prints a line to standard error; that nobody reads it is no reason to lose a rendering.
 pub(super) fn say(text: &str) {
     use std::io::Write;
     let _ = writeln!(std::io::stderr().lock(), "{text}");
+}
+
+/// Prints a line to standard error, unless it has been printed before, as for another frame.
+pub(super) fn say_once(text: &str) {
+    static SAID: Mutex<BTreeSet<String>> = Mutex::new(BTreeSet::new());
+    if SAID.lock().unwrap_or_else(PoisonError::into_inner).insert(text.to_owned()) {
+        say(text);
+    }
 }
 
 /// Prints a line to standard output; a closed pipe is not an error.
