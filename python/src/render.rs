@@ -4,7 +4,7 @@ use crate::attendant::{Attendant, Event};
 use crate::images::{Layer, Place, arrays, split};
 use crate::parts::{PartOptions, Parts, in_words_of_python, part_error, place};
 use crate::progress::Canvas;
-use crate::settings::{Given, apply, parse, parse_plan};
+use crate::settings::{Given, apply, named, parse, parse_plan};
 use lumiris::film::filter::PixelFilter;
 use lumiris::film::{Film, PixelBounds};
 use lumiris::imaging::Image;
@@ -207,6 +207,7 @@ impl Request {
         }
         apply(&self.plan, &mut loaded.settings);
         apply(&self.settings, &mut loaded.settings);
+        loaded.given.extend(named(&self.settings));
         complete_for_noise(&mut loaded.settings, self.spp().is_some())
             .map_err(|needs| Failure::Value(format!("noise {needs}")))?;
         // More samples belong to what the first ones were prepared for
@@ -244,7 +245,7 @@ impl Request {
             warnings.push("without samples on non-contributing lights, direct light is biased".to_owned());
         }
         goes_on()?;
-        let files = std::mem::take(&mut loaded.files);
+        let (files, given) = (std::mem::take(&mut loaded.files), std::mem::take(&mut loaded.given));
         let mut job = loaded.job(asked.accel, self.packet_width).map_err(|error| other(&error))?;
         let loading = processor_time::of_process().saturating_sub(before);
         let extent = &self.parts.extent;
@@ -260,11 +261,13 @@ impl Request {
             loading,
             stop,
         };
+        let before = *job.settings();
         let plan = prepare(&mut job, &how).map_err(|error| match error {
             RenderError::Stopped => Failure::Stopped,
             error => other(&error),
         })?;
         warnings.extend(plan.warnings);
+        warnings.extend(given.without_effect(&before, job.settings()));
 
         let mut settings = self.render_settings(&asked, &job);
         settings.time_limit = settings.time_limit.map(|limit| limit.saturating_sub(start.elapsed()));

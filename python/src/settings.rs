@@ -46,6 +46,13 @@ pub(crate) fn parse_plan(plan: &[(String, String)]) -> PyResult<Given> {
     plan.iter().map(parse).collect()
 }
 
+/// The settings as messages name them.
+pub(crate) fn named(given: &Given) -> lumiris::settings::Given {
+    let mut named = lumiris::settings::Given::default();
+    given.iter().for_each(|(row, value)| named.add(row, *value, format!("{}={value}", keyword(row.flag))));
+    named
+}
+
 /// Sets all values.
 pub(crate) fn apply(given: &Given, settings: &mut Settings) {
     for (row, value) in given {

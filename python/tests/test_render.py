@@ -162,7 +162,7 @@ def test_warnings_of_scenes_are_warnings() -> None:
         lumiris.render(SCENE + "WorldEnd", **TINY)
     with pytest.warns(lumiris.SceneWarning, match="biased"):
         lumiris.render(SCENE, **TINY, estimator="contributing", noncontributing_samples=0)
-    with pytest.warns(lumiris.SceneWarning, match="pixels do not share paths: paths of one bounce"):
+    with pytest.warns(lumiris.SceneWarning, match="path_reuse=4 has no effect on this image"):
         lumiris.render(SCENE, **TINY, integrator="direct", path_reuse=4)
 
 

@@ -19,7 +19,7 @@ pub mod volumes;
 
 use crate::accel::embree::EmbreeError;
 use crate::scene::{AccelKind, RenderJob, Scene, World};
-use crate::settings::Settings;
+use crate::settings::{Given, Settings};
 use cache::FileCache;
 use fingerprint::SceneFiles;
 use gltf::LightUnits;
@@ -72,6 +72,8 @@ pub struct Loaded {
     pub scene: Scene,
     /// The file's settings.
     pub settings: Settings,
+    /// Those of them that the file gives.
+    pub given: Given,
     /// Warnings.
     pub warnings: Report,
     /// The files that it was read from.
@@ -143,7 +145,14 @@ fn load_parsed(
     let failed = diagnostics.has_errors();
     let report = diagnostics.finish(&sources);
     match finished {
-        Some((scene, settings)) if !failed => Ok(Loaded { scene, settings, warnings: report, files: scene_files }),
+        Some((scene, settings, placed)) if !failed => {
+            let mut given = Given::default();
+            for (row, value, span) in placed {
+                let parameter = row.parameters.first().unwrap_or(&row.flag);
+                given.add(row, value, format!("{}: `{parameter}` {value}", sources.locate(span)));
+            }
+            Ok(Loaded { scene, settings, given, warnings: report, files: scene_files })
+        }
         _ => Err(Box::new(report)),
     }
 }

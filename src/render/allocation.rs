@@ -28,15 +28,13 @@ use crate::imaging::metrics::difference::DEFAULT_EPSILON;
 use crate::integrators::reuse;
 use crate::integrators::{PathTracer, Tracer};
 use crate::scene::{PixelSamples, RenderJob};
-use crate::settings::{Allocation, IntegratorKind, IntegratorSettings, SamplingSettings, Settings};
+use crate::settings::{Allocation, IntegratorSettings, MIN_ADAPTIVE_SPP, SamplingSettings, Settings};
 use lumiris_numbers::math::hash::{pcg4d, unit_f32};
 use lumiris_numbers::math::luminance;
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// Fewest samples per pixel for which a pilot pays.
-const MIN_SPP: u32 = 8;
 /// Fewest and most samples of a pixel in the pilot; with less than the fewest, the pilot has fewer pixels.
 const PILOT_SPP: [u32; 2] = [2, 8];
 /// Samples of two sets each that see visible lights alone: as a part of those of the image, and fewest and most of them.
@@ -68,10 +66,10 @@ const MAX_SPP_FOR_NOISE: u32 = 4096;
 /// true, which ends the pilot.
 pub(super) fn allocate(job: &RenderJob, stop: &AtomicBool) -> Option<PixelSamples> {
     let settings = job.settings();
-    if let Some(noise) = settings.sampling.noise.filter(|_| allows_adaptive(settings)) {
+    if let Some(noise) = settings.sampling.noise.filter(|_| settings.allows_adaptive()) {
         return Some(counts_for(job, noise, stop));
     }
-    if settings.sampling.allocation != Allocation::Adaptive || !allows_adaptive(settings) {
+    if settings.allocation() != Allocation::Adaptive || !settings.allows_adaptive() {
         return None;
     }
     let mut pilot = Pilot::new(job, stop);
@@ -95,23 +93,14 @@ pub fn complete_for_noise(settings: &mut Settings, has_spp: bool) -> Result<(), 
     if !has_spp {
         settings.sampling.spp = MAX_SPP_FOR_NOISE;
     }
-    let enough = SamplingSettings { spp: MIN_SPP, ..settings.sampling };
-    if allows_adaptive(settings) {
+    let enough = SamplingSettings { spp: MIN_ADAPTIVE_SPP, ..settings.sampling };
+    if settings.allows_adaptive() {
         Ok(())
-    } else if allows_adaptive(&Settings { sampling: enough, ..*settings }) {
+    } else if (Settings { sampling: enough, ..*settings }).allows_adaptive() {
         Err("needs 8 samples per pixel at least (--spp)")
     } else {
         Err("needs the integrator direct or path, and an estimator that does not fit blocks of samples")
     }
-}
-
-/// True if pixels may have different numbers of samples: they are not fitted in blocks, and have enough samples for a pilot. Where
-/// they are fitted to others, numbers follow from noise that this has not lowered.
-pub fn allows_adaptive(settings: &Settings) -> bool {
-    let i = &settings.integrator;
-    matches!(i.kind, IntegratorKind::Direct | IntegratorKind::Path)
-        && !Estimator::at_vertex(i, 0).is_progressive()
-        && settings.sampling.spp >= MIN_SPP
 }
 
 /// True if samples of an image that is rendered with the settings `of_paths` may be split: their looks have the noise of visible
@@ -119,7 +108,7 @@ pub fn allows_adaptive(settings: &Settings) -> bool {
 pub(super) fn may_split(settings: &Settings, of_paths: &IntegratorSettings) -> bool {
     let sampling = settings.sampling;
     let is_open = sampling.allocation != Allocation::Uniform || sampling.noise.is_some();
-    is_open && allows_adaptive(&Settings { integrator: *of_paths, sampling })
+    is_open && Settings { integrator: *of_paths, sampling }.allows_adaptive()
 }
 
 /// What a pilot's samples of a pixel say, in few bytes: a pilot has all pixels of an image at once.

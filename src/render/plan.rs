@@ -94,10 +94,12 @@ pub fn prepare(job: &mut RenderJob, how: &Preparation<'_>) -> Result<Plan, Rende
     let ris = choose_proposals(job, how)?;
     job.pixel_samples = pool.install(|| allocate(job, how.stop));
     how.goes_on()?;
-    let shares_paths = job.settings().integrator.path_reuse.is_some_and(|edge| edge > 1);
+    // Settings that do not apply are said to have no effect where they are given
+    let applies = |flag| rows().any(|row| row.flag == flag && row.applies.to(job.settings()));
+    let shares_paths = job.settings().integrator.path_reuse.is_some_and(|edge| edge > 1) && applies("path-reuse");
     let obstacle = reuse::obstacle(job).filter(|_| shares_paths);
     let unshared = obstacle.map(|reason| format!("pixels do not share paths: {reason}"));
-    let wants_light_paths = job.settings().integrator.light_paths.is_some_and(|paths| paths > 0.0);
+    let wants_light_paths = job.settings().integrator.light_paths.is_some_and(|n| n > 0.0) && applies("light-paths");
     let obstacle = light_paths::obstacle(job).filter(|_| wants_light_paths);
     let without_light_paths = obstacle.map(|reason| format!("there are no light paths: {reason}"));
     let obstacle = light_layers::obstacle(job).filter(|_| light_layers::is_wanted(job));

@@ -3,8 +3,9 @@
 //! [`Settings`] is plain data, which the renderer reads. [`table`] has a row for each setting, with its names, range,
 //! default, help and where it applies; command line, scene-file parameters, metadata and `lumiris info` follow from it.
 //!
-//! Reading order: [`integrator`], [`ris`], [`photon_map`], [`sampling`], [`value`], [`table`].
+//! Reading order: [`integrator`], [`ris`], [`photon_map`], [`sampling`], [`value`], [`table`], [`given`].
 
+pub mod given;
 pub mod integrator;
 pub mod photon_map;
 pub mod ris;
@@ -12,6 +13,7 @@ pub mod sampling;
 pub mod table;
 pub mod value;
 
+pub use given::Given;
 pub use integrator::{
     Cached, ContributingSettings, ControlVariates, CorrelatedForm, CorrelatedSettings, EstimatorKind, IntegratorKind,
     IntegratorSettings, IrradianceCacheSettings, OcvSettings, OptimalForm, RouletteKind, SampleCounts,
@@ -22,6 +24,11 @@ pub use ris::{ProposalPoints, Proposals, RisSettings, StageTimes, Strata, Target
 pub use sampling::{Allocation, SamplingSettings};
 pub use table::Setting;
 pub use value::Value;
+
+use lumiris_numbers::estimators::ocv::Form;
+
+/// Fewest camera samples per pixel of which pilots can tell how many pixels need.
+pub const MIN_ADAPTIVE_SPP: u32 = 8;
 
 /// All settings of an image, except its size and filter, which belong to the film.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -47,6 +54,29 @@ impl Settings {
     pub fn recorded(&self) -> impl Iterator<Item = (&'static str, Value)> {
         let rows = table::rows().filter(|row| row.is_recorded && row.applies.to(self));
         rows.filter_map(|row| Some((row.key, (row.resolved.unwrap_or(row.get))(self)?)))
+    }
+
+    /// True if pixels may have different numbers of camera samples: they are not fitted in blocks, and have enough samples for a
+    /// pilot.
+    pub fn allows_adaptive(&self) -> bool {
+        let i = &self.integrator;
+        let is_progressive = match i.estimator {
+            EstimatorKind::Ocv => i.ocv.form == Form::Progressive,
+            EstimatorKind::OptimalMis => i.optimal_mis == OptimalForm::Progressive,
+            _ => false,
+        };
+        matches!(i.kind, IntegratorKind::Direct | IntegratorKind::Path)
+            && !is_progressive
+            && self.sampling.spp >= MIN_ADAPTIVE_SPP
+    }
+
+    /// How camera samples are distributed over the pixels.
+    pub fn allocation(&self) -> Allocation {
+        match self.sampling.allocation {
+            _ if self.sampling.noise.is_some() => Allocation::Adaptive,
+            Allocation::Adaptive if !self.allows_adaptive() => Allocation::Uniform,
+            allocation => allocation,
+        }
     }
 
     /// The settings that differ from the default, with their values.

@@ -4,9 +4,11 @@
 //! the mode of the old one, as far as the user may give them. A file without write permission is not replaced, though the
 //! folder would allow it: it was protected on purpose. What is no file (a pipe, a terminal, `/dev/stdout`) gets the bytes.
 
+use std::collections::BTreeSet;
 use std::fs::{File, Metadata};
 use std::io::{self, ErrorKind, Write};
 use std::path::{Path, PathBuf};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 use tempfile::{Builder, NamedTempFile};
 
 /// Symbolic links that may lead from one to the next, as many as Linux follows.
@@ -132,11 +134,45 @@ pub fn check_writable(path: &Path) -> io::Result<()> {
     })
 }
 
+/// Temporary files and folders that there are now.
+static TEMPORARY: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
+
+fn temporary() -> MutexGuard<'static, BTreeSet<PathBuf>> {
+    TEMPORARY.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Until this is dropped, [`remove_temporary`] removes a file or folder.
+#[derive(Debug)]
+pub struct Temporary(PathBuf);
+
+impl Temporary {
+    /// Of the file or folder with this path.
+    pub fn new(path: &Path) -> Self {
+        temporary().insert(path.to_owned());
+        Temporary(path.to_owned())
+    }
+}
+
+impl Drop for Temporary {
+    fn drop(&mut self) {
+        temporary().remove(&self.0);
+    }
+}
+
+/// Removes the temporary files and folders that there are now, for a program that ends without running destructors.
+pub fn remove_temporary() {
+    for path in std::mem::take(&mut *temporary()) {
+        // Whoever made it may have removed it meanwhile
+        let _ = if path.is_dir() { std::fs::remove_dir_all(path) } else { std::fs::remove_file(path) };
+    }
+}
+
 /// Writes a file. `write` gets another one beside it with the same extension, which takes the name when all of it is on
 /// the disk, and is removed if anything fails.
 pub fn write_whole(path: &Path, write: impl FnOnce(&mut NamedTempFile) -> io::Result<()>) -> io::Result<()> {
     let destination = Destination::of(path)?;
     let mut partial = destination.partial()?;
+    let _temporary = Temporary::new(partial.path());
     write(&mut partial)?;
     if destination.is_stream {
         // Opened anew, as below
@@ -175,6 +211,26 @@ mod tests {
         assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
         assert!(write_text(&folder.path().join("no/where.txt"), "").is_err());
         assert!(write_text(folder.path(), "").is_err());
+    }
+
+    #[test]
+    fn a_program_that_ends_at_once_leaves_no_temporary_files() {
+        let folder = tempfile::tempdir().unwrap();
+        let files = |path: &Path| std::fs::read_dir(path).unwrap().count();
+        let inner = tempfile::tempdir_in(folder.path()).unwrap().keep();
+        std::fs::write(inner.join("image"), "").unwrap();
+        let held = Temporary::new(&inner);
+        let written = write_whole(&folder.path().join("a.txt"), |file| {
+            assert_eq!((file.path().exists(), files(folder.path())), (true, 2));
+            remove_temporary();
+            assert_eq!(files(folder.path()), 0);
+            Ok(())
+        });
+        assert!(written.is_err());
+        drop(held);
+        write_text(&folder.path().join("b.txt"), "b").unwrap();
+        remove_temporary();
+        assert_eq!(files(folder.path()), 1, "a file that has its name is not temporary");
     }
 
     #[cfg(unix)]

@@ -17,7 +17,7 @@ mod view;
 use super::cache::FileCache;
 use super::fingerprint::SceneFiles;
 use super::{LoadOptions, Loaded};
-use crate::settings::Settings;
+use crate::settings::{Given, Settings};
 use assemble::Assembly;
 use lumiris_formats::diagnostic::{Diagnostics, Report};
 use lumiris_formats::gltf::document::Unread;
@@ -165,9 +165,13 @@ pub fn load(path: &Path, options: &LoadOptions, files: &FileCache) -> Result<Loa
     let scene_files = SceneFiles::new(&sources, others);
     let report = diagnostics.finish(&sources);
     match scene {
-        Some(scene) if !failed => {
-            Ok(Loaded { scene, settings: Settings::default(), warnings: report, files: scene_files })
-        }
+        Some(scene) if !failed => Ok(Loaded {
+            scene,
+            settings: Settings::default(),
+            given: Given::default(),
+            warnings: report,
+            files: scene_files,
+        }),
         _ => Err(Box::new(report)),
     }
 }

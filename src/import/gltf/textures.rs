@@ -11,6 +11,7 @@ use crate::textures::{
 use glam::{Affine2, Mat2};
 use lumiris_formats::gltf::document::Content;
 use lumiris_formats::gltf::{Document, GltfError, Place};
+use lumiris_formats::output::Temporary;
 use lumiris_formats::source::Span;
 use lumiris_numbers::math::{Rgb, Vec2};
 use std::path::{Path, PathBuf};
@@ -32,12 +33,15 @@ pub(super) struct Textures<'a> {
     pub resources: Resources,
     /// Holds images that are in the document.
     folder: tempfile::TempDir,
+    _temporary: Temporary,
 }
 
 impl<'a> Textures<'a> {
     pub(super) fn new(document: &'a Document) -> std::io::Result<Self> {
         let (set, resources) = (TextureSet::default(), Resources::default());
-        Ok(Textures { document, set, resources, folder: tempfile::tempdir()? })
+        let folder = tempfile::tempdir()?;
+        let _temporary = Temporary::new(folder.path());
+        Ok(Textures { document, set, resources, folder, _temporary })
     }
 
     pub(super) fn float(&mut self, value: f32) -> FloatTextureId {

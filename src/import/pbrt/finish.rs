@@ -7,6 +7,7 @@ use super::measured;
 use super::media::MediaInUse;
 use super::options::ParsedOptions;
 use super::ptex;
+use super::settings::Placed;
 use super::shapes::{Made, ShapeError};
 use super::state::Builder;
 use crate::geometry::{Geometry, GeometryId, GeometrySet, Group, GroupId, Instance, Shape, Visibility};
@@ -45,8 +46,9 @@ struct Assembly {
 }
 
 impl Builder<'_> {
-    /// Reads the files that the text names and builds the scene; `None` after an error.
-    pub fn finish(mut self, files: &FileCache, d: &mut Diagnostics) -> Option<(Scene, Settings)> {
+    /// Reads the files that the text names and builds the scene; `None` after an error. Also returns its settings, and which of
+    /// them the text gives.
+    pub fn finish(mut self, files: &FileCache, d: &mut Diagnostics) -> Option<(Scene, Settings, Placed)> {
         let options = self.options.finish(self.load_options, d);
 
         // Read all files, whatever went wrong before: all missing ones are named in one run
@@ -110,7 +112,7 @@ impl Builder<'_> {
         if d.has_errors() {
             return None;
         }
-        let ParsedOptions { camera, film, settings, .. } = options?;
+        let ParsedOptions { camera, film, settings, given, .. } = options?;
 
         // Lights
         let mut lights = LightSetBuilder::default();
@@ -146,7 +148,7 @@ impl Builder<'_> {
             media: assembly.media.set,
             choices: Choices::default(),
         };
-        Some((scene, settings))
+        Some((scene, settings, given))
     }
 
     /// Adds the shapes of one description to their group, or to the root, or to an instance of their own if they move.

@@ -5,7 +5,7 @@ use super::checks::{positive, unknown};
 use super::descriptions::Pending;
 use super::film::finish_film;
 use super::lenses::{self, realistic};
-use super::settings::{finish_integrator, finish_sampler};
+use super::settings::{Placed, finish_integrator, finish_sampler};
 use super::transform::{Ctm, affine};
 use crate::cameras::{Camera, SphericalMapping, default_screen_window};
 use crate::import::LoadOptions;
@@ -41,6 +41,8 @@ pub struct ParsedOptions {
     pub film: FilmSettings,
     /// Integrator and sampler.
     pub settings: Settings,
+    /// The settings that the file gives.
+    pub given: Placed,
     /// Opening and closing of the shutter as fractions of the motion.
     pub shutter: [f32; 2],
 }
@@ -152,11 +154,11 @@ impl Options {
         let (film, sensor) = finish_film(self.film.as_ref(), self.filter.as_ref(), load, d);
         let mut settings = Settings::default();
         settings.sampling.seed = self.seed.unwrap_or(settings.sampling.seed);
-        finish_sampler(self.sampler.as_ref(), &mut settings, d);
-        finish_integrator(self.integrator.as_ref(), &mut settings, d);
+        let mut given = finish_sampler(self.sampler.as_ref(), &mut settings, d);
+        given.extend(finish_integrator(self.integrator.as_ref(), &mut settings, d));
         let (camera, shutter, seconds) = self.finish_camera(film.resolution, sensor.diagonal, d)?;
         let film = FilmSettings { scale: sensor.scale * seconds, ..film };
-        Some(ParsedOptions { camera, film, settings, shutter })
+        Some(ParsedOptions { camera, film, settings, given, shutter })
     }
 
     fn finish_camera(

@@ -7,6 +7,7 @@ use crate::settings::value::{Integers, Interval, Kind, Value};
 use crate::settings::{IntegratorKind, ProgressiveSettings, Setting, Settings};
 use lumiris_formats::diagnostic::Diagnostics;
 use lumiris_formats::pbrt::params::{ParamSet, ParamType};
+use lumiris_formats::source::Span;
 use lumiris_numbers::samplers::SamplerKind;
 
 /// Parameters of pbrt's integrators that have no effect here.
@@ -29,9 +30,12 @@ const IGNORED: [&str; 16] = [
     "seed",
 ];
 
-/// Reads `Integrator`.
-pub(super) fn finish_integrator(pending: Option<&Pending>, s: &mut Settings, d: &mut Diagnostics) {
-    let Some(Pending { name, params: p }) = pending else { return };
+/// Settings of a file, with their values and where these are.
+pub type Placed = Vec<(&'static Setting, Value, Span)>;
+
+/// Reads `Integrator`, and returns its settings.
+pub(super) fn finish_integrator(pending: Option<&Pending>, s: &mut Settings, d: &mut Diagnostics) -> Placed {
+    let Some(Pending { name, params: p }) = pending else { return Placed::new() };
     let mut kind = IntegratorKind::Path;
     match name.text.as_str() {
         "path" | "volpath" => {}
@@ -54,7 +58,7 @@ pub(super) fn finish_integrator(pending: Option<&Pending>, s: &mut Settings, d: 
         }
     }
     set_name("integrator", kind.into(), s);
-    parameters(Directive::Integrator, s, p, d);
+    let placed = parameters(Directive::Integrator, s, p, d);
     // pbrt counts photon paths, the setting stored photons; −1 leaves the choice to the renderer
     if let Some(n @ 1..) = p.integer("photonsperiteration", d) {
         s.integrator.photons.photons = n as u32;
@@ -66,11 +70,12 @@ pub(super) fn finish_integrator(pending: Option<&Pending>, s: &mut Settings, d: 
         p.ignore(key);
     });
     p.report_unused(d);
+    placed
 }
 
-/// Reads `Sampler`.
-pub(super) fn finish_sampler(pending: Option<&Pending>, s: &mut Settings, d: &mut Diagnostics) {
-    let Some(Pending { name, params: p }) = pending else { return };
+/// Reads `Sampler`, and returns its settings.
+pub(super) fn finish_sampler(pending: Option<&Pending>, s: &mut Settings, d: &mut Diagnostics) -> Placed {
+    let Some(Pending { name, params: p }) = pending else { return Placed::new() };
     match name.text.as_str() {
         "independent" | "random" => {
             // Of all samplers it alone has this default
@@ -92,10 +97,11 @@ pub(super) fn finish_sampler(pending: Option<&Pending>, s: &mut Settings, d: &mu
         p.ignore("jitter");
         p.ignore("dimensions");
     }
-    parameters(Directive::Sampler, s, p, d);
+    let placed = parameters(Directive::Sampler, s, p, d);
     // Randomisation is part of the sampler here.
     p.ignore("randomization");
     p.report_unused(d);
+    placed
 }
 
 /// Sets a setting of the table to a known name.
@@ -106,12 +112,17 @@ fn set_name(flag: &str, name: &'static str, s: &mut Settings) {
 }
 
 /// Reads all settings that are parameters of a directive.
-fn parameters(directive: Directive, s: &mut Settings, p: &ParamSet, d: &mut Diagnostics) {
+fn parameters(directive: Directive, s: &mut Settings, p: &ParamSet, d: &mut Diagnostics) -> Placed {
+    let mut placed = Placed::new();
     for row in rows().filter(|row| row.directive == directive) {
         if let Some(value) = read(row, s, p, d) {
             (row.set)(s, value);
+            let names = row.parameters.iter().chain(row.old_parameters.iter().map(|(_, old)| old));
+            let written = names.copied().find(|name| p.type_of(name).is_some());
+            placed.extend(written.map(|name| (row, value, p.span_of(name))));
         }
     }
+    placed
 }
 
 /// The name under which a file has parameter `i` of a setting: an old one if the present one is absent.

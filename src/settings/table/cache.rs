@@ -66,7 +66,10 @@ pub(super) const IRRADIANCE_CACHE: Group = Group {
             key: "cache_passes",
             kind: integer(1, MAX_SAMPLES),
             help: "Estimates of direct light per record, with `--cached all`",
-            applies: Applies::If(|s| CACHE.to(s) && s.integrator.cache.cached == Cached::All),
+            applies: Applies::If(
+                |s| CACHE.to(s) && s.integrator.cache.cached == Cached::All,
+                "the integrator irradiance-cache with --cached all",
+            ),
             get: |s| Some(Value::Integer(s.integrator.cache.passes.into())),
             set: |s, v| v.count().map(|n| s.integrator.cache.passes = n),
             ..Setting::BASE

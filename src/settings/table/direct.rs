@@ -1,7 +1,7 @@
 //! How direct light is estimated.
 
 use super::{Applies, Group, MAX_SAMPLES, Setting, choice, integer};
-use crate::settings::EstimatorKind::{Contributing, Correlated, Mis, Ocv, OptimalMis, Ris};
+use crate::settings::EstimatorKind::{Auto, Contributing, Correlated, Mis, Ocv, OptimalMis, Ris};
 use crate::settings::value::{Integers, Interval, Kind, Value};
 use crate::settings::{
     ControlVariates, CorrelatedForm, EstimatorKind, OptimalForm, ProposalPoints, Proposals, SamplingTechnique,
@@ -53,7 +53,7 @@ pub(super) const DIRECT: Group = Group {
             kind: Kind::Integer { range: SAMPLES, words: &["auto"] },
             help: "Samples per estimate at later vertices of a path than the first",
             default: "auto: as many as at the first; ris halves them at every bounce",
-            applies: Applies::If(|s| s.integrator.depth() > 1),
+            applies: Applies::If(|s| s.integrator.depth() > 1, "paths of more than one bounce"),
             get: |s| Some(s.integrator.later_samples.map_or(Value::Name("auto"), |n| Value::Integer(n.into()))),
             set: |s, v| {
                 s.integrator.later_samples = if v.name().is_some() { None } else { Some(v.count()?) };
@@ -68,6 +68,7 @@ pub(super) const DIRECT: Group = Group {
             kind: choice(Heuristic::VARIANTS),
             help: "MIS heuristic, which weights the techniques",
             default: "power; balance for ris, optimal-mis, and ocv unless over pixels",
+            applies: Applies::Estimators(&[Auto, Mis, Ris, Ocv, OptimalMis, Contributing]),
             get: |s| s.integrator.heuristic.map(|h| Value::Name(h.into())),
             resolved: Some(|s| Some(Value::Name(s.integrator.heuristic().into()))),
             set: |s, v| v.named().map(|heuristic| s.integrator.heuristic = Some(heuristic)),
@@ -115,7 +116,10 @@ pub(super) const DIRECT: Group = Group {
             help: "BSDF samples of contributing on surfaces that are not diffuse, combined with its light samples by \
                    --heuristic; 0 takes light samples alone, as --noncontributing-samples 0 does",
             default: "1",
-            applies: Applies::Estimators(&[Contributing]),
+            applies: Applies::If(
+                |s| s.integrator.estimator == Contributing && !s.integrator.leaves_lights_out(),
+                "the estimator contributing with samples on non-contributing lights",
+            ),
             get: |s| s.integrator.contributing.bsdf_samples.map(|n| Value::Integer(n.into())),
             resolved: Some(|s| Some(Value::Integer(s.integrator.contributing.bsdf_samples().into()))),
             set: |s, v| v.count().map(|n| s.integrator.contributing.bsdf_samples = Some(n)),
@@ -243,11 +247,14 @@ pub(super) const CONTROL_VARIATES: Group = Group {
             kind: choice(ControlVariates::VARIANTS),
             help: "Control variates over pixels, of ocv and of ris with the target fgl-control: in any image, or where a \
                    pilot finds that they gain more than they cost; elsewhere the image is that of mis, or of fgl",
-            applies: Applies::If(|s| match s.integrator.estimator {
-                Ocv => s.integrator.ocv.form == Form::Pixels,
-                Ris => s.integrator.ris.target == Target::FglControl,
-                _ => false,
-            }),
+            applies: Applies::If(
+                |s| match s.integrator.estimator {
+                    Ocv => s.integrator.ocv.form == Form::Pixels,
+                    Ris => s.integrator.ris.target == Target::FglControl,
+                    _ => false,
+                },
+                "the estimator ocv with the form pixels, and ris with the target fgl-control",
+            ),
             get: |s| Some(Value::Name(s.integrator.ocv.control_variates.into())),
             set: |s, v| v.named().map(|kind| s.integrator.ocv.control_variates = kind),
             ..Setting::BASE

@@ -65,8 +65,8 @@ pub enum Applies {
     Estimators(&'static [EstimatorKind]),
     /// Those with one of these integrators.
     Integrators(&'static [IntegratorKind]),
-    /// Those for whose settings this is true.
-    If(fn(&Settings) -> bool),
+    /// Those for whose settings this is true, and when that is.
+    If(fn(&Settings) -> bool, &'static str),
 }
 
 impl Applies {
@@ -76,7 +76,23 @@ impl Applies {
             Applies::Always => true,
             Applies::Estimators(list) => list.contains(&settings.integrator.estimator),
             Applies::Integrators(list) => list.contains(&settings.integrator.kind),
-            Applies::If(is_so) => is_so(settings),
+            Applies::If(is_so, _) => is_so(settings),
+        }
+    }
+
+    /// Which images these are, as the end of a sentence.
+    pub fn condition(&self) -> String {
+        let list = |kind: &str, names: Vec<&'static str>| match &names[..] {
+            [first @ .., last] if !first.is_empty() => {
+                format!("it is for the {kind}s {} and {last}", first.join(", "))
+            }
+            names => format!("it is for the {kind} {}", names.concat()),
+        };
+        match self {
+            Applies::Always => "it is for all".to_owned(),
+            Applies::Estimators(kinds) => list("estimator", kinds.iter().map(|&kind| kind.into()).collect()),
+            Applies::Integrators(kinds) => list("integrator", kinds.iter().map(|&kind| kind.into()).collect()),
+            Applies::If(_, condition) => format!("it is for {condition}"),
         }
     }
 }

@@ -150,7 +150,10 @@ pub(super) const PHOTONS: Group = Group {
             help: "Photon paths traced for the visibility cache, which --light-sampler photons, --target visibility \
                    and --estimator contributing use",
             default: "262144",
-            applies: Applies::If(|s| s.integrator.uses_visibility_cache()),
+            applies: Applies::If(
+                |s| s.integrator.uses_visibility_cache(),
+                "the light sampler photons, the estimator contributing and the targets visibility and visibility-control",
+            ),
             get: |s| s.integrator.photons.visibility_photons.map(|n| Value::Integer(n.into())),
             set: |s, v| v.count().map(|n| s.integrator.photons.visibility_photons = Some(n)),
             ..Setting::BASE

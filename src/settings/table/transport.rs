@@ -8,6 +8,11 @@ use crate::settings::{Allocation, IntegratorKind, RouletteKind};
 use lumiris_numbers::samplers::SamplerKind;
 use strum::VariantNames;
 
+const PATHS: Applies = Applies::If(
+    |s| s.integrator.kind == IntegratorKind::Path && s.integrator.depth() > 1,
+    "the integrator path with more than one bounce",
+);
+
 /// Light transport.
 pub(super) const TRANSPORT: Group = Group {
     title: "Light transport",
@@ -36,6 +41,7 @@ pub(super) const TRANSPORT: Group = Group {
             kind: integer(0, 10_000),
             help: "Maximum number of bounces; `direct` has at most one",
             get: |s| Some(Value::Integer(s.integrator.max_depth.into())),
+            resolved: Some(|s| Some(Value::Integer(s.integrator.depth().into()))),
             set: |s, v| v.count().map(|n| s.integrator.max_depth = n),
             ..Setting::BASE
         },
@@ -47,6 +53,7 @@ pub(super) const TRANSPORT: Group = Group {
             kind: Kind::Integer { range: Integers { min: 1, max: 10_000 }, words: &["off"] },
             help: "First bounce that Russian roulette may end a path before, or `off`: fewer and noisier paths in less \
                    time, or all of them up to the maximum number of bounces",
+            applies: Applies::If(|s| s.integrator.depth() > 1, "paths of more than one bounce"),
             get: |s| Some(s.integrator.roulette_depth.map_or(Value::Name("off"), |n| Value::Integer(n.into()))),
             set: |s, v| {
                 s.integrator.roulette_depth = if v.name().is_some() { None } else { Some(v.count()?) };
@@ -62,7 +69,7 @@ pub(super) const TRANSPORT: Group = Group {
             help: "What decides whether a path ends by Russian roulette: its throughput, what it is expected to \
                    contribute to its pixel, or the variance and the cost of what lies ahead; by the latter two, paths \
                    split as well, and pilot paths are traced first",
-            applies: Applies::Integrators(&[IntegratorKind::Path]),
+            applies: PATHS,
             get: |s| Some(Value::Name(s.integrator.roulette.into())),
             set: |s, v| v.named().map(|kind| s.integrator.roulette = kind),
             ..Setting::BASE
@@ -76,7 +83,7 @@ pub(super) const TRANSPORT: Group = Group {
             help: "Blocks of E × E pixels share what their paths find from the second diffuse vertex on, by E² − 1 shadow rays \
                    more for each path: less noise, which is correlated within a block; 1: none do",
             default: "auto: what --estimator auto finds to be the most efficient, 3 in images too small for that; 1 with others",
-            applies: Applies::Integrators(&[IntegratorKind::Path]),
+            applies: PATHS,
             get: |s| Some(s.integrator.path_reuse.map_or(Value::Name("auto"), |n| Value::Integer(n.into()))),
             resolved: Some(|s| Some(Value::Integer(s.integrator.path_reuse.unwrap_or(1).into()))),
             set: |s, v| {
@@ -137,7 +144,7 @@ pub(super) const TRANSPORT: Group = Group {
             key: "infinite_fraction",
             kind: Kind::Real { range: Interval::open(0.0, 1.0), words: &[] },
             help: "Fraction of the light samples by the light tree that go to lights at infinity: skies and suns",
-            applies: Applies::If(|s| s.integrator.has_light_tree()),
+            applies: Applies::If(|s| s.integrator.has_light_tree(), "the light samplers tree and photons"),
             default: "as many to each of them as to all other lights together; auto measures what is best",
             get: |s| s.integrator.infinite_fraction.map(Value::Real),
             set: |s, v| v.real().map(|fraction| s.integrator.infinite_fraction = Some(fraction)),
@@ -204,6 +211,7 @@ pub(super) const SAMPLING: Group = Group {
                    from 8 samples per pixel on",
             default: "auto: adaptive with --estimator auto, otherwise uniform",
             get: |s| Some(Value::Name(s.sampling.allocation.into())),
+            resolved: Some(|s| Some(Value::Name(s.allocation().into()))),
             set: |s, v| v.named().map(|allocation| s.sampling.allocation = allocation),
             ..Setting::BASE
         },

@@ -3,17 +3,14 @@
 use crate::types::{OIIO_SHIM_ABI, OiioAttribute, OiioInput, OiioLevel, OiioOutput, OiioPart, OiioSpec};
 use libloading::Library;
 use std::env;
-use std::ffi::{OsStr, c_char};
-use std::fs;
+use std::ffi::c_char;
 use std::io::{self, Write};
-use std::path::{Path, PathBuf};
-use std::process;
+use std::path::Path;
 use std::sync::OnceLock;
+use tempfile::NamedTempFile;
 
-/// The shim as the build script made it, for executables that were moved away from it.
-static SHIM_BYTES: &[u8] = include_bytes!(env!("LUMIRIS_OIIO_SHIM_BUILT"));
-/// Where the build script put it.
-const SHIM_BUILT: &str = env!("LUMIRIS_OIIO_SHIM_BUILT");
+/// The shim as the build script made it.
+static SHIM: &[u8] = include_bytes!(env!("LUMIRIS_OIIO_SHIM_BUILT"));
 
 /// Declares [`Api`] and how each function is looked up as `oiio_shim_<name>`.
 macro_rules! api {
@@ -156,9 +153,9 @@ api! {
 
 /// The shim, opened by the first call. An error is final: later calls return it again.
 ///
-/// Tried in this order: `$LUMIRIS_OIIO_SHIM` (then nothing else), a file named as the shim beside
-/// the executable, the place where it was built, and at last a copy held in the executable, which is
-/// written to the directory for temporary files while it is being opened.
+/// It is the file that `$LUMIRIS_OIIO_SHIM` names, or else the copy held in the executable, which is opened from memory, or
+/// from a temporary file of the user where that cannot be. No other place is looked at, since whoever can write there
+/// would run code in this process.
 pub fn load() -> Result<&'static Api, String> {
     API.get_or_init(find).as_ref().map_err(Clone::clone)
 }
@@ -170,24 +167,18 @@ pub fn is_loaded() -> bool {
 
 static API: OnceLock<Result<Api, String>> = OnceLock::new();
 
-/// Tries the candidates of [`load`].
+/// Opens the shim: see [`load`].
 fn find() -> Result<Api, String> {
     if let Some(path) = env::var_os("LUMIRIS_OIIO_SHIM").filter(|path| !path.is_empty()) {
         return open(Path::new(&path));
     }
-    let name = Path::new(SHIM_BUILT).file_name().unwrap_or(OsStr::new("liblumiris_oiio.so"));
-    let beside = env::current_exe().ok().and_then(|exe| Some(exe.parent()?.join(name)));
-    let mut reasons = Vec::new();
-    for path in beside.into_iter().chain([PathBuf::from(SHIM_BUILT)]).filter(|path| path.is_file()) {
-        match open(&path) {
-            Ok(api) => return Ok(api),
-            Err(reason) => reasons.push(reason),
-        }
+    #[cfg(target_os = "linux")]
+    if let Ok(path) = in_memory() {
+        return open(&path).map_err(|reason| format!("cannot load OpenImageIO: {reason}"));
     }
-    open_embedded().map_err(|reason| {
-        reasons.push(reason);
-        format!("cannot load OpenImageIO: {}", reasons.join("; "))
-    })
+    // Once open, the library needs its name no more
+    let file = temporary().map_err(|error| format!("cannot load OpenImageIO: temporary file: {error}"))?;
+    open(file.path()).map_err(|reason| format!("cannot load OpenImageIO: {reason}"))
 }
 
 /// Opens one file and checks that it is of this version.
@@ -207,30 +198,49 @@ fn open(path: &Path) -> Result<Api, String> {
     Ok(api)
 }
 
-/// Opens the copy in the executable, by way of a temporary file.
-fn open_embedded() -> Result<Api, String> {
-    let (path, mut file) = create_temporary().map_err(|e| format!("temporary file: {e}"))?;
-    let written = file.write_all(SHIM_BYTES);
-    drop(file);
-    let result = match written {
-        Ok(()) => open(&path),
-        Err(error) => Err(format!("{}: {error}", path.display())),
-    };
-    // Once open, the library needs its name no more; and a leftover does no harm.
-    let _ = fs::remove_file(&path);
-    result
+/// The copy of the executable as a file that has no name, and its path, which is valid in this process alone. It remains open:
+/// debuggers and backtraces open the library by that path.
+#[cfg(target_os = "linux")]
+fn in_memory() -> io::Result<std::path::PathBuf> {
+    use std::os::fd::{AsRawFd, IntoRawFd};
+    let fd = rustix::fs::memfd_create("liblumiris_oiio.so", rustix::fs::MemfdFlags::CLOEXEC)?;
+    let mut file = std::fs::File::from(fd);
+    file.write_all(SHIM)?;
+    let path = format!("/proc/self/fd/{}", file.as_raw_fd()).into();
+    // Without /proc there is none
+    std::fs::metadata(&path)?;
+    let _ = file.into_raw_fd();
+    Ok(path)
 }
 
-/// A new file that nobody else has, in the directory for temporary files.
-fn create_temporary() -> io::Result<(PathBuf, fs::File)> {
-    let mut attempt = 0;
-    loop {
-        let name = format!("lumiris-oiio-{}-{attempt}.so", process::id());
-        let path = env::temp_dir().join(name);
-        match fs::File::create_new(&path) {
-            Ok(file) => return Ok((path, file)),
-            Err(error) if error.kind() == io::ErrorKind::AlreadyExists && attempt < 100 => attempt += 1,
-            Err(error) => return Err(error),
-        }
+/// The copy of the executable as a temporary file that only the user can read and write.
+fn temporary() -> io::Result<NamedTempFile> {
+    let mut file = tempfile::Builder::new().prefix("lumiris-oiio-").suffix(".so").tempfile()?;
+    file.write_all(SHIM)?;
+    Ok(file)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::fs;
+    use std::os::unix::fs::PermissionsExt;
+
+    #[test]
+    fn the_temporary_file_is_for_its_owner_alone_and_opens() {
+        let file = temporary().unwrap();
+        assert_eq!(file.as_file().metadata().unwrap().permissions().mode() & 0o777, 0o600);
+        open(file.path()).unwrap();
+    }
+
+    /// Code of the shim that came from a folder could be replaced by whoever can write there.
+    #[test]
+    #[cfg(target_os = "linux")]
+    fn the_shim_is_opened_from_memory_and_not_from_where_it_was_built() {
+        load().unwrap();
+        let maps = fs::read_to_string("/proc/self/maps").unwrap();
+        let shims: Vec<_> = maps.lines().filter(|line| line.contains("liblumiris_oiio")).collect();
+        assert!(!shims.is_empty() && shims.iter().all(|line| line.contains("/memfd:")), "{shims:#?}");
+        assert!(!maps.contains(env!("LUMIRIS_OIIO_SHIM_BUILT")), "{shims:#?}");
     }
 }

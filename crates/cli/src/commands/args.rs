@@ -6,6 +6,7 @@ use super::frame_list::{FrameList, parse_frames};
 use super::look::LookArgs;
 use super::memory::{MemoryLimit, parse_limit};
 use super::named::named;
+use super::output_options::OutputOptions;
 use super::part_args::{LONGEST, PartArgs};
 use super::settings_args::SettingsArgs;
 use super::watch_args::WatchArgs;
@@ -15,7 +16,8 @@ use lumiris::import::LoadOptions;
 use lumiris::import::gltf::LightUnits;
 use lumiris::render::output::Aov;
 use lumiris::scene::AccelKind;
-use std::path::PathBuf;
+use std::borrow::Cow;
+use std::path::{Path, PathBuf};
 use strum::VariantNames;
 
 /// An AOV, or none.
@@ -82,6 +84,11 @@ pub(super) struct SceneArgs {
 }
 
 impl SceneArgs {
+    /// The scene as messages name it.
+    pub(super) fn name(&self) -> Cow<'_, str> {
+        if is_standard_input(&self.scene) { "<stdin>".into() } else { self.scene.to_string_lossy() }
+    }
+
     /// How the scene is loaded.
     pub(super) fn load_options(&self) -> LoadOptions {
         LoadOptions {
@@ -100,6 +107,9 @@ impl SceneArgs {
 /// `lumiris render`
 #[derive(Args, Clone, Debug)]
 pub(super) struct RenderArgs {
+    // First: the fields that follow take their values from the command line
+    #[command(flatten)]
+    pub output_options: OutputOptions,
     #[command(flatten)]
     pub scene: SceneArgs,
     /// Output image; may be given several times. EXR stores all channels; PNG, JPEG, TIFF and TGA the tone-mapped image; .part
@@ -145,6 +155,11 @@ pub(super) struct RenderArgs {
     pub quiet: bool,
     #[command(flatten)]
     pub parts: PartArgs,
+}
+
+/// True for `-`: a pbrt scene whose files are relative to the working directory.
+pub(super) fn is_standard_input(scene: &Path) -> bool {
+    scene.as_os_str() == "-"
 }
 
 fn parse_resolution(text: &str) -> Result<[u32; 2], String> {

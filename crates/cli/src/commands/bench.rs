@@ -3,7 +3,7 @@
 use super::args::SceneArgs;
 use super::bench_efficiency::{EfficiencyArgs, efficiency};
 use super::progress;
-use super::settings::{load_job, plan};
+use super::settings::{Setup, load_job, plan};
 use anyhow::{Context, bail};
 use clap::{Args, ValueEnum};
 use lumiris::render::bench::{BenchSettings, RayCase, Report, measure};
@@ -65,8 +65,8 @@ pub(super) fn run(args: &BenchArgs) -> anyhow::Result<ExitCode> {
         bail!("bench measures Embree; leave out --accel");
     }
     args.json.as_deref().map_or(Ok(()), check_writable)?;
-    let (mut job, times) = load_job(&args.scene)?;
-    plan(&args.scene, &mut job, &Preparation::default(), false)?;
+    let (mut job, Setup { times, given, .. }) = load_job(&args.scene)?;
+    plan(&args.scene, (&mut job, &given), &Preparation::default(), false)?;
     let asked = |subject| args.subject == subject || args.subject == Subject::All;
     let settings = BenchSettings {
         intersect: asked(Subject::Intersect),

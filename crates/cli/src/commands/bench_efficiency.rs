@@ -4,7 +4,7 @@ use super::args::SceneArgs;
 use super::bench_references::References;
 use super::named::named;
 use super::progress;
-use super::settings::{load_job_of, render_settings};
+use super::settings::{Setup, load_job_of, render_settings};
 use super::settings_args::SettingsArgs;
 use anyhow::Context;
 use clap::Args;
@@ -145,7 +145,7 @@ pub(super) fn efficiency(scene_args: &SceneArgs, own: &EfficiencyArgs, json: Opt
     for path in std::iter::once(&scene_args.scene).chain(&own.more_scenes) {
         let mut scene = scene_args.clone();
         scene.scene.clone_from(path);
-        let (mut job, _, files) = load_job_of(&scene, &FileCache::default(), None)?;
+        let (mut job, Setup { files, .. }) = load_job_of(&scene, &FileCache::default(), None)?;
         let mut base = *job.settings();
         // Cases with other numbers of samples are of the same textures
         base.sampling.footprint_spp = Some(base.sampling.footprint_spp());

@@ -1,7 +1,7 @@
 //! `lumiris farm`: an image rendered in parts by the nodes of a cluster.
 
 use super::UsageError;
-use super::args::{RenderArgs, SceneArgs, aov, parse_fps};
+use super::args::{RenderArgs, SceneArgs, aov, is_standard_input, parse_fps};
 use super::denoise_args::DenoiseArgs;
 use super::exr::ExrArgs;
 use super::farm_scripts::{Job, quoted};
@@ -14,7 +14,7 @@ use super::part_args::{PART_TYPE, PartBy, extension};
 use super::parts;
 use super::pictures::check_outputs;
 use super::progress;
-use super::settings::{is_standard_input, load_scene};
+use super::settings::load_scene;
 use super::typed_options::AsTyped;
 use anyhow::{Context, bail};
 use clap::{Args, FromArgMatches, Subcommand};

@@ -6,9 +6,10 @@
 use super::UsageError;
 use super::args::RenderArgs;
 use super::frame_list::{FrameList, has_number, numbered};
+use super::interrupt::{self, INTERRUPTED};
 use super::pictures::are_complete;
 use super::progress;
-use super::render::{INTERRUPTED, Rendered, Session, check, is_stop, render_one, write_stats};
+use super::render::{Rendered, Session, check, is_stop, is_stopped, render_one, write_stats};
 use lumiris::import::cache::{FileCache, FileCounts};
 use lumiris::import::is_gltf;
 use serde_json::json;
@@ -36,10 +37,11 @@ struct Frame {
 pub(super) fn run(args: &RenderArgs, list: &FrameList) -> anyhow::Result<ExitCode> {
     check_names(args)?;
     check(args)?;
+    let _orderly = interrupt::orderly();
     let session = Session::start(args, FileCache::keeping())?;
     let mut frames = Vec::with_capacity(list.0.len());
     for (index, &number) in list.0.iter().enumerate() {
-        let outcome = if session.is_stopped() {
+        let outcome = if is_stopped() {
             Outcome::NotRendered
         } else {
             if !args.quiet {
@@ -65,7 +67,7 @@ pub(super) fn run(args: &RenderArgs, list: &FrameList) -> anyhow::Result<ExitCod
         progress::say(&format!("lumiris: {failed} of {} frames failed", frames.len()));
         return Ok(ExitCode::from(3));
     }
-    Ok(if session.is_stopped() { ExitCode::from(INTERRUPTED) } else { ExitCode::SUCCESS })
+    Ok(if is_stopped() { ExitCode::from(INTERRUPTED) } else { ExitCode::SUCCESS })
 }
 
 /// Scene, images and checkpoints must have a place for the number: all frames would be the same, or overwrite each other.

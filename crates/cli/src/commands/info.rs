@@ -4,7 +4,7 @@ use super::args::SceneArgs;
 use super::info_file::facts_of_file;
 use super::memory::{most_taken, taken};
 use super::progress;
-use super::settings::load_job;
+use super::settings::{Setup, load_job};
 use clap::Args;
 use lumiris::geometry::Shape;
 use lumiris::lights::Light;
@@ -31,7 +31,7 @@ pub(super) fn run(args: &InfoArgs) -> anyhow::Result<ExitCode> {
     let facts = match facts_of_file(&args.scene.scene)? {
         Some(facts) => facts,
         None => {
-            let (job, times) = load_job(&args.scene)?;
+            let (job, Setup { times, .. }) = load_job(&args.scene)?;
             let mut facts = facts(&job);
             facts["seconds"] = json!({ "load": times.load, "build": times.build });
             facts["scene"] = json!(args.scene.scene.display().to_string());

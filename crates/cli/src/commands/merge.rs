@@ -6,6 +6,7 @@ use super::exr::ExrArgs;
 use super::frame_list::{FrameList, numbered, parse_frames};
 use super::frames::check_numbers;
 use super::look::LookArgs;
+use super::output_options::OutputOptions;
 use super::part_args::is_part;
 use super::pictures::{Picture, Written, check_outputs, write_all};
 use super::progress;
@@ -20,6 +21,9 @@ use std::process::ExitCode;
 /// `lumiris merge`
 #[derive(Args, Clone, Debug)]
 pub(super) struct MergeArgs {
+    // First: the fields that follow take their values from the command line
+    #[command(flatten)]
+    output_options: OutputOptions,
     /// Parts that `lumiris render --part` has rendered, in any order; finished checkpoints are parts, too
     #[arg(required = true, value_name = "PART")]
     parts: Vec<PathBuf>,
@@ -78,6 +82,7 @@ fn merge_one(args: &MergeArgs, denoiser: Option<&Denoiser>) -> anyhow::Result<()
     if let Some(path) = repeated(&args.parts) {
         return Err(UsageError(format!("{} is given twice", path.display())).into());
     }
+    args.output_options.check(&args.output);
     let merged = merge(&args.parts, args.allow_missing)?;
     let (denoised, not_denoised) = denoise(denoiser, &merged);
     let picture = Picture {

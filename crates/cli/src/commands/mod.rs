@@ -1,8 +1,9 @@
 //! The command line: one file per subcommand.
 //!
 //! Exit codes: 0 success, 1 a check failed (`crosscheck` found a disagreement, `compare` a number beyond a limit),
-//! 2 wrong usage, 3 bad input or failed output, 130 a rendering stopped by Ctrl-C, which was written nevertheless. A reader
-//! of the standard output that has closed its pipe ends nothing: the command finishes, with the code that it has anyway.
+//! 2 wrong usage, 3 bad input or failed output, 130 stopped by Ctrl-C, SIGTERM or SIGHUP: a rendering has written the image
+//! so far. A reader of the standard output that has closed its pipe ends nothing: the command finishes, with the code that it
+//! has anyway.
 
 mod args;
 mod bench;
@@ -20,10 +21,12 @@ mod frames;
 mod generate;
 mod info;
 mod info_file;
+mod interrupt;
 mod look;
 mod memory;
 mod merge;
 mod named;
+mod output_options;
 mod part_args;
 mod parts;
 mod pictures;
@@ -93,7 +96,7 @@ pub(crate) fn run() -> ExitCode {
         Ok(cli) => cli,
         Err(error) => return code_of(answer(&error)),
     };
-    let result = match &cli.command {
+    let result = interrupt::watch().and_then(|()| match &cli.command {
         Command::Render(args) => match &args.frames {
             Some(list) => frames::run(args, list),
             None => render::run(args),
@@ -110,7 +113,7 @@ pub(crate) fn run() -> ExitCode {
         Command::Generate(args) => generate::run(args),
         Command::Completions(args) => shell::completions(args, Cli::command()),
         Command::Man(args) => shell::man(args, Cli::command()),
-    };
+    });
     code_of(result)
 }
 

@@ -2,7 +2,7 @@
 
 use super::args::SceneArgs;
 use super::progress;
-use super::settings::{load_job, plan};
+use super::settings::{Setup, load_job, plan};
 use anyhow::Context;
 use clap::Args;
 use lumiris::render::auto::{AutoChoice, Trial};
@@ -25,9 +25,9 @@ pub(super) struct PlanArgs {
 pub(super) fn run(args: &PlanArgs) -> anyhow::Result<ExitCode> {
     check_writable(&args.output)?;
     let before = processor_time::of_process();
-    let (mut job, _) = load_job(&args.scene)?;
+    let (mut job, Setup { given, .. }) = load_job(&args.scene)?;
     let loading = processor_time::of_process().saturating_sub(before);
-    let file = plan(&args.scene, &mut job, &Preparation { loading, ..Preparation::default() }, true)?;
+    let file = plan(&args.scene, (&mut job, &given), &Preparation { loading, ..Preparation::default() }, true)?;
     write_text(&args.output, &serde_json::to_string_pretty(&file)?)
         .with_context(|| format!("cannot write {}", args.output.display()))?;
     if let Ok(auto) = serde_json::from_value::<AutoChoice>(file.auto.clone()) {

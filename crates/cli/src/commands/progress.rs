@@ -4,11 +4,21 @@
 use anyhow::Context;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use lumiris::render::Progress;
+use std::collections::BTreeSet;
 use std::io::{self, Write};
+use std::sync::{Mutex, PoisonError};
 
 /// Prints a line to standard error; that nobody reads it is no reason to lose a rendering.
 pub(super) fn say(text: &str) {
     let _ = writeln!(std::io::stderr().lock(), "{text}");
+}
+
+/// Prints a line to standard error, unless it has been printed before, as for another frame.
+pub(super) fn say_once(text: &str) {
+    static SAID: Mutex<BTreeSet<String>> = Mutex::new(BTreeSet::new());
+    if SAID.lock().unwrap_or_else(PoisonError::into_inner).insert(text.to_owned()) {
+        say(text);
+    }
 }
 
 /// Prints a line to standard output. A closed pipe is not an error: its reader, such as `head`, has all that it wants.

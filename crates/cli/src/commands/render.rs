@@ -1,8 +1,9 @@
 //! `lumiris render`
 
 use super::UsageError;
-use super::args::RenderArgs;
+use super::args::{RenderArgs, is_standard_input};
 use super::denoise_args::denoise;
+use super::interrupt::{self, During, INTERRUPTED};
 use super::memory;
 use super::part_args::is_part;
 use super::parts;
@@ -10,7 +11,7 @@ use super::pictures::{Made, Written, check_outputs, is_exr, is_output, write_pic
 use super::plan_file::PlanFile;
 use super::progress::{self, Bar};
 use super::rescue::write_or_rescue;
-use super::settings::{SetupTimes, is_standard_input, load_job_of, plan, render_settings};
+use super::settings::{Setup, SetupTimes, load_job_of, plan, render_settings};
 use crate::watch::{self, Watch};
 use anyhow::{Context, bail};
 use lumiris::film::{Film, Summary};
@@ -31,25 +32,18 @@ use lumiris_formats::output::{check_writable, write_text};
 use serde_json::json;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::Ordering;
+use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
-
-/// Exit code of a rendering that was stopped by Ctrl-C, as in shells.
-pub(super) const INTERRUPTED: u8 = 130;
 
 /// What the renderings of one run of the program have in common.
 pub(super) struct Session {
-    /// True once Ctrl-C was pressed.
-    pub stop: Arc<AtomicBool>,
     /// Meshes and images that scenes share.
     pub files: FileCache,
     /// What denoises images, if they are to be.
     denoiser: Option<Denoiser>,
     /// Those who watch.
     watch: Watch,
-    /// True once it was said that layers of light groups are lost.
-    has_noted_layers: AtomicBool,
 }
 
 /// A picture that was rendered.
@@ -67,6 +61,7 @@ pub(super) struct Rendered {
 }
 
 pub(super) fn run(args: &RenderArgs) -> anyhow::Result<ExitCode> {
+    let _orderly = interrupt::orderly();
     let session = Session::start(args, FileCache::default())?;
     let mut rendered = match render_one(args, &session) {
         Err(error) if is_stop(&error) => {
@@ -81,7 +76,7 @@ pub(super) fn run(args: &RenderArgs) -> anyhow::Result<ExitCode> {
     if !rendered.misplaced.is_empty() {
         bail!(rendered.misplaced.join("\nlumiris: "));
     }
-    Ok(if session.is_stopped() { ExitCode::from(INTERRUPTED) } else { ExitCode::SUCCESS })
+    Ok(if is_stopped() { ExitCode::from(INTERRUPTED) } else { ExitCode::SUCCESS })
 }
 
 /// True if a rendering was stopped before it had anything to write.
@@ -90,8 +85,9 @@ pub(super) fn is_stop(error: &anyhow::Error) -> bool {
 }
 
 impl Session {
-    /// From here on Ctrl-C ends renderings in an orderly way, and they can be watched.
+    /// From here on renderings can be watched.
     pub(super) fn start(args: &RenderArgs, files: FileCache) -> anyhow::Result<Self> {
+        let _starting = interrupt::during(String::new());
         if !args.output.is_empty() {
             check_denoise(args, &args.output)?;
         }
@@ -101,19 +97,18 @@ impl Session {
         if let Some(address) = watch.page {
             progress::say(&format!("the image can be watched at http://{address}/"));
         }
-        let stop = Arc::new(AtomicBool::new(false));
-        stop_at_ctrl_c(&stop)?;
-        Ok(Session { stop, files, denoiser, watch, has_noted_layers: AtomicBool::new(false) })
+        Ok(Session { files, denoiser, watch })
     }
+}
 
-    /// True once Ctrl-C was pressed.
-    pub(super) fn is_stopped(&self) -> bool {
-        self.stop.load(Ordering::Relaxed)
-    }
+/// True once Ctrl-C was pressed.
+pub(super) fn is_stopped() -> bool {
+    interrupt::stop().load(Ordering::Relaxed)
 }
 
 /// Renders a picture and writes it. What could not be written is no error here, but part of the result.
 pub(super) fn render_one(args: &RenderArgs, session: &Session) -> anyhow::Result<Rendered> {
+    let preparing = interrupt::during(format!("preparing {}", args.scene.name()));
     check_outputs(&args.output)?;
     let stored = parts::stored(&args.parts)?;
     let mut args = args.clone();
@@ -121,7 +116,7 @@ pub(super) fn render_one(args: &RenderArgs, session: &Session) -> anyhow::Result
     let args = &args;
     let asked = check(args)?;
     let before = processor_time::of_process();
-    let (mut job, setup, files) = load_job_of(&args.scene, &session.files, stored.as_ref())?;
+    let (mut job, Setup { times: setup, files, given }) = load_job_of(&args.scene, &session.files, stored.as_ref())?;
     let loading = processor_time::of_process().saturating_sub(before);
     parts::check_settings(args, job.settings(), &job.world.scene.film.bounds)?;
     check_memory(args, &job, asked.as_deref())?;
@@ -134,24 +129,25 @@ pub(super) fn render_one(args: &RenderArgs, session: &Session) -> anyhow::Result
     // What goes on, or is planned, has its pilots, whatever the time
     let is_open = stored.is_none() && args.scene.plan.is_none();
     let time_limit = args.time.filter(|_| is_open).map(Duration::from_secs_f64);
-    let how = Preparation { threads: None, ratio_map: asks_for_ratio, time_limit, loading, stop: &session.stop };
-    let plan = plan(&args.scene, &mut job, &how, args.quiet)?;
+    let how = Preparation { threads: None, ratio_map: asks_for_ratio, time_limit, loading, stop: interrupt::stop() };
+    let plan = plan(&args.scene, (&mut job, &given), &how, args.quiet)?;
     let preparation = start.elapsed();
     let outputs = outputs(args, &job);
     if args.output.is_empty() {
         check_outputs(&outputs)?;
     }
     check_denoise(args, &outputs)?;
-    note_layers(args, &job, (&outputs, asked.as_deref()), session);
+    args.output_options.check(&outputs);
+    note_layers(args, &job, (&outputs, asked.as_deref()));
 
     let bar = Bar::new(args.quiet);
     let mut settings = settings_of(args, &job, asked.as_deref());
     settings.time_limit = settings.time_limit.map(|limit| limit.saturating_sub(preparation));
     let mut film_file = parts::film_file(args, (&job, &plan, &files), &mut settings, stored)?;
     let continuation = film_file.as_mut().map_or_else(Continuation::default, FilmFile::continuation);
-    let rendering = render_shown((&job, &settings), session, (&name_of(args), &bar), continuation)?;
+    let rendering = render_shown((&job, &settings), session, (&name_of(args), &bar), continuation, preparing)?;
     bar.finish();
-    if session.is_stopped() && rendering.film.summary().samples[1] == 0 {
+    if is_stopped() && rendering.film.summary().samples[1] == 0 {
         return Err(RenderError::Stopped.into());
     }
 
@@ -169,14 +165,11 @@ pub(super) fn render_one(args: &RenderArgs, session: &Session) -> anyhow::Result
 }
 
 /// Says, once, that no output holds the layers of light groups.
-fn note_layers(args: &RenderArgs, job: &RenderJob, (outputs, asked): (&[PathBuf], Option<&[Aov]>), session: &Session) {
+fn note_layers(args: &RenderArgs, job: &RenderJob, (outputs, asked): (&[PathBuf], Option<&[Aov]>)) {
     let is_wanted = asked.is_none_or(|list| list.contains(&Aov::LightGroups));
     let is_kept = outputs.iter().any(|path| is_exr(path) || is_part(path)) || args.parts.checkpoint.is_some();
-    if light_layers::count(job) == 0 || !is_wanted || is_kept || args.quiet {
-        return;
-    }
-    if !session.has_noted_layers.swap(true, Ordering::Relaxed) {
-        progress::say("note: only EXR files have the layers of light groups: -o image.exr");
+    if light_layers::count(job) > 0 && is_wanted && !is_kept && !args.quiet {
+        progress::say_once("note: only EXR files have the layers of light groups: -o image.exr");
     }
 }
 
@@ -217,7 +210,7 @@ fn write_results(
     let (denoised, not_denoised) = denoised.unwrap_or_default();
     let asked = asked_aovs(args)?;
     let asked = asked.as_deref();
-    let is_interrupted = session.is_stopped();
+    let is_interrupted = is_stopped();
     let made = Made { args, job, plan, rendering, asked, cryptomattes, denoised, is_interrupted };
     let (part_files, images): (Vec<PathBuf>, Vec<PathBuf>) = outputs.into_iter().partition(|path| is_part(path));
     let mut written = write_pictures(&made, &images)?;
@@ -239,22 +232,25 @@ fn check_denoise(args: &RenderArgs, outputs: &[PathBuf]) -> Result<(), UsageErro
     args.denoise.check(outputs)
 }
 
-/// Renders, for those who watch as well.
+/// Renders, for those who watch as well. From the first sample on there is something to lose.
 fn render_shown(
     (job, settings): (&RenderJob, &RenderSettings),
     session: &Session,
     (name, bar): (&str, &Bar),
     continuation: Continuation<'_>,
+    preparing: During,
 ) -> anyhow::Result<Rendering> {
+    let preparing = Mutex::new(Some(preparing));
     let canvas = session.watch.begin(name, &job.world.scene.film, settings.with_features);
     let observe = |progress: &Progress| {
+        drop(preparing.lock().unwrap_or_else(PoisonError::into_inner).take());
         bar.update(progress);
         watch::observe(canvas.as_ref(), progress);
     };
-    let Some(shown) = &canvas else { return Ok(go_on(job, settings, &session.stop, &observe, continuation)?) };
+    let Some(shown) = &canvas else { return Ok(go_on(job, settings, interrupt::stop(), &observe, continuation)?) };
     let set_tile = |tile: &Film| shown.set_tile(tile);
     let watched = Continuation { watch: Some(&set_tile), ..continuation };
-    let rendering = go_on(job, settings, &session.stop, &observe, watched)?;
+    let rendering = go_on(job, settings, interrupt::stop(), &observe, watched)?;
     shown.finish(&rendering.film);
     Ok(rendering)
 }
@@ -268,17 +264,6 @@ fn name_of(args: &RenderArgs) -> String {
 pub(super) fn write_stats(path: &Path, stats: &serde_json::Value) -> anyhow::Result<()> {
     let text = serde_json::to_string_pretty(stats)?;
     write_or_rescue(path, |path| write_text(path, &text).with_context(|| format!("cannot write {}", path.display())))
-}
-
-/// Ctrl-C sets `stop`, which ends a rendering in an orderly way; a second one ends the program.
-pub(super) fn stop_at_ctrl_c(stop: &Arc<AtomicBool>) -> anyhow::Result<()> {
-    let handler = Arc::clone(stop);
-    ctrlc::set_handler(move || {
-        if handler.swap(true, Ordering::Relaxed) {
-            std::process::abort();
-        }
-    })
-    .context("cannot watch for Ctrl-C")
 }
 
 fn outputs(args: &RenderArgs, job: &RenderJob) -> Vec<PathBuf> {

@@ -1,13 +1,11 @@
 //! `lumiris reproduce`
 
-use super::progress;
+use super::{interrupt, progress};
 use crate::compare::check_page;
 use clap::{Args, ValueEnum};
 use lumiris_lab::reproduce::{Observer, Options, ReproduceError, fan, keller_wald, talbot};
 use std::path::PathBuf;
 use std::process::ExitCode;
-use std::sync::Arc;
-use std::sync::atomic::AtomicBool;
 
 /// `lumiris reproduce`
 #[derive(Args, Clone, Debug)]
@@ -50,8 +48,6 @@ enum Paper {
 
 pub(super) fn run(args: &ReproduceArgs) -> anyhow::Result<ExitCode> {
     check_page(&args.out)?;
-    let stop = Arc::new(AtomicBool::new(false));
-    super::render::stop_at_ctrl_c(&stop)?;
     let options = Options {
         out: args.out.clone(),
         scenes: args.scenes.clone(),
@@ -65,7 +61,7 @@ pub(super) fn run(args: &ReproduceArgs) -> anyhow::Result<ExitCode> {
             progress::say(text);
         }
     };
-    let observer = Observer { say: &say, stop: &stop };
+    let observer = Observer { say: &say, stop: interrupt::stop() };
     let page = match args.paper {
         Paper::Talbot => talbot::run(&options, observer),
         Paper::Fan => fan::run(&options, observer),
@@ -76,7 +72,7 @@ pub(super) fn run(args: &ReproduceArgs) -> anyhow::Result<ExitCode> {
             progress::print(&page.display().to_string())?;
             Ok(ExitCode::SUCCESS)
         }
-        Err(ReproduceError::Stopped) => Ok(ExitCode::from(super::render::INTERRUPTED)),
+        Err(ReproduceError::Stopped) => Ok(ExitCode::from(interrupt::INTERRUPTED)),
         Err(error) => Err(error.into()),
     }
 }

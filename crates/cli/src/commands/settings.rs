@@ -1,7 +1,8 @@
 //! From command-line options to a render job.
 
 use super::UsageError;
-use super::args::SceneArgs;
+use super::args::{SceneArgs, is_standard_input};
+use super::interrupt;
 use super::memory::MemoryLimit;
 use super::pictures::is_picture;
 use super::plan_file::PlanFile;
@@ -17,7 +18,7 @@ use lumiris::render::parts::Stored;
 use lumiris::render::plan::{Preparation, prepare};
 use lumiris::scene::RenderJob;
 use lumiris::settings::table::rows;
-use lumiris::settings::{Proposals, SampleCounts, Settings, StageTimes};
+use lumiris::settings::{Given, Proposals, SampleCounts, Settings, StageTimes};
 use lumiris_formats::source::read_bytes;
 use std::io;
 use std::path::Path;
@@ -39,6 +40,7 @@ pub(super) struct SetupTimes {
 /// warnings.
 pub(super) fn load_scene(args: &SceneArgs, files: &FileCache, stored: Option<&Stored>) -> anyhow::Result<Loaded> {
     check_scene(args)?;
+    let _loading = interrupt::during(format!("loading {}", args.name()));
     if let Some(MemoryLimit::Bytes(bytes)) = args.texture_memory {
         files.limit_textures(bytes);
     }
@@ -53,8 +55,7 @@ pub(super) fn load_scene(args: &SceneArgs, files: &FileCache, stored: Option<&St
         Ok(loaded) => loaded,
         Err(diagnostics) => {
             progress::say(diagnostics.to_string().trim_end());
-            let name = if is_standard_input(&args.scene) { "<stdin>".into() } else { args.scene.to_string_lossy() };
-            bail!("{name} could not be loaded");
+            bail!("{} could not be loaded", args.name());
         }
     };
     let warnings = loaded.warnings.to_string();
@@ -69,6 +70,7 @@ pub(super) fn load_scene(args: &SceneArgs, files: &FileCache, stored: Option<&St
         apply_plan(path, &mut loaded.settings)?;
     }
     args.settings.apply(&mut loaded.settings);
+    loaded.given.extend(args.settings.given());
     let has_spp = args.settings.has("spp");
     complete_for_noise(&mut loaded.settings, has_spp).map_err(|needs| UsageError(format!("--noise {needs}")))?;
     // More samples belong to what the first ones were prepared for
@@ -82,11 +84,6 @@ pub(super) fn load_scene(args: &SceneArgs, files: &FileCache, stored: Option<&St
         progress::say("warning: without samples on non-contributing lights, direct light is biased");
     }
     Ok(loaded)
-}
-
-/// True for `-`: a pbrt scene whose files are relative to the working directory.
-pub(super) fn is_standard_input(scene: &Path) -> bool {
-    scene.as_os_str() == "-"
 }
 
 /// All of the standard input, which commands may load more than once.
@@ -134,26 +131,38 @@ fn mesh_kind(path: &Path) -> Option<&'static str> {
     }
 }
 
-/// Loads the scene and builds its ray tracers.
-pub(super) fn load_job(args: &SceneArgs) -> anyhow::Result<(RenderJob, SetupTimes)> {
-    load_job_of(args, &FileCache::default(), None).map(|(job, times, _)| (job, times))
+/// What is known of a scene that was loaded, beside its job.
+pub(super) struct Setup {
+    /// Times.
+    pub times: SetupTimes,
+    /// The files of the scene.
+    pub files: SceneFiles,
+    /// The settings that were given.
+    pub given: Given,
 }
 
-/// The same with the settings of what is stored, and without reading what `files` has; also returns the files of the scene.
+/// Loads the scene and builds its ray tracers.
+pub(super) fn load_job(args: &SceneArgs) -> anyhow::Result<(RenderJob, Setup)> {
+    load_job_of(args, &FileCache::default(), None)
+}
+
+/// The same with the settings of what is stored, and without reading what `files` has.
 pub(super) fn load_job_of(
     args: &SceneArgs,
     files: &FileCache,
     stored: Option<&Stored>,
-) -> anyhow::Result<(RenderJob, SetupTimes, SceneFiles)> {
+) -> anyhow::Result<(RenderJob, Setup)> {
     let start = Instant::now();
     let mut loaded = load_scene(args, files, stored)?;
-    let files = std::mem::take(&mut loaded.files);
+    let (files, given) = (std::mem::take(&mut loaded.files), std::mem::take(&mut loaded.given));
     let load = start.elapsed().as_secs_f64();
     let start = Instant::now();
+    let _building = interrupt::during(format!("building the ray tracers of {}", args.name()));
     let job = loaded
         .job(args.accel, args.packet_width)
         .with_context(|| format!("cannot build the ray tracer of {}", args.scene.display()))?;
-    Ok((job, SetupTimes { load, build: start.elapsed().as_secs_f64(), prepare: 0.0 }, files))
+    let times = SetupTimes { load, build: start.elapsed().as_secs_f64(), prepare: 0.0 };
+    Ok((job, Setup { times, files, given }))
 }
 
 /// Applies the choices of a plan file, which options may override.
@@ -169,13 +178,16 @@ fn apply_plan(path: &Path, settings: &mut Settings) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Chooses what the settings leave open, and prints it unless `quiet`; on the threads of the options.
+/// Chooses what the settings leave open, and prints it unless `quiet`; on the threads of the options. Of the settings that were
+/// given, says which have no effect.
 pub(super) fn plan(
     args: &SceneArgs,
-    job: &mut RenderJob,
+    (job, given): (&mut RenderJob, &Given),
     how: &Preparation<'_>,
     quiet: bool,
 ) -> anyhow::Result<PlanFile> {
+    let _preparing = interrupt::during(format!("measuring what the settings of {} leave open", args.name()));
+    let asked = *job.settings();
     let plan = prepare(job, &Preparation { threads: args.threads.map(|t| t as usize), ..*how })?;
     if let (Some(auto), false) = (&plan.auto, quiet) {
         progress::say(&format!("auto: {}", auto.chosen));
@@ -197,9 +209,8 @@ pub(super) fn plan(
         progress::say(&format!("adaptive: {min} to {max} samples per pixel{looks}"));
     }
     plan.warnings.iter().for_each(|warning| progress::say(&format!("warning: {warning}")));
-    let idle = args.settings.without_effect(job.settings());
-    if !idle.is_empty() && !quiet {
-        progress::say(&format!("note: without effect on this image: {}", idle.join(", ")));
+    for line in given.without_effect(&asked, job.settings()) {
+        progress::say_once(&format!("warning: {line}"));
     }
     if let Some(path) = &args.plan
         && let Some(other) = PlanFile::read(path)?.other_image(&args.scene, job)

@@ -2,9 +2,9 @@
 
 use clap::builder::{PossibleValuesParser, TypedValueParser, ValueParser};
 use clap::{Arg, ArgMatches, Args, Command, FromArgMatches};
-use lumiris::settings::Settings;
 use lumiris::settings::table::{GROUPS, Setting, rows};
 use lumiris::settings::value::{Integers, Kind, Value};
+use lumiris::settings::{Given, Settings};
 
 /// The settings given as options, in the order of the table.
 #[derive(Clone, Debug, Default)]
@@ -24,10 +24,11 @@ impl SettingsArgs {
         value.integer().and_then(|n| u32::try_from(n).ok())
     }
 
-    /// Options that are given, and change nothing of an image with these settings.
-    pub(super) fn without_effect(&self, settings: &Settings) -> Vec<String> {
-        let idle = self.typed.iter().filter(|(row, _)| !row.applies.to(settings));
-        idle.map(|(row, _)| format!("--{}", row.flag)).collect()
+    /// The settings that are given.
+    pub(super) fn given(&self) -> Given {
+        let mut given = Given::default();
+        self.typed.iter().for_each(|(row, value)| given.add(row, *value, format!("--{} {value}", row.flag)));
+        given
     }
 
     /// Parses options outside the command line of the program.

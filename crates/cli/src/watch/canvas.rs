@@ -1,22 +1,20 @@
 //! The pixels of an image as they are by now.
 //!
 //! Threads that render leave the packed sums of their tiles, which they share and do not copy. Pixels are made of them when
-//! somebody asks, by the thread that asks: of what has changed since, and rarely enough to take at most a hundredth of the
-//! machine.
+//! somebody asks, by the thread that asks: of what has changed since, and of a few tiles at once.
 
 use lumiris::film::{Film, FilmTile, PixelBounds};
 use lumiris::imaging::{Layer, layers};
 use lumiris::render::Progress;
-use lumiris::render::output::{Aov, Layers, channels, live_aovs};
-use std::collections::BTreeMap;
+use lumiris::render::output::{Aov, Layers, live_aovs};
+use std::collections::{BTreeMap, HashMap};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
-use std::time::{Duration, Instant};
 
-/// Time of all processors for each second that one of them makes pixels.
-const REST: u32 = 100;
+/// Pixels that are handed out at once, at most: less than a megabyte, whatever the size of tiles. A row of a tile is the least.
+const AT_ONCE: usize = 1 << 14;
 
-/// The pixels of a tile.
+/// The pixels of a tile, or of some of its rows.
 #[derive(Clone, Debug)]
 pub(crate) struct Tile {
     /// Left, top, width and height inside the crop window (pixels).
@@ -25,21 +23,24 @@ pub(crate) struct Tile {
     pub data: Vec<f32>,
 }
 
-/// What there is of a tile.
+/// What there is of some rows of a tile.
 #[derive(Clone, Debug)]
 enum Content {
+    /// The tile.
     Sums(FilmTile),
-    Pixels(PixelBounds, Vec<f32>),
+    /// All channels of the rows, interleaved.
+    Pixels(Arc<[f32]>),
 }
 
-#[derive(Debug)]
+#[derive(Debug, Default)]
 struct State {
+    /// Number of changes so far.
     version: u64,
-    /// With the state of the canvas from which on they are like this; by left and top.
-    tiles: BTreeMap<[u32; 2], (u64, Content)>,
+    /// Rows of tiles, by the change that made them like this.
+    bands: BTreeMap<u64, (PixelBounds, Content)>,
+    /// The keys of these, by left and top.
+    versions: HashMap<[u32; 2], u64>,
     progress: Option<Progress>,
-    /// When pixels may be made again.
-    rests_until: Instant,
 }
 
 /// See the module.
@@ -55,8 +56,6 @@ pub(crate) struct Canvas {
     pub layers: Vec<Layer>,
     bounds: PixelBounds,
     aovs: Vec<Aov>,
-    /// Time of one processor for each second that it makes pixels.
-    rest: u32,
     state: Mutex<State>,
     is_finished: AtomicBool,
 }
@@ -67,8 +66,6 @@ impl Canvas {
         let empty = Film::new([0, 0], PixelBounds { x0: 0, x1: 0, y0: 0, y1: 0 }, Vec::new(), Vec::new());
         let channels = Layers::new(&empty, true, &aovs, None).names();
         let layers = layers(&channels);
-        let processors = std::thread::available_parallelism().map_or(1, |n| u32::try_from(n.get()).unwrap_or(REST));
-        let state = State { version: 0, tiles: BTreeMap::new(), progress: None, rests_until: Instant::now() };
         Canvas {
             name: name.to_owned(),
             size: [bounds.width(), bounds.height()],
@@ -76,8 +73,7 @@ impl Canvas {
             layers,
             bounds,
             aovs,
-            rest: REST / processors.min(REST),
-            state: Mutex::new(state),
+            state: Mutex::default(),
             is_finished: AtomicBool::new(false),
         }
     }
@@ -88,14 +84,13 @@ impl Canvas {
 
     /// Takes the film of a tile, whose sums it shares.
     pub(crate) fn set_tile(&self, film: &Film) {
-        film.tiles().iter().for_each(|tile| self.set(&tile.bounds, Content::Sums(tile.clone())));
+        film.tiles().iter().for_each(|tile| self.set(tile));
     }
 
-    fn set(&self, b: &PixelBounds, content: Content) {
-        let mut state = self.state();
-        state.version += 1;
-        let version = state.version;
-        state.tiles.insert([b.x0, b.y0], (version, content));
+    fn set(&self, tile: &FilmTile) {
+        for band in bands(&tile.bounds) {
+            self.state().set(band, Content::Sums(tile.clone()));
+        }
     }
 
     pub(super) fn set_progress(&self, progress: &Progress) {
@@ -111,12 +106,11 @@ impl Canvas {
         if film.is_corrected() {
             self.set_pixels(film);
         } else {
-            let is_known = |tile: &FilmTile| match self.state().tiles.get(&[tile.bounds.x0, tile.bounds.y0]) {
-                Some((_, Content::Sums(known))) => Arc::ptr_eq(&known.sums, &tile.sums),
-                Some((_, Content::Pixels(..))) | None => false,
+            let is_known = |tile: &FilmTile| match self.state().content([tile.bounds.x0, tile.bounds.y0]) {
+                Some(Content::Sums(known)) => Arc::ptr_eq(&known.sums, &tile.sums),
+                Some(Content::Pixels(_)) | None => false,
             };
-            let new = film.tiles().iter().filter(|tile| !is_known(tile));
-            new.for_each(|tile| self.set(&tile.bounds, Content::Sums(tile.clone())));
+            film.tiles().iter().filter(|tile| !is_known(tile)).for_each(|tile| self.set(tile));
         }
         self.is_finished.store(true, Ordering::Release);
     }
@@ -126,11 +120,13 @@ impl Canvas {
         let layers = Layers::new(film, true, &self.aovs, None);
         let row = film.bounds.width() as usize * self.channels.len();
         for tiles in film.tiles().chunk_by(|a, b| (a.bounds.y0, a.bounds.y1) == (b.bounds.y0, b.bounds.y1)) {
-            let rows = layers.rows_in_parallel(tiles[0].bounds.y0..tiles[0].bounds.y1);
-            for b in tiles.iter().map(|tile| tile.bounds) {
+            let top = tiles[0].bounds.y0;
+            let rows = layers.rows_in_parallel(top..tiles[0].bounds.y1);
+            for b in tiles.iter().flat_map(|tile| bands(&tile.bounds)) {
                 let columns = [b.x0, b.x1].map(|x| (x - film.bounds.x0) as usize * self.channels.len());
-                let pixels = rows.chunks(row).flat_map(|row| &row[columns[0]..columns[1]]).copied().collect();
-                self.set(&b, Content::Pixels(b, pixels));
+                let rows = rows.chunks(row).skip((b.y0 - top) as usize).take(b.height() as usize);
+                let pixels = rows.flat_map(|row| &row[columns[0]..columns[1]]).copied().collect();
+                self.state().set(b, Content::Pixels(pixels));
             }
         }
     }
@@ -139,36 +135,66 @@ impl Canvas {
         self.is_finished.load(Ordering::Acquire)
     }
 
-    /// The tiles that have changed since a state, and the state that they are of. None, and the former state, if it is too soon
-    /// to ask again.
-    pub(super) fn changed_since(&self, version: u64) -> (u64, Vec<Tile>) {
-        let is_finished = self.is_finished();
-        let (present, changed) = {
-            let state = self.state();
-            if !is_finished && Instant::now() < state.rests_until {
-                return (version, Vec::new());
-            }
-            let changed = state.tiles.values().filter(|(of, _)| *of > version).map(|(_, content)| content.clone());
-            (state.version, changed.collect::<Vec<_>>())
-        };
-        let start = Instant::now();
-        let tiles = changed.into_iter().map(|content| self.tile(content)).collect();
-        self.state().rests_until = Instant::now() + start.elapsed().min(Duration::from_secs(60)) * self.rest;
-        (present, tiles)
+    /// Number of changes so far, which is the state that the canvas is in.
+    pub(super) fn version(&self) -> u64 {
+        self.state().version
     }
 
-    /// The pixels of a tile.
-    fn tile(&self, content: Content) -> Tile {
-        let (b, data) = match content {
-            Content::Pixels(bounds, pixels) => (bounds, pixels),
+    /// Tiles that have changed since a state, those first that have changed first, and the state that they lead to. There may be
+    /// more, unless there are none.
+    pub(super) fn changed_since(&self, version: u64) -> (u64, Vec<Tile>) {
+        let (reached, changed) = self.state().changed_since(version);
+        (reached, changed.into_iter().map(|(bounds, content)| self.tile(bounds, content)).collect())
+    }
+
+    /// The pixels of some rows of a tile.
+    fn tile(&self, b: PixelBounds, content: Content) -> Tile {
+        let data = match content {
+            Content::Pixels(pixels) => pixels.to_vec(),
             Content::Sums(tile) => {
                 let bounds = tile.bounds;
                 let film = Film::new([bounds.x1, bounds.y1], bounds, vec![tile], Vec::new());
-                (bounds, channels(&film, &self.aovs, None).data)
+                Layers::new(&film, true, &self.aovs, None).rows(b.y0..b.y1)
             }
         };
         Tile { place: [b.x0 - self.bounds.x0, b.y0 - self.bounds.y0, b.width(), b.height()], data }
     }
+}
+
+impl State {
+    fn set(&mut self, bounds: PixelBounds, content: Content) {
+        self.version += 1;
+        if let Some(former) = self.versions.insert([bounds.x0, bounds.y0], self.version) {
+            self.bands.remove(&former);
+        }
+        self.bands.insert(self.version, (bounds, content));
+    }
+
+    /// What there is from a left upper corner on.
+    fn content(&self, corner: [u32; 2]) -> Option<&Content> {
+        self.bands.get(self.versions.get(&corner)?).map(|(_, content)| content)
+    }
+
+    /// See [`Canvas::changed_since`].
+    fn changed_since(&self, version: u64) -> (u64, Vec<(PixelBounds, Content)>) {
+        let (mut reached, mut changed, mut pixels) = (self.version, Vec::new(), 0);
+        for (&version, (bounds, content)) in self.bands.range(version.saturating_add(1)..) {
+            pixels += bounds.area();
+            if pixels > AT_ONCE && !changed.is_empty() {
+                break;
+            }
+            changed.push((*bounds, content.clone()));
+            reached = version;
+        }
+        (reached, changed)
+    }
+}
+
+/// The rows of a tile, so many together as are handed out at once.
+fn bands(tile: &PixelBounds) -> impl Iterator<Item = PixelBounds> {
+    let (tile, height) = (*tile, (AT_ONCE as u32 / tile.width().max(1)).max(1));
+    let tops = (tile.y0..tile.y1).step_by(height as usize);
+    tops.map(move |y0| PixelBounds { y0, y1: tile.y1.min(y0 + height), ..tile })
 }
 
 #[cfg(test)]
@@ -191,28 +217,21 @@ mod tests {
             counts.iter().for_each(|&(i, count)| pixels[i].radiance.count = count);
             Film::of_pixels([100, 100], tile, &pixels)
         };
-        let soon = |canvas: &Canvas| canvas.state().rests_until = Instant::now();
         assert_eq!(canvas.changed_since(0).1.len(), 0);
         let films: Vec<Film> = tiles.iter().map(|&tile| film(tile, &[])).collect();
         films.iter().for_each(|film| canvas.set_tile(film));
-        soon(&canvas);
         let (state, changed) = canvas.changed_since(0);
         assert_eq!(changed.iter().map(|t| t.place).collect::<Vec<_>>(), [[0, 0, 16, 10], [16, 0, 4, 10]]);
         assert_eq!(changed[1].data.len(), 40 * canvas.channels.len());
         assert_eq!(canvas.changed_since(state).1.len(), 0);
         let second = film(tiles[1], &[(3, 5)]);
         canvas.set_tile(&second);
-        // Too soon after what took long
-        canvas.state().rests_until = Instant::now() + Duration::from_secs(600);
-        assert_eq!((canvas.changed_since(state).0, canvas.changed_since(state).1.len()), (state, 0));
-        soon(&canvas);
         let places = |changed: Vec<Tile>| changed.iter().map(|t| t.place).collect::<Vec<_>>();
         let (now, changed) = canvas.changed_since(state);
         assert_eq!(places(changed), [[16, 0, 4, 10]]);
 
-        // The end changes the first tile only, and is told at once
+        // The end changes the first tile only
         let whole = [film(tiles[0], &[(0, 1)]), second].map(|film| film.tiles()[0].clone());
-        canvas.state().rests_until = Instant::now() + Duration::from_secs(600);
         let mut whole = Film::new([100, 100], bounds, whole.to_vec(), Vec::new());
         canvas.finish(&whole);
         assert!(canvas.is_finished());
@@ -225,5 +244,36 @@ mod tests {
         let (_, changed) = canvas.changed_since(state);
         assert_eq!(changed.len(), 2);
         assert!(changed.iter().any(|tile| tile.data.contains(&2.0)));
+    }
+
+    #[test]
+    fn however_large_tiles_are_few_pixels_are_handed_out_at_once() {
+        let (width, height) = (1000_u32, 70_u32);
+        let bounds = PixelBounds { x0: 3, x1: 3 + width, y0: 5, y1: 5 + height };
+        let canvas = Canvas::new("a", bounds, false);
+        let mut pixels = vec![PixelAccumulator::default(); bounds.area()];
+        pixels.iter_mut().zip(0..).for_each(|(pixel, i)| pixel.radiance.count = i);
+        let mut film = Film::of_pixels([2000, 100], bounds, &pixels);
+        canvas.set_tile(&film);
+        film.correct(vec![[0.0; 3]; bounds.area()], Vec::new());
+        let corrected = Canvas::new("a", bounds, false);
+        corrected.finish(&film);
+        for canvas in [canvas, corrected] {
+            let (mut counts, mut state) = (vec![f32::NAN; bounds.area()], 0);
+            while state < canvas.version() {
+                let (reached, tiles) = canvas.changed_since(state);
+                let handed_out: u32 = tiles.iter().map(|tile| tile.place[2] * tile.place[3]).sum();
+                assert!((1..=AT_ONCE as u32).contains(&handed_out) && reached > state, "{handed_out}");
+                for Tile { place: [left, top, columns, rows], data } in tiles {
+                    assert_eq!((left, columns), (0, width));
+                    let first = (top * width) as usize;
+                    for (count, pixel) in counts[first..][..(columns * rows) as usize].iter_mut().zip(data.chunks(4)) {
+                        *count = pixel[3];
+                    }
+                }
+                state = reached;
+            }
+            assert!(counts.iter().zip(0..).all(|(&count, i)| count == i as f32));
+        }
     }
 }

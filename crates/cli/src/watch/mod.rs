@@ -1,8 +1,10 @@
 //! Watching an image while it converges: in tev ([`tev`]), and on a page in the browser ([`server`]).
 //!
-//! Threads that render leave their tiles in a [`Canvas`](canvas::Canvas), which shares their sums; those that send them on
-//! make pixels of them, some times a second at most, and only of what has changed.
+//! Threads that render leave their tiles in a [`Canvas`](canvas::Canvas), which shares their sums, and wait for nobody. Those
+//! that send them on, one for each way to watch, make pixels of them, only of what has changed, within an
+//! [`Allowance`](allowance::Allowance) of processor time.
 
+mod allowance;
 mod canvas;
 mod server;
 mod tev;
@@ -12,11 +14,15 @@ use canvas::Canvas;
 use lumiris::render::Progress;
 use lumiris::scene::FilmSettings;
 use server::Server;
-use std::net::SocketAddr;
+use std::net::{Shutdown, SocketAddr, TcpStream};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
 use tev::Tev;
+
+/// How long the program may take to show the last state when it ends.
+const FAREWELL: Duration = Duration::from_secs(5);
 
 /// Where images may be watched.
 #[derive(Clone, Debug, Default)]
@@ -52,6 +58,8 @@ impl Shared {
 pub(crate) struct Watch {
     shared: Arc<Shared>,
     threads: Vec<JoinHandle<()>>,
+    /// The connection with tev.
+    tev: Option<TcpStream>,
     /// Address of the page.
     pub page: Option<SocketAddr>,
 }
@@ -61,16 +69,17 @@ impl Watch {
     pub(crate) fn start(places: &Places, warn: fn(&str)) -> anyhow::Result<Self> {
         let mut watch = Watch::default();
         if let Some(address) = &places.tev {
-            let tev = Tev::connect(address).with_context(|| format!("--tev: there is no tev at {address}"))?;
+            let (tev, stream) =
+                Tev::connect(address).with_context(|| format!("--tev: there is no tev at {address}"))?;
+            watch.tev = Some(stream);
             let shared = Arc::clone(&watch.shared);
             watch.threads.push(std::thread::spawn(move || tev.run(&shared, warn)));
         }
         if let Some(address) = places.view {
-            let server = Server::open(address, places.insecure)
+            let server = Server::open(address, places.insecure, Arc::clone(&watch.shared))
                 .with_context(|| format!("--view: nothing can be served on {address}"))?;
             watch.page = Some(server.address());
-            let shared = Arc::clone(&watch.shared);
-            watch.threads.push(std::thread::spawn(move || server.run(&shared)));
+            watch.threads.push(std::thread::spawn(move || server.run()));
         }
         Ok(watch)
     }
@@ -89,6 +98,14 @@ impl Watch {
 impl Drop for Watch {
     fn drop(&mut self) {
         self.shared.is_closing.store(true, Ordering::Release);
+        let closing = Instant::now();
+        while closing.elapsed() < FAREWELL && !self.threads.iter().all(JoinHandle::is_finished) {
+            std::thread::sleep(Duration::from_millis(5));
+        }
+        if let Some(tev) = &self.tev {
+            // A tev that reads a byte now and then would never end the thread that writes
+            let _ = tev.shutdown(Shutdown::Both);
+        }
         for thread in self.threads.drain(..) {
             // A thread that failed has shown nothing more: the image is not its concern
             let _ = thread.join();

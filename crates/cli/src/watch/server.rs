@@ -2,36 +2,75 @@
 //!
 //! * `/`: the page;
 //! * `/state`: progress and layers, as JSON;
-//! * `/tiles?image=I&layer=L&since=V`: the tiles of a layer that have changed since the state V: that of the answer (u64),
-//!   then for each tile left, top, width, height (u32) and its values (f32), little-endian.
+//! * `/tiles?image=I&layer=L&since=V`: tiles of a layer that have changed since the state V: the state that they lead to
+//!   (u64), then for each tile left, top, width, height (u32) and its values (f32), little-endian. The page goes on from there
+//!   until it has reached the `version` of `/state`.
 //!
 //! A page of another site could ask for these under a name of its own that leads to this machine; so requests must
 //! name it by its address or as `localhost`.
+//!
+//! Whoever reaches the address may send anything. One thread answers, with an [`Allowance`] of processor time, and connections
+//! are bounded in number, length and time: 64 of them have 16 kB for the head of a request, and 260 kB for an answer each.
 
 use super::Shared;
+use super::allowance::Allowance;
 use super::canvas::Canvas;
-use anyhow::anyhow;
+use http_body_util::Full;
+use hyper::body::{Body, Bytes};
+use hyper::header::{self, HeaderValue};
+use hyper::server::conn::http1;
+use hyper::service::service_fn;
+use hyper::{Method, Request, Response, StatusCode};
+use hyper_util::rt::{TokioIo, TokioTimer};
 use serde_json::json;
-use std::io::Cursor;
+use std::collections::VecDeque;
+use std::convert::Infallible;
+use std::io;
 use std::net::SocketAddr;
-use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
-use tiny_http::{Header, Method, Request, Response, StatusCode};
+use tokio::net::{TcpListener, TcpStream};
+use tokio::runtime::Runtime;
+use tokio::task::AbortHandle;
+use tokio::time::{sleep, timeout};
 
 const PAGE: &str = include_str!("viewer/index.html");
 const STYLE: &str = include_str!("viewer/style.css");
 const SCRIPT: &str = include_str!("viewer/view.js");
 
-/// Time between two looks at whether the program ends.
-const INTERVAL: Duration = Duration::from_millis(100);
+/// Time between two looks at whether the program ends, and at how much processor time was taken.
+const INTERVAL: Duration = Duration::from_millis(10);
 /// How long a page that is open may take to fetch the last state.
 const FAREWELL: Duration = Duration::from_secs(2);
+/// Connections; one more ends the oldest of them.
+const CONNECTIONS: usize = 64;
+/// Length of the head of a request (bytes).
+const HEAD: usize = 16 << 10;
+/// How long a client may take to send it.
+const HEAD_TIME: Duration = Duration::from_secs(10);
+/// How long a connection may take altogether.
+const CONNECTION_TIME: Duration = Duration::from_secs(30);
 
-/// The server and the images that it has shown.
+/// The server, before it answers.
 pub(super) struct Server {
-    http: tiny_http::Server,
+    runtime: Runtime,
+    listener: TcpListener,
+    page: Page,
+}
+
+/// What requests ask for.
+struct Page {
+    shared: Arc<Shared>,
     address: SocketAddr,
     insecure: bool,
+    /// The page with its style and script.
+    html: Bytes,
+    state: Mutex<State>,
+}
+
+#[derive(Default)]
+struct State {
     /// The image that is shown, with a number of its own.
     shown: Option<(u64, Arc<Canvas>)>,
     /// When a page asked last.
@@ -40,144 +79,190 @@ pub(super) struct Server {
     is_told: bool,
 }
 
-type Answer = Response<Cursor<Vec<u8>>>;
+type Answer = Response<Full<Bytes>>;
 
 impl Server {
-    pub(super) fn open(address: SocketAddr, insecure: bool) -> anyhow::Result<Self> {
-        let http = tiny_http::Server::http(address).map_err(|error| anyhow!("{error}"))?;
+    pub(super) fn open(address: SocketAddr, insecure: bool, shared: Arc<Shared>) -> io::Result<Self> {
+        let runtime = tokio::runtime::Builder::new_current_thread().enable_io().enable_time().build()?;
+        let listener = runtime.block_on(TcpListener::bind(address))?;
         // With port 0 the system chooses
-        let address = http.server_addr().to_ip().unwrap_or(address);
-        Ok(Server { http, address, insecure, shown: None, asked: None, is_told: false })
+        let address = listener.local_addr()?;
+        let html = PAGE.replace("/*style*/", STYLE).replace("/*script*/", SCRIPT).into();
+        Ok(Server { runtime, listener, page: Page { shared, address, insecure, html, state: Mutex::default() } })
     }
 
     pub(super) fn address(&self) -> SocketAddr {
-        self.address
+        self.page.address
     }
 
     /// Answers until the program ends, and a page that is open has seen the end.
-    pub(super) fn run(mut self, shared: &Shared) {
-        let mut closing: Option<Instant> = None;
-        loop {
-            if shared.is_closing() {
-                let since = *closing.get_or_insert_with(Instant::now);
-                let is_open = self.asked.is_some_and(|asked| asked.elapsed() < FAREWELL);
-                if !is_open || self.is_told || since.elapsed() > FAREWELL {
-                    return;
-                }
+    pub(super) fn run(self) {
+        let (page, listener) = (Arc::new(self.page), self.listener);
+        self.runtime.block_on(async move {
+            let mut allowance = Allowance::new();
+            tokio::spawn(accept(listener, Arc::clone(&page)));
+            while !page.shared.is_closing() {
+                sleep(INTERVAL).await;
+                // This thread itself, so that no connection goes on meanwhile
+                std::thread::sleep(allowance.rest());
             }
-            match self.http.recv_timeout(INTERVAL) {
-                Ok(Some(request)) => self.answer(shared, request),
-                Ok(None) => {}
-                Err(_) => return,
+            let closing = Instant::now();
+            while closing.elapsed() < FAREWELL && page.is_awaited() {
+                sleep(INTERVAL).await;
             }
-        }
+        });
     }
+}
 
-    fn answer(&mut self, shared: &Shared, request: Request) {
-        if let Some(canvas) = shared.canvas()
-            && self.shown.as_ref().is_none_or(|(_, shown)| !Arc::ptr_eq(shown, &canvas))
+/// Takes connections, each into a task of its own.
+async fn accept(listener: TcpListener, page: Arc<Page>) {
+    let mut open: VecDeque<AbortHandle> = VecDeque::new();
+    loop {
+        let Ok((stream, _)) = listener.accept().await else {
+            // Too many files are open, perhaps
+            sleep(Duration::from_millis(100)).await;
+            continue;
+        };
+        open.retain(|connection| !connection.is_finished());
+        if open.len() >= CONNECTIONS
+            && let Some(oldest) = open.pop_front()
         {
-            let number = self.shown.as_ref().map_or(0, |(number, _)| number + 1);
-            (self.shown, self.is_told) = (Some((number, canvas)), false);
+            oldest.abort();
         }
-        let answer = self.answer_to(&request);
-        // Who asked may have gone away
-        let _ = request.respond(answer);
+        open.push_back(tokio::spawn(connection(stream, Arc::clone(&page))).abort_handle());
+    }
+}
+
+/// Answers the one request of a connection.
+async fn connection(stream: TcpStream, page: Arc<Page>) {
+    let is_last = AtomicBool::new(false);
+    let service = service_fn(|request: Request<_>| {
+        let answer = page.answer(&request, &is_last);
+        async { Ok::<_, Infallible>(answer) }
+    });
+    let mut http = http1::Builder::new();
+    http.timer(TokioTimer::new()).header_read_timeout(HEAD_TIME).max_buf_size(HEAD).keep_alive(false);
+    let ended = timeout(CONNECTION_TIME, http.serve_connection(TokioIo::new(stream), service)).await;
+    if matches!(ended, Ok(Ok(()))) && is_last.load(Ordering::Relaxed) {
+        page.state().is_told = true;
+    }
+}
+
+impl Page {
+    fn state(&self) -> MutexGuard<'_, State> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    fn answer_to(&mut self, request: &Request) -> Answer {
+    /// True if a page is open that has not seen the end.
+    fn is_awaited(&self) -> bool {
+        let state = self.state();
+        !state.is_told && state.asked.is_some_and(|asked| asked.elapsed() < FAREWELL)
+    }
+
+    /// The answer to a request; `is_last` becomes true if nothing will come after it.
+    fn answer(&self, request: &Request<impl Body>, is_last: &AtomicBool) -> Answer {
         if !self.is_for_us(request) {
-            return plain(403, "This page is for this machine only.");
+            return plain(StatusCode::FORBIDDEN, "This page is for this machine only.");
         }
-        if *request.method() != Method::Get {
-            return plain(405, "GET only");
+        if request.method() != Method::GET {
+            return plain(StatusCode::METHOD_NOT_ALLOWED, "GET only");
         }
-        let (path, query) = request.url().split_once('?').unwrap_or((request.url(), ""));
-        match path {
-            "/" => typed(page().into_bytes(), "text/html; charset=utf-8"),
+        if !request.body().is_end_stream() {
+            return plain(StatusCode::PAYLOAD_TOO_LARGE, "GET without a body only");
+        }
+        let mut state = self.state();
+        state.show(self.shared.canvas());
+        match request.uri().path() {
+            "/" => typed(self.html.clone(), "text/html; charset=utf-8"),
             "/state" => {
-                self.asked = Some(Instant::now());
-                typed(self.state().to_string().into_bytes(), "application/json")
+                state.asked = Some(Instant::now());
+                typed(state.json().to_string(), "application/json")
             }
-            "/tiles" => self.tiles(query),
-            _ => plain(404, "There is nothing else here."),
+            "/tiles" => {
+                state.asked = Some(Instant::now());
+                tiles(state, request.uri().query().unwrap_or_default(), is_last)
+            }
+            _ => plain(StatusCode::NOT_FOUND, "There is nothing else here."),
         }
     }
 
     /// True if a request names this machine as who is to answer.
-    fn is_for_us(&self, request: &Request) -> bool {
-        let host = request.headers().iter().find(|header| header.field.equiv("Host"));
-        let port = self.address.port();
-        self.insecure
-            || host.is_some_and(|host| {
-                let host = host.value.as_str();
-                host == self.address.to_string() || host == format!("localhost:{port}")
-            })
+    fn is_for_us(&self, request: &Request<impl Body>) -> bool {
+        let (address, port) = (self.address, self.address.port());
+        let names = [address.to_string(), format!("localhost:{port}")];
+        let host = request.headers().get(header::HOST);
+        self.insecure || host.is_some_and(|host| names.iter().any(|name| name.as_bytes() == host.as_bytes()))
+    }
+}
+
+impl State {
+    /// Shows an image, if it is another one than before.
+    fn show(&mut self, canvas: Option<Arc<Canvas>>) {
+        let Some(canvas) = canvas else { return };
+        if self.shown.as_ref().is_none_or(|(_, shown)| !Arc::ptr_eq(shown, &canvas)) {
+            let number = self.shown.as_ref().map_or(0, |(number, _)| number + 1);
+            (self.shown, self.is_told) = (Some((number, canvas)), false);
+        }
     }
 
-    fn state(&self) -> serde_json::Value {
+    fn json(&self) -> serde_json::Value {
         let Some((number, canvas)) = &self.shown else { return json!({ "image": null }) };
         let layers: Vec<_> =
             canvas.layers.iter().map(|l| json!({ "name": l.name, "channels": l.channels.len() })).collect();
         let progress = canvas.progress();
         json!({
             "image": number, "name": canvas.name, "width": canvas.size[0], "height": canvas.size[1],
-            "layers": layers, "finished": canvas.is_finished(),
+            "layers": layers, "finished": canvas.is_finished(), "version": canvas.version(),
             "done": progress.map_or(0, |p| p.samples_done), "total": progress.map_or(0, |p| p.samples_total),
             "seconds": progress.map_or(0.0, |p| p.elapsed.as_secs_f64()),
             "noise": progress.and_then(|p| p.noise).filter(|noise| noise.is_finite()),
         })
     }
+}
 
-    /// See the module.
-    fn tiles(&mut self, query: &str) -> Answer {
-        let value = |name: &str| {
-            let mut pairs = query.split('&').filter_map(|pair| pair.split_once('='));
-            pairs.find(|(key, _)| *key == name).and_then(|(_, value)| value.parse::<u64>().ok())
-        };
-        let (Some(image), Some(layer), Some(since)) = (value("image"), value("layer"), value("since")) else {
-            return plain(400, "image, layer and since are numbers");
-        };
-        let Some((number, canvas)) = &self.shown else { return plain(404, "There is no image yet.") };
-        let layer = usize::try_from(layer).ok().and_then(|layer| canvas.layers.get(layer));
-        let (Some(layer), true) = (layer, image == *number) else { return plain(404, "There is no such layer.") };
-        // In this order: what is finished before its tiles are read has no others
-        let is_finished = canvas.is_finished();
-        let (version, tiles) = canvas.changed_since(since);
-        self.is_told |= is_finished && tiles.is_empty();
-        let mut bytes = version.to_le_bytes().to_vec();
-        for tile in tiles {
-            bytes.extend(tile.place.iter().flat_map(|n| n.to_le_bytes()));
-            for pixel in tile.data.chunks_exact(canvas.channels.len()) {
-                bytes.extend(pixel[layer.channels.clone()].iter().flat_map(|v| v.to_le_bytes()));
-            }
+/// See the module.
+fn tiles(state: MutexGuard<'_, State>, query: &str, is_last: &AtomicBool) -> Answer {
+    let value = |name: &str| {
+        let mut pairs = query.split('&').filter_map(|pair| pair.split_once('='));
+        pairs.find(|(key, _)| *key == name).and_then(|(_, value)| value.parse::<u64>().ok())
+    };
+    let (Some(image), Some(layer), Some(since)) = (value("image"), value("layer"), value("since")) else {
+        return plain(StatusCode::BAD_REQUEST, "image, layer and since are numbers");
+    };
+    let Some((number, canvas)) = &state.shown else { return plain(StatusCode::NOT_FOUND, "There is no image yet.") };
+    let layer = usize::try_from(layer).ok().and_then(|layer| canvas.layers.get(layer));
+    let (Some(layer), true) = (layer, image == *number) else {
+        return plain(StatusCode::NOT_FOUND, "There is no such layer.");
+    };
+    // In this order: what is finished before its tiles are read has no others
+    let is_finished = canvas.is_finished();
+    let (version, tiles) = canvas.changed_since(since);
+    is_last.store(is_finished && tiles.is_empty(), Ordering::Relaxed);
+    let mut bytes = version.to_le_bytes().to_vec();
+    for tile in tiles {
+        bytes.extend(tile.place.iter().flat_map(|n| n.to_le_bytes()));
+        for pixel in tile.data.chunks_exact(canvas.channels.len()) {
+            bytes.extend(pixel[layer.channels.clone()].iter().flat_map(|v| v.to_le_bytes()));
         }
-        typed(bytes, "application/octet-stream")
     }
+    typed(bytes, "application/octet-stream")
 }
 
-/// The page with its style and script.
-fn page() -> String {
-    PAGE.replace("/*style*/", STYLE).replace("/*script*/", SCRIPT)
-}
-
-fn header(name: &str, value: &str) -> Option<Header> {
-    Header::from_bytes(name, value).ok()
-}
-
-fn typed(bytes: Vec<u8>, kind: &str) -> Answer {
+fn typed(bytes: impl Into<Bytes>, kind: &'static str) -> Answer {
     let policy =
         "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; connect-src 'self'; img-src data:";
-    let headers = [
-        ("Content-Type", kind),
-        ("Cache-Control", "no-store"),
-        ("X-Content-Type-Options", "nosniff"),
-        ("Content-Security-Policy", policy),
-    ];
-    let headers = headers.into_iter().filter_map(|(name, value)| header(name, value));
-    headers.fold(Response::from_data(bytes), Response::with_header)
+    let mut answer = Response::new(Full::new(bytes.into()));
+    answer.headers_mut().extend([
+        (header::CONTENT_TYPE, HeaderValue::from_static(kind)),
+        (header::CACHE_CONTROL, HeaderValue::from_static("no-store")),
+        (header::X_CONTENT_TYPE_OPTIONS, HeaderValue::from_static("nosniff")),
+        (header::CONTENT_SECURITY_POLICY, HeaderValue::from_static(policy)),
+    ]);
+    answer
 }
 
-fn plain(code: u16, text: &str) -> Answer {
-    typed(text.as_bytes().to_vec(), "text/plain; charset=utf-8").with_status_code(StatusCode(code))
+fn plain(status: StatusCode, text: &'static str) -> Answer {
+    let mut answer = typed(text, "text/plain; charset=utf-8");
+    *answer.status_mut() = status;
+    answer
 }

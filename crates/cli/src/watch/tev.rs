@@ -1,7 +1,8 @@
 //! Sending tiles to tev.
 
 use super::Shared;
-use super::canvas::Canvas;
+use super::allowance::Allowance;
+use super::canvas::{Canvas, Tile};
 use std::io;
 use std::net::{TcpStream, ToSocketAddrs};
 use std::sync::Arc;
@@ -17,15 +18,15 @@ const PATIENCE: Duration = Duration::from_secs(5);
 pub(super) struct Tev(TevClient);
 
 impl Tev {
-    /// Connects with the first address that answers.
-    pub(super) fn connect(address: &str) -> io::Result<Self> {
+    /// Connects with the first address that answers. The stream that is returned as well can end the connection.
+    pub(super) fn connect(address: &str) -> io::Result<(Self, TcpStream)> {
         let mut error = io::Error::other("no such host");
         for address in address.to_socket_addrs()? {
             match TcpStream::connect_timeout(&address, PATIENCE) {
                 Ok(stream) => {
                     stream.set_write_timeout(Some(PATIENCE))?;
                     stream.set_nodelay(true)?;
-                    return Ok(Tev(TevClient::wrap(stream)));
+                    return Ok((Tev(TevClient::wrap(stream.try_clone()?)), stream));
                 }
                 Err(e) => error = e,
             }
@@ -36,9 +37,10 @@ impl Tev {
     /// Sends what changes until the end. Without tev the image is rendered all the same.
     pub(super) fn run(mut self, shared: &Shared, warn: fn(&str)) {
         let mut shown: Option<(Arc<Canvas>, u64)> = None;
+        let mut allowance = Allowance::new();
         loop {
             let is_closing = shared.is_closing();
-            if let Err(error) = self.show(shared, &mut shown) {
+            if let Err(error) = self.show(shared, &mut shown, &mut allowance) {
                 return warn(&format!("warning: tev is gone ({error}); the image is rendered without it"));
             }
             if is_closing {
@@ -49,45 +51,61 @@ impl Tev {
     }
 
     /// Sends what is new of the image that was shown last, and of the present one.
-    fn show(&mut self, shared: &Shared, shown: &mut Option<(Arc<Canvas>, u64)>) -> io::Result<()> {
-        if let Some((canvas, version)) = shown {
-            *version = self.update(canvas, *version)?;
+    fn show(
+        &mut self,
+        shared: &Shared,
+        shown: &mut Option<(Arc<Canvas>, u64)>,
+        allowance: &mut Allowance,
+    ) -> io::Result<()> {
+        if let Some(present) = shared.canvas()
+            && shown.as_ref().is_none_or(|(canvas, _)| !Arc::ptr_eq(canvas, &present))
+        {
+            if let Some((former, version)) = shown {
+                self.update(former, *version, || ())?;
+            }
+            self.0.send(PacketCreateImage {
+                image_name: &present.name,
+                grab_focus: true,
+                width: present.size[0],
+                height: present.size[1],
+                channel_names: &present.channels,
+            })?;
+            *shown = Some((present, 0));
         }
-        let Some(present) = shared.canvas() else { return Ok(()) };
-        if shown.as_ref().is_some_and(|(canvas, _)| Arc::ptr_eq(canvas, &present)) {
-            return Ok(());
-        }
-        self.0.send(PacketCreateImage {
-            image_name: &present.name,
-            grab_focus: true,
-            width: present.size[0],
-            height: present.size[1],
-            channel_names: &present.channels,
-        })?;
-        let version = self.update(&present, 0)?;
-        *shown = Some((present, version));
+        let Some((canvas, version)) = shown else { return Ok(()) };
+        let rest = || {
+            if !shared.is_closing() {
+                std::thread::sleep(allowance.rest())
+            }
+        };
+        *version = self.update(canvas, *version, rest)?;
         Ok(())
     }
 
-    fn update(&mut self, canvas: &Canvas, since: u64) -> io::Result<u64> {
-        let (version, tiles) = canvas.changed_since(since);
+    /// Sends what has changed since a state, and returns that which tev has then. Rests on the way.
+    fn update(&mut self, canvas: &Canvas, since: u64, mut rest: impl FnMut()) -> io::Result<u64> {
         let offsets: Vec<u64> = (0..canvas.channels.len() as u64).collect();
         let strides = vec![canvas.channels.len() as u64; canvas.channels.len()];
-        for tile in tiles {
-            let [x, y, width, height] = tile.place;
-            self.0.send(PacketUpdateImage {
-                image_name: &canvas.name,
-                grab_focus: false,
-                channel_names: &canvas.channels,
-                channel_offsets: &offsets,
-                channel_strides: &strides,
-                x,
-                y,
-                width,
-                height,
-                data: &tile.data,
-            })?;
+        let (mut sent, present) = (since, canvas.version());
+        while sent < present {
+            let (version, tiles) = canvas.changed_since(sent);
+            for Tile { place: [x, y, width, height], data } in tiles {
+                self.0.send(PacketUpdateImage {
+                    image_name: &canvas.name,
+                    grab_focus: false,
+                    channel_names: &canvas.channels,
+                    channel_offsets: &offsets,
+                    channel_strides: &strides,
+                    x,
+                    y,
+                    width,
+                    height,
+                    data: &data,
+                })?;
+            }
+            sent = version;
+            rest();
         }
-        Ok(version)
+        Ok(sent)
     }
 }

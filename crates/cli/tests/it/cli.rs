@@ -380,6 +380,20 @@ fn efficiency_is_measured_against_references_that_are_kept() {
     assert!(stderr(&output).contains("8 × 8 pixels, but the image has 32 × 32"), "{}", stderr(&output));
 }
 
+/// As `make install` installs it.
+#[test]
+fn a_copy_of_the_executable_alone_reads_and_writes_images() {
+    let folder = tempfile::tempdir().unwrap();
+    let program = folder.path().join("lumiris");
+    std::fs::copy(env!("CARGO_BIN_EXE_lumiris"), &program).unwrap();
+    let run = |args: &[&str]| Command::new(&program).args(args).current_dir(folder.path()).output().unwrap();
+    let small = ["--resolution", "8x6", "--spp", "1", "--estimator", "mis", "-q", "-o", "a.exr", "-o", "a.png"];
+    let output = run(&[&["render", &scene("analytic/rectangle.pbrt")], &small[..]].concat());
+    assert!(output.status.success(), "{}", stderr(&output));
+    let output = run(&["compare", "a.exr", "a.exr"]);
+    assert!(output.status.success(), "{}", stderr(&output));
+}
+
 #[test]
 fn ctrl_c_writes_what_there_is() {
     let folder = tempfile::tempdir().unwrap();
@@ -408,7 +422,9 @@ fn ctrl_c_before_the_first_sample_leaves_what_there_is() {
     assert!(Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap().success());
     let output = child.wait_with_output().unwrap();
     assert_eq!(output.status.code(), Some(130));
-    assert!(stderr(&output).contains("stopped before the first sample: nothing is written"), "{}", stderr(&output));
+    // By itself, or since that took too long
+    let ends = ["stopped before the first sample: nothing is written", "stopped while "];
+    assert!(ends.iter().any(|end| stderr(&output).contains(end)), "{}", stderr(&output));
     assert_eq!(std::fs::read(folder.path().join("a.exr")).unwrap(), b"an image of yesterday");
 }
 

@@ -9,6 +9,7 @@ mod denoise;
 mod farm;
 mod frames;
 mod gltf;
+mod interrupt;
 mod light_groups;
 mod looks;
 mod lost_output;

@@ -98,9 +98,42 @@ fn options_without_effect_are_named() {
     let image = "render GALLERY --resolution 8x6 --spp 1 -o a.png";
     let said =
         stderr(&lumiris(&format!("{image} --estimator mis --proposals 16 --samples 2 --cache-error 0.1"), folder));
-    assert!(said.contains("note: without effect on this image: --proposals, --cache-error"), "{said}");
-    let said = stderr(&lumiris(&format!("{image} --estimator ris --proposals 16 --samples 2"), folder));
-    assert!(!said.contains("note:"), "{said}");
+    let warnings = |said: &str| -> Vec<String> {
+        let lines = said.lines().filter_map(|line| line.strip_prefix("warning: "));
+        lines.filter_map(|line| Some(line.split_once(" has no effect on ")?.0.to_owned())).collect()
+    };
+    assert_eq!(warnings(&said), ["--proposals 16", "--cache-error 0.1"], "{said}");
+    for (options, expected) in [
+        ("--estimator ris --proposals 16 --samples 2", &[][..]),
+        ("--integrator direct --max-depth 7 --estimator mis", &["--max-depth 7"]),
+        (
+            "--integrator photon-map --photons 100 --allocation adaptive --path-reuse 4",
+            &["--path-reuse 4", "--allocation adaptive"],
+        ),
+        ("--estimator mc --heuristic maximum", &["--heuristic maximum"]),
+        ("--estimator mis --cryptomatte --exr-type half --aov depth", &["--aov", "--cryptomatte", "--exr-type"]),
+        ("--estimator mis --cryptomatte --exr-type half --aov depth -o a.exr", &[]),
+        ("--estimator mis --aov none --exposure 1", &[]),
+    ] {
+        let said = stderr(&lumiris(&format!("{image} -q {options}"), folder));
+        assert_eq!(warnings(&said), expected, "{options}: {said}");
+    }
+    let said =
+        stderr(&lumiris("render GALLERY --resolution 8x6 --spp 1 -o a.exr --estimator mis --exposure 1", folder));
+    assert_eq!(warnings(&said), ["--exposure"], "{said}");
+
+    // There is too little to gain for the pilot
+    let said = stderr(&lumiris("render GALLERY --resolution 128x72 --spp 1 -q -o a.png --estimator ocv", folder));
+    assert_eq!(warnings(&said), ["--estimator ocv"], "{said}");
+
+    // In a scene file, with the place
+    let head = "Integrator \"direct\" \"integer maxdepth\" 7\n  \"string estimator\" \"mis\" \"integer proposals\" 4";
+    std::fs::write(folder.join("s.pbrt"), format!("{head}\nWorldBegin\nLightSource \"infinite\"\n")).unwrap();
+    let said = stderr(&lumiris("render s.pbrt --resolution 8x6 --spp 1 -q -o a.png", folder));
+    let places = ["s.pbrt:1:21: `maxdepth` 7", "s.pbrt:2:28: `proposals` 4"];
+    assert_eq!(warnings(&said), places, "{said}");
+    let said = stderr(&lumiris("render s.pbrt --resolution 8x6 --spp 1 -q -o a.png --estimator ris", folder));
+    assert_eq!(warnings(&said), places[..1], "{said}");
 }
 
 #[test]

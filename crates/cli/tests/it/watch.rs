@@ -1,13 +1,17 @@
 //! Watching an image while it converges: a tev that the test plays, and the page over HTTP and in the browser.
 
 use crate::browser::Browser;
-use crate::program::{command, folder_with};
+use crate::checkpoints::Random;
+use crate::program::{command, folder_with, read};
 use lumiris::imaging::oiio::{ReadLimits, read_image};
 use serde_json::Value;
 use std::io::{BufRead, BufReader, Read, Write};
-use std::net::{TcpListener, TcpStream};
+use std::net::{Shutdown, TcpListener, TcpStream};
 use std::path::Path;
-use std::process::{Child, Command, Stdio};
+use std::process::{Child, ChildStderr, Command, Stdio};
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::{Duration, Instant};
 
 const SCENE: &str = "LookAt 0 0 -4 0 0 0 0 1 0\nCamera \"perspective\" \"float fov\" [ 50 ]\n\
                      Film \"rgb\" \"integer xresolution\" [ 50 ] \"integer yresolution\" [ 36 ]\n\
@@ -163,14 +167,25 @@ impl Drop for Endless {
     }
 }
 
+/// The address of the page, which the program says first.
+fn address_of(stderr: &mut BufReader<ChildStderr>) -> String {
+    let mut lines = stderr.lines().map(Result::unwrap);
+    let said = lines.find_map(|l| Some(l.split_once("at http://")?.1.trim_end_matches('/').to_owned()));
+    said.unwrap()
+}
+
 impl Endless {
     fn start(folder: &Path) -> Endless {
         let mut child = lumiris(folder, "-o a.exr --spp 1000000000 --estimator mis --view=0");
-        let lines = BufReader::new(child.stderr.take().unwrap()).lines();
-        let said = lines
-            .map(Result::unwrap)
-            .find_map(|l| Some(l.split_once("at http://")?.1.trim_end_matches('/').to_owned()));
-        Endless { child, address: said.unwrap() }
+        let address = address_of(&mut BufReader::new(child.stderr.take().unwrap()));
+        Endless { child, address }
+    }
+
+    fn send(&self, bytes: &[u8]) -> TcpStream {
+        let mut stream = TcpStream::connect(&self.address).unwrap();
+        stream.set_read_timeout(Some(Duration::from_secs(20))).unwrap();
+        stream.write_all(bytes).unwrap();
+        stream
     }
 
     /// Status and body of an answer.
@@ -188,11 +203,11 @@ impl Endless {
         self.ask("GET", path, &self.address)
     }
 
-    /// The state, once a tile is done.
+    /// The state, once the 12 tiles have a sample each.
     fn state(&self) -> Value {
         loop {
             let state: Value = serde_json::from_slice(&self.get("/state").1).unwrap();
-            if state["done"].as_u64().is_some_and(|done| done > 0) {
+            if state["version"].as_u64().is_some_and(|version| version >= 12) {
                 return state;
             }
             std::thread::sleep(std::time::Duration::from_millis(50));
@@ -219,9 +234,19 @@ fn the_server_knows_the_page_its_data_and_nothing_else() {
     let tiles = format!("/tiles?image={}&layer=0&since=0", state["image"]);
     let (status, bytes) = view.get(&tiles);
     assert_eq!(status, 200);
-    assert_eq!([8, 12, 16, 20].map(|at| number(&bytes, at)), [0, 0, 16, 16]);
-    let corner = [24, 28, 32].map(|at| f32::from_bits(number(&bytes, at)));
-    assert_eq!(corner, [0.4, 0.2, 0.1], "the sky");
+    let (mut places, mut at) = (Vec::new(), 8);
+    while at < bytes.len() {
+        let place = [0, 4, 8, 12].map(|offset| number(&bytes, at + offset));
+        at += 16;
+        if place[..2] == [0, 0] {
+            let corner = [0, 4, 8].map(|offset| f32::from_bits(number(&bytes, at + offset)));
+            assert_eq!(corner, [0.4, 0.2, 0.1], "the sky");
+        }
+        at += 12 * (place[2] * place[3]) as usize;
+        places.push(place);
+    }
+    places.sort_unstable();
+    assert_eq!((places.len(), places[0], places[11]), (12, [0, 0, 16, 16], [48, 32, 2, 4]));
     for wrong in [
         "/tiles",
         "/tiles?image=7&layer=0&since=0",
@@ -247,6 +272,158 @@ fn the_server_knows_the_page_its_data_and_nothing_else() {
     let page = String::from_utf8(page).unwrap();
     assert!(!page.contains("http:") && !page.contains("https:") && !page.contains("/*s"), "{page}");
     assert_eq!(view.stop(), Some(130));
+    assert!(folder.path().join("a.exr").exists());
+}
+
+/// The status of an answer, or `None` if the connection ends without one.
+fn status(mut stream: TcpStream) -> Option<u16> {
+    let mut answer = Vec::new();
+    // Who has not sent all may lose the connection before the answer is read
+    let _ = stream.read_to_end(&mut answer);
+    String::from_utf8_lossy(&answer).split(' ').nth(1)?.parse().ok()
+}
+
+#[test]
+fn requests_are_short_and_have_no_body_whatever_they_announce() {
+    let folder = folder();
+    let view = Endless::start(folder.path());
+    let host = format!("Host: {}\r\n", view.address);
+    for body in ["Content-Length: 99999999999\r\n", "Content-Length: 5\r\n", "Transfer-Encoding: chunked\r\n"] {
+        let stream = view.send(format!("GET / HTTP/1.1\r\n{host}{body}\r\n").as_bytes());
+        assert!([Some(400), Some(413)].contains(&status(stream)), "{body}");
+    }
+    // A line and a head without an end: cut after 16 kB, long before a megabyte has been sent
+    for head in ["GET /".to_owned(), format!("GET / HTTP/1.1\r\n{host}X: ")] {
+        let mut stream = view.send(head.as_bytes());
+        let sent = (0..256).take_while(|_| stream.write_all(&[b'a'; 4096]).is_ok()).count();
+        assert!(sent < 256 || [None, Some(414), Some(431)].contains(&status(stream)), "{head}");
+    }
+    let filler = |bytes: usize| format!("GET / HTTP/1.1\r\n{host}X: {}\r\n\r\n", "a".repeat(bytes));
+    assert_eq!(status(view.send(filler(15_000).as_bytes())), Some(200));
+    assert_ne!(status(view.send(filler(17_000).as_bytes())), Some(200));
+
+    // Connections that are half open, or do not read, keep nobody else out
+    let state = view.state();
+    let tiles = format!("GET /tiles?image={}&layer=0&since=0 HTTP/1.1\r\n{host}\r\n", state["image"]);
+    let held: Vec<TcpStream> =
+        (0..300).map(|i| view.send(if i % 2 == 0 { b"GET / HT" } else { tiles.as_bytes() })).collect();
+    let start = Instant::now();
+    assert_eq!(view.get("/state").0, 200);
+    assert!(start.elapsed() < Duration::from_secs(8), "{:?}", start.elapsed());
+    // The oldest of them are ended
+    assert_eq!(status(held.into_iter().next().unwrap()), None);
+    assert_eq!(view.stop(), Some(130));
+}
+
+/// A request that is changed at some places: bytes replaced, left out, repeated, or pieces of other requests put in.
+fn malformed(random: &mut Random, address: &str) -> Vec<u8> {
+    const LINES: [&str; 6] = [
+        "GET / HTTP/1.1\r\n",
+        "GET /state HTTP/1.1\r\n",
+        "GET /tiles?image=0&layer=0&since=0 HTTP/1.0\r\n",
+        "GET http://evil.example/../%2e%2e/etc/passwd HTTP/1.1\r\n",
+        "POST /state HTTP/1.1\r\n",
+        "PRI * HTTP/2.0\r\n\r\nSM\r\n",
+    ];
+    const PIECES: [&[u8]; 12] = [
+        b"Content-Length: 99999999999\r\n",
+        b"Content-Length: 18446744073709551616\r\n",
+        b"Content-Length: -1\r\n",
+        b"Transfer-Encoding: chunked\r\n",
+        b"Expect: 100-continue\r\n",
+        b"Connection: Upgrade\r\nUpgrade: websocket\r\n",
+        b"Host: evil.example\r\n",
+        b"fffffffffffffffff\r\n",
+        b"\r\n\r\n",
+        b"\n \t",
+        b"\0\xff\xfe",
+        b"&since=99999999999999999999",
+    ];
+    let mut below = |n: usize| random.below(n as u64) as usize;
+    let mut bytes = format!("{}Host: {address}\r\n\r\n", LINES[below(LINES.len())]).into_bytes();
+    for _ in 0..=below(4) {
+        let at = below(bytes.len() + 1);
+        match below(5) {
+            0 => bytes.truncate(at),
+            1 => bytes.iter_mut().skip(at).take(1).for_each(|byte| *byte = below(256) as u8),
+            2 => drop(bytes.drain(at..bytes.len().min(at + 1 + below(8)))),
+            3 => drop(bytes.splice(at..at, PIECES[below(PIECES.len())].iter().copied())),
+            _ => drop(bytes.splice(at..at, vec![below(256) as u8; below(3000)])),
+        }
+    }
+    bytes
+}
+
+/// Sends a request, and reads its answer to the end.
+fn exchange(address: &str, request: &[u8]) -> std::io::Result<()> {
+    let mut stream = TcpStream::connect(address)?;
+    stream.set_read_timeout(Some(Duration::from_secs(20)))?;
+    // The server may end the connection at any time
+    let _ = stream.write_all(request).and_then(|()| stream.shutdown(Shutdown::Write));
+    let _ = stream.read_to_end(&mut Vec::new());
+    Ok(())
+}
+
+#[test]
+fn ten_thousand_malformed_requests_leave_the_image_as_it_is() {
+    const REQUESTS: u64 = 10_000;
+    let folder = folder();
+    let args = "--spp 800 --estimator mis --threads 1";
+    let alone = lumiris(folder.path(), &format!("{args} -q -o a.exr")).wait_with_output().unwrap();
+    assert!(alone.status.success());
+
+    // The page is there while the scene is awaited, and while it is rendered
+    let mut watched = command(folder.path(), &format!("render - {args} -o b.exr --view=0"));
+    let mut child = watched.stdin(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    let mut stderr = BufReader::new(child.stderr.take().unwrap());
+    let address = address_of(&mut stderr);
+    let (next, scene) = (AtomicU64::new(0), Mutex::new(child.stdin.take()));
+    std::thread::scope(|scope| {
+        for _ in 0..4 {
+            scope.spawn(|| {
+                loop {
+                    let index = next.fetch_add(1, Ordering::Relaxed);
+                    if index >= REQUESTS {
+                        break;
+                    }
+                    if index == REQUESTS / 4 {
+                        scene.lock().unwrap().take().unwrap().write_all(SCENE.as_bytes()).unwrap();
+                    }
+                    let request = malformed(&mut Random(index), &address);
+                    let reached = exchange(&address, &request);
+                    // Once it is rendered, the page is gone
+                    assert!(index > REQUESTS / 4 || reached.is_ok(), "request {index}: {reached:?}");
+                }
+            });
+        }
+    });
+    let mut said = String::new();
+    stderr.read_to_string(&mut said).unwrap();
+    assert!(child.wait().unwrap().success(), "{said}");
+    let [a, b] = ["a.exr", "b.exr"].map(|name| read(folder.path(), name).image);
+    assert_eq!(a.channels, b.channels);
+    assert!(a.data.iter().zip(&b.data).all(|(a, b)| a.to_bits() == b.to_bits()));
+}
+
+#[test]
+fn a_tev_that_reads_slowly_holds_nothing_up() {
+    let folder = folder();
+    let tev = TcpListener::bind("127.0.0.1:0").unwrap();
+    // 21 MB, which would take a minute
+    let args = format!("-q -o a.exr --resolution 800x600 --spp 1 --estimator mis --tev={}", tev.local_addr().unwrap());
+    let mut child = lumiris(folder.path(), &args);
+    let (mut stream, _) = tev.accept().unwrap();
+    let start = Instant::now();
+    while child.try_wait().unwrap().is_none() && start.elapsed() < Duration::from_secs(30) {
+        // An error is the end of the connection
+        let _ = stream.read(&mut [0; 1 << 15]);
+        // It says things that nobody understands, too
+        let _ = stream.write_all(&[7; 4096]);
+        std::thread::sleep(Duration::from_millis(100));
+    }
+    let status = child.try_wait().unwrap();
+    let _ = child.kill();
+    assert!(status.is_some_and(|status| status.success()), "{status:?} after {:?}", start.elapsed());
     assert!(folder.path().join("a.exr").exists());
 }
 

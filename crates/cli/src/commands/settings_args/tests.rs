@@ -212,8 +212,16 @@ fn options_out_of_range_are_errors_that_say_what_is_expected() {
 fn a_setting_applies_to_some_images_and_not_to_all_unless_it_says_so() {
     for row in rows() {
         let always = matches!(row.applies, Applies::Always);
-        let by_default =
-            ["roulette", "later-samples", "path-reuse", "light-paths", "infinite-fraction"].contains(&row.flag);
+        let by_default = [
+            "roulette",
+            "roulette-depth",
+            "heuristic",
+            "later-samples",
+            "path-reuse",
+            "light-paths",
+            "infinite-fraction",
+        ]
+        .contains(&row.flag);
         assert!(always || by_default || !row.applies.to(&Settings::default()), "--{}", row.flag);
         where_it_applies(row);
     }

@@ -82,13 +82,14 @@ function reset() {
   drawAll();
 }
 
-async function fetchTiles() {
+// Some tiles at a time, until they are those of the last state; false if there is nothing more to fetch
+async function fetchSome() {
   const [layer, image] = [layerChoice.value, state.image];
   const answer = await fetch(`tiles?image=${image}&layer=${layer}&since=${version}`);
-  if (!answer.ok) return;
+  if (!answer.ok) return false;
   const data = new DataView(await answer.arrayBuffer());
   // Another image or layer was chosen meanwhile
-  if (image !== state.image || layer !== layerChoice.value) return;
+  if (image !== state.image || layer !== layerChoice.value) return false;
   const rectangles = [];
   for (let at = 8; at < data.byteLength;) {
     const [left, top, width, height] = [0, 4, 8, 12].map((offset) => data.getUint32(at + offset, true));
@@ -103,6 +104,11 @@ async function fetchTiles() {
   // Numbers are shown by the largest one, which may be new
   if (channels === 1 && rectangles.length > 0) drawAll();
   else rectangles.forEach((rectangle) => draw(...rectangle));
+  return rectangles.length > 0 && Number(version) < state.version;
+}
+
+async function fetchTiles() {
+  while (await fetchSome());
 }
 
 const time = (seconds) => {

@@ -1,0 +1,52 @@
+//! Ctrl-C and SIGTERM before there is an image.
+
+use super::program::{command, stderr};
+use std::io::Write;
+use std::process::{Command, Stdio};
+use std::time::{Duration, Instant};
+
+/// Every subcommand that loads a scene ends while it does; a scene that never comes to its end takes for ever to load.
+#[test]
+fn signals_end_the_loading_of_a_scene_within_a_second() {
+    let folder = tempfile::tempdir().unwrap();
+    for (args, signal) in [
+        ("render - -o a.exr", "-INT"),
+        ("render - -o a.exr", "-TERM"),
+        ("render - -o a.exr --estimator mis --view=0", "-INT"),
+        ("plan - -o a.json", "-TERM"),
+        ("info -", "-INT"),
+        ("crosscheck -", "-INT"),
+        ("bench -", "-INT"),
+    ] {
+        let mut command = command(folder.path(), args);
+        let mut child = command.stdin(Stdio::piped()).stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
+        // More than a pipe holds: once it is written, it is read
+        let mut scene = child.stdin.take().unwrap();
+        scene.write_all(&b"# still going on\n".repeat(1 << 15)).unwrap();
+        let start = Instant::now();
+        assert!(Command::new("kill").args([signal, &child.id().to_string()]).status().unwrap().success());
+        let output = child.wait_with_output().unwrap();
+        let text = stderr(&output);
+        assert_eq!(output.status.code(), Some(130), "{args} {signal}: {text}");
+        assert!(start.elapsed() < Duration::from_secs(1), "{args} {signal}: {:?}", start.elapsed());
+        assert!(text.contains("stopped while loading <stdin>"), "{args} {signal}: {text}");
+        drop(scene);
+    }
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0, "nothing is left behind");
+}
+
+#[test]
+fn a_second_signal_ends_the_program_at_once() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut child = command(folder.path(), "info -").stdin(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    let mut scene = child.stdin.take().unwrap();
+    scene.write_all(&b"# still going on\n".repeat(1 << 15)).unwrap();
+    // One signal that comes before the other is taken may be lost
+    let id = child.id().to_string();
+    while child.try_wait().unwrap().is_none() {
+        let _ = Command::new("kill").args(["-INT", &id]).stderr(Stdio::null()).status();
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    let output = child.wait_with_output().unwrap();
+    assert_eq!((output.status.code(), stderr(&output).as_str()), (Some(130), ""));
+}
