@@ -5,7 +5,8 @@
 
 use super::hit::{LocalHit, SurfaceHit, VertexValues, face_forward, round, spanning};
 use glam::DVec3;
-use lumiris_numbers::math::{Bounds3, Ray, Vec2, Vec3, gamma};
+use lumiris_numbers::math::transform::{swaps_handedness, transform_normal};
+use lumiris_numbers::math::{Affine3A, Bounds3, Ray, Vec2, Vec3, gamma};
 
 /// Indexed bilinear patches; p(u, v) blends corners p00, p10, p01, p11 in this order (pbrt's `bilinearmesh`).
 #[derive(Clone, Debug, Default)]
@@ -25,6 +26,16 @@ pub struct BilinearMesh {
 }
 
 impl BilinearMesh {
+    /// The patches placed by a transformation, which may flatten them.
+    #[must_use]
+    pub fn transformed(&self, m: &Affine3A) -> Self {
+        let mut mesh = self.clone();
+        mesh.positions.iter_mut().for_each(|p| *p = m.transform_point3(*p));
+        mesh.normals.iter_mut().for_each(|n| *n = transform_normal(m, *n));
+        mesh.flip_normal ^= swaps_handedness(m);
+        mesh
+    }
+
     /// Number of patches.
     #[inline]
     pub fn patch_count(&self) -> usize {
@@ -109,7 +120,7 @@ impl BilinearMesh {
         let (dpdu, dpdv) = self.texture_derivatives(i, uv, [du, dv]);
         let (dpdu, dpdv) = spanning(dpdu, dpdv, n);
         let uv = self.texture_coordinates_at(i, uv);
-        SurfaceHit { p, p_error, n, ns, dpdu, dpdv, dpdus: dpdu, uv, vertex: self.vertex_values_of(i) }
+        SurfaceHit { p, p_error, n, ns, dpdu, dpdv, dpdus: dpdu, dpdvs: dpdv, uv, vertex: self.vertex_values_of(i) }
     }
 
     /// What patch `i` has besides the texture coordinates.

@@ -247,7 +247,7 @@ impl CurveSet {
         let dpdv = n.cross(dpdu).normalize_or(round(side)) * width;
         let p_error = Vec3::splat(2.0 * width) + p.abs() * gamma(4);
         let (uv, vertex) = (Vec2::new(u, v), VertexValues::default());
-        SurfaceHit { p, p_error, n, ns: n, dpdu, dpdv, dpdus: dpdu, uv, vertex }
+        SurfaceHit { p, p_error, n, ns: n, dpdu, dpdv, dpdus: dpdu, dpdvs: dpdv, uv, vertex }
     }
 }
 

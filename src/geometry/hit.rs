@@ -54,6 +54,8 @@ pub struct SurfaceHit {
     pub dpdv: Vec3,
     /// ∂p/∂u for shading (tangent), not yet orthogonal to `ns`.
     pub dpdus: Vec3,
+    /// A vector on the side of the second axis of tangent space (bitangent), not yet orthogonal to `ns` and `dpdus`.
+    pub dpdvs: Vec3,
     /// Texture coordinates.
     pub uv: Vec2,
     /// What else the vertices have.
@@ -72,6 +74,7 @@ impl SurfaceHit {
             dpdu: zero,
             dpdv: zero,
             dpdus: zero,
+            dpdvs: zero,
             uv: Vec2::ZERO,
             vertex: VertexValues::default(),
         }
@@ -95,6 +98,7 @@ impl SurfaceHit {
             dpdu: world_from_group.transform_vector3(self.dpdu),
             dpdv: world_from_group.transform_vector3(self.dpdv),
             dpdus: world_from_group.transform_vector3(self.dpdus),
+            dpdvs: world_from_group.transform_vector3(self.dpdvs),
             uv: self.uv,
             vertex: self.vertex,
         }

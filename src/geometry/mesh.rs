@@ -1,7 +1,8 @@
 //! Indexed triangle meshes.
 
 use super::hit::{SurfaceHit, VertexValues, face_forward, round, spanning};
-use lumiris_numbers::math::{Bounds3, Vec2, Vec3, gamma};
+use lumiris_numbers::math::transform::{swaps_handedness, transform_normal};
+use lumiris_numbers::math::{Affine3A, Bounds3, Vec2, Vec3, gamma};
 
 /// Indexed triangles. Optional arrays are empty if absent; those of vertices are else as long as the positions.
 #[derive(Clone, Debug, Default)]
@@ -20,6 +21,11 @@ pub struct TriangleMesh {
     pub colors: Vec<[f32; 4]>,
     /// Shading tangents.
     pub tangents: Vec<Vec3>,
+    /// Per vertex, 1 where the second axis of tangent space is at the left of the tangent, seen against the shading normal,
+    /// −1 where it is at the right; if empty, it is on the side of ∂p/∂v.
+    pub tangent_signs: Vec<i8>,
+    /// True if the second texture coordinates have the shading tangents of a mesh without its own.
+    pub tangents_along_second: bool,
     /// Per triangle, the number of the face that it is (a part of).
     pub faces: Vec<u32>,
     /// True if the geometric normal is the reverse of (p1 − p0) × (p2 − p0): pbrt's
@@ -36,6 +42,22 @@ impl TriangleMesh {
         }
         positions.push(Vec3::ZERO);
         Ok(TriangleMesh { padded_positions: positions, indices, ..TriangleMesh::default() })
+    }
+
+    /// The mesh placed by a transformation, which may flatten it.
+    #[must_use]
+    pub fn transformed(&self, m: &Affine3A) -> Self {
+        let mut mesh = self.clone();
+        let count = self.positions().len();
+        mesh.padded_positions[..count].iter_mut().for_each(|p| *p = m.transform_point3(*p));
+        mesh.normals.iter_mut().for_each(|n| *n = transform_normal(m, *n));
+        mesh.tangents.iter_mut().for_each(|t| *t = m.transform_vector3(*t));
+        if swaps_handedness(m) {
+            // The second axis of tangent space comes to the other side of the first
+            mesh.tangent_signs.iter_mut().for_each(|sign| *sign = -*sign);
+            mesh.flip_normal = !self.flip_normal;
+        }
+        mesh
     }
 
     /// Vertex positions.
@@ -100,10 +122,29 @@ impl TriangleMesh {
         let st = self.texture_coordinates(i);
         let (dpdu, dpdv) = partial_derivatives(corners, st);
         let (dpdu, dpdv) = spanning(dpdu, dpdv, ns);
-        let dpdus = self.blend(&self.tangents, i, b).filter(|s| s.length_squared() > 0.0).unwrap_or(dpdu);
+        let (dpdus, dpdvs) = self.shading_tangents(i, b, ns).unwrap_or((dpdu, dpdv));
         let vertex = self.vertex_values_at(i, uv);
         let uv = self.texture_coordinates_at(i, uv);
-        SurfaceHit { p, p_error, n, ns, dpdu, dpdv, dpdus, uv, vertex }
+        SurfaceHit { p, p_error, n, ns, dpdu, dpdv, dpdus, dpdvs, uv, vertex }
+    }
+
+    /// The tangents for shading at the weights `b` of triangle `i`, if they are not those of the texture coordinates.
+    fn shading_tangents(&self, i: usize, b: [f32; 3], ns: Vec3) -> Option<(Vec3, Vec3)> {
+        let vertices = self.indices[i].map(|v| v as usize);
+        let second = || {
+            let (u, v) = partial_derivatives(self.triangle(i), vertices.map(|v| self.uvs1[v]));
+            spanning(u, v, ns)
+        };
+        if self.tangents.is_empty() {
+            return (self.tangents_along_second && !self.uvs1.is_empty()).then(second);
+        }
+        let tangent = self.blend(&self.tangents, i, b).filter(|s| s.length_squared() > 0.0)?;
+        if self.tangent_signs.is_empty() {
+            let (_, dpdv) = partial_derivatives(self.triangle(i), self.texture_coordinates(i));
+            return Some((tangent, dpdv));
+        }
+        let sign = vertices.iter().map(|&v| i32::from(self.tangent_signs[v])).sum::<i32>().signum();
+        Some((tangent, ns.cross(tangent) * sign as f32))
     }
 
     /// The texture coordinates of triangle `i`'s corners.
@@ -168,8 +209,8 @@ fn partial_derivatives([p0, p1, p2]: [Vec3; 3], [uv0, uv1, uv2]: [Vec2; 3]) -> (
 mod tests {
     use super::*;
     use crate::geometry::triangle::{RayPrecomputed, intersect_triangle};
+    use lumiris_numbers::math::Ray;
     use lumiris_numbers::math::ray::offset_origin;
-    use lumiris_numbers::math::{Affine3A, Ray};
     use lumiris_test_support::random::{RngExt, pcg32};
 
     fn triangle() -> TriangleMesh {
@@ -215,6 +256,16 @@ mod tests {
 
         mesh.tangents = vec![Vec3::new(0.0, 2.0, 0.0); 3];
         assert_eq!(mesh.surface_hit(0, [0.2, 0.3]).dpdus, Vec3::new(0.0, 2.0, 0.0));
+        for sign in [1, -1] {
+            mesh.tangent_signs = vec![sign; 3];
+            assert_eq!(mesh.surface_hit(0, [0.2, 0.3]).dpdvs, Vec3::new(-2.0, 0.0, 0.0) * f32::from(sign));
+        }
+
+        // Those of the second texture coordinates, where there are no others
+        (mesh.tangents, mesh.uvs1) = (Vec::new(), vec![Vec2::ZERO, Vec2::new(0.0, -1.0), Vec2::X]);
+        mesh.tangents_along_second = true;
+        let hit = mesh.surface_hit(0, [0.2, 0.3]);
+        assert_eq!((hit.dpdus, hit.dpdvs), (Vec3::new(0.0, 2.0, 0.0), Vec3::new(-2.0, 0.0, 0.0)));
     }
 
     #[test]

@@ -126,7 +126,7 @@ impl Quadric {
         let [dpdu, dpdv] = local.derivatives.map(|v| round(group_from_local.transform_vector3(v)));
         let (dpdu, dpdv) = spanning(dpdu, dpdv, n);
         let vertex = VertexValues::default();
-        SurfaceHit { p, p_error, n, ns: n, dpdu, dpdv, dpdus: dpdu, uv: Vec2::from(uv), vertex }
+        SurfaceHit { p, p_error, n, ns: n, dpdu, dpdv, dpdus: dpdu, dpdvs: dpdv, uv: Vec2::from(uv), vertex }
     }
 }
 

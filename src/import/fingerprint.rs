@@ -2,6 +2,7 @@
 
 use lumiris_formats::source::SourceMap;
 use rayon::prelude::*;
+use std::collections::{BTreeSet, HashMap};
 use std::fs::File;
 use std::io::{self, Read};
 use std::path::PathBuf;
@@ -26,11 +27,13 @@ impl SceneFiles {
     pub fn fingerprint(&self) -> Result<u64, (PathBuf, io::Error)> {
         let mut paths = self.others.clone();
         paths.dedup();
-        let hashes: Vec<(u64, u32)> = paths
-            .par_iter()
-            .map(|path| hash_of(path).map_err(|error| (path.clone(), error)))
+        // Each file is read once, however many shapes it has
+        let distinct: BTreeSet<&PathBuf> = paths.iter().collect();
+        let hashes: HashMap<&PathBuf, (u64, u32)> = distinct
+            .into_par_iter()
+            .map(|path| Ok((path, hash_of(path).map_err(|error| (path.clone(), error))?)))
             .collect::<Result<_, _>>()?;
-        Ok(combined([(self.texts, 0)].into_iter().chain(hashes)))
+        Ok(combined([(self.texts, 0)].into_iter().chain(paths.iter().map(|path| hashes[path]))))
     }
 }
 

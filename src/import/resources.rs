@@ -1,4 +1,4 @@
-//! Image files of a scene: each is requested once, and all are read in parallel.
+//! Files that a scene asks for, each once, and its images, which are all read in parallel.
 
 use super::cache::{FileCache, TexturePlan};
 use super::images::ImageRequest;
@@ -12,41 +12,67 @@ use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+/// Requests of files, each once, in the order in which they were made first.
+#[derive(Debug)]
+pub struct Requests<R> {
+    list: Vec<(R, Span)>,
+    by_path: HashMap<PathBuf, Vec<u32>>,
+}
+
+impl<R> Default for Requests<R> {
+    fn default() -> Self {
+        Requests { list: Vec::new(), by_path: HashMap::new() }
+    }
+}
+
+impl<R: PartialEq> Requests<R> {
+    /// The index of a request of the file `path`; equal requests share one. `span` is where it is made.
+    pub fn index(&mut self, path: &Path, request: R, span: Span) -> u32 {
+        let indices = self.by_path.entry(path.to_owned()).or_default();
+        if let Some(&index) = indices.iter().find(|&&index| self.list[index as usize].0 == request) {
+            return index;
+        }
+        let index = self.list.len() as u32;
+        indices.push(index);
+        self.list.push((request, span));
+        index
+    }
+
+    /// All of them, with where each was made first.
+    pub fn list(&self) -> &[(R, Span)] {
+        &self.list
+    }
+}
+
 /// All images that a scene asks for.
 #[derive(Debug, Default)]
 pub struct Resources {
-    requests: Vec<(ImageRequest, Span)>,
-    by_path: HashMap<PathBuf, Vec<ImageId>>,
+    requests: Requests<ImageRequest>,
 }
 
 impl Resources {
     /// The id that the image will have; equal requests share one.
     pub fn image(&mut self, request: ImageRequest, span: Span) -> ImageId {
-        let ids = self.by_path.entry(request.path.clone()).or_default();
-        if let Some(&id) = ids.iter().find(|&&id| self.requests[id as usize].0 == request) {
-            return id;
-        }
-        let id = self.requests.len() as ImageId;
-        ids.push(id);
-        self.requests.push((request, span));
-        id
+        let path = request.path.clone();
+        self.requests.index(&path, request, span)
     }
 
     /// The files, in the order of the images.
     pub fn paths(&self) -> impl Iterator<Item = &Path> {
-        self.requests.iter().map(|(request, _)| request.path.as_path())
+        self.requests.list().iter().map(|(request, _)| request.path.as_path())
     }
 
     /// Reads all images, in the order of their ids; errors go to `d`.
     pub fn load(&self, files: &FileCache, d: &mut Diagnostics) -> Vec<Arc<MipMap>> {
-        let plan = files.plan_textures(self.requests.iter().map(|(request, _)| request)).unwrap_or_else(|error| {
+        let requests = self.requests.list();
+        let plan = files.plan_textures(requests.iter().map(|(request, _)| request)).unwrap_or_else(|error| {
             d.error_without_place(format!("there is no temporary file for tiles of textures: {error}"));
             TexturePlan::default()
         });
-        let requests = self.requests.par_iter().enumerate();
-        let loaded: Vec<_> = requests.map(|(i, (request, _))| files.planned_map(&plan, i, request)).collect();
+        let numbered = requests.par_iter().enumerate();
+        let loaded: Vec<_> = numbered.map(|(i, (request, _))| files.planned_map(&plan, i, request)).collect();
         let mut maps = Vec::with_capacity(loaded.len());
-        for (result, (request, span)) in loaded.into_iter().zip(&self.requests) {
+        for (result, (request, span)) in loaded.into_iter().zip(requests) {
             match result {
                 Ok(map) => maps.push(map),
                 Err(error) => report(&error, &request.path, *span, d),

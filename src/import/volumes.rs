@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 /// What a grid is read for.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum VolumeUse {
     /// Densities, none of which is negative.
     Density,
@@ -16,7 +16,7 @@ pub enum VolumeUse {
 }
 
 /// A grid that a scene asks for.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub struct VolumeRequest {
     /// The file.
     pub path: PathBuf,

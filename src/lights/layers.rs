@@ -1,6 +1,7 @@
 //! Light groups: lights whose light has a layer of its own in the image.
 
 use super::LightId;
+use std::collections::HashMap;
 use std::sync::Arc;
 
 /// The group of lights that name none, where others do.
@@ -21,13 +22,14 @@ impl LightLayers {
         if groups.iter().all(Option::is_none) {
             return layers;
         }
+        let mut indices: HashMap<&str, u32> = HashMap::new();
         for group in groups {
             let name = group.as_deref().unwrap_or(OTHERS);
-            let place = layers.names.iter().position(|other| other == name).unwrap_or_else(|| {
+            let index = *indices.entry(name).or_insert_with(|| {
                 layers.names.push(name.to_owned());
-                layers.names.len() - 1
+                (layers.names.len() - 1) as u32
             });
-            layers.of_light.push(place as u32);
+            layers.of_light.push(index);
         }
         layers
     }

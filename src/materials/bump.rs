@@ -25,7 +25,7 @@ fn normal_mapped(map: NormalMap, textures: &TextureSet, hit: &SurfaceHit, ctx: &
     let c = textures.images[map.image.image as usize].bilinear(0, Vec2::new(st.x, 1.0 - st.y));
     let local = Vec3::from_array((c * 2.0).to_array()) - Vec3::ONE;
     let frame = Frame::from_xz(hit.dpdus, hit.ns);
-    let is_mirrored = map.is_along_v && frame.y.dot(hit.dpdv) < 0.0;
+    let is_mirrored = map.is_along_v && frame.y.dot(hit.dpdvs) < 0.0;
     let scale = Vec2::new(map.strength, if is_mirrored { -map.strength } else { map.strength });
     let local = (local.truncate() * scale).extend(local.z);
     let ns = frame.to_world(local).normalize_or(hit.ns);

@@ -29,7 +29,6 @@ use crate::textures::{FloatTextureId, ImageId, ImageTexture, Mapping2d, RgbTextu
 use lumiris_numbers::math::hash::{hash_floats, unit_f32};
 use lumiris_numbers::math::{Rgb, Vec3};
 use rayon::prelude::*;
-use std::collections::BTreeSet;
 use std::sync::Arc;
 use strum::IntoStaticStr;
 
@@ -174,8 +173,8 @@ pub struct NormalMap {
     pub image: ImageTexture,
     /// Factor of the tangential components.
     pub strength: f32,
-    /// True if the second axis of tangent space is that of ∂p/∂v, where texture coordinates are mirrored; else it is at the
-    /// left of the first, as in pbrt-v4.
+    /// True if the second axis of tangent space is on the side of the bitangent, as in glTF; else it is at the left of the
+    /// first, as in pbrt-v4.
     pub is_along_v: bool,
 }
 
@@ -314,18 +313,24 @@ impl MaterialSet {
         self.entries.iter().any(|entry| entry.dispersion.is_some())
     }
 
-    /// True if there may be no surface at a hit of the material.
-    pub fn may_pass(&self, id: MaterialId) -> bool {
-        // Mixtures of mixtures may hold themselves
-        let (mut open, mut seen) = (vec![id], BTreeSet::new());
-        while let Some(id) = open.pop() {
-            match self.entries[id as usize].material {
-                Material::Interface => return true,
-                Material::Mix { materials, .. } if seen.insert(id) => open.extend(materials),
+    /// By material, true if there may be no surface at a hit: those that only bound a medium, and mixtures with them.
+    pub fn may_pass(&self) -> Vec<bool> {
+        let mut holders: Vec<Vec<MaterialId>> = vec![Vec::new(); self.entries.len()];
+        let mut open = Vec::new();
+        for (id, entry) in (0..).zip(&self.entries) {
+            match entry.material {
+                Material::Interface => open.push(id),
+                Material::Mix { materials, .. } => materials.iter().for_each(|&part| holders[part as usize].push(id)),
                 _ => {}
             }
         }
-        false
+        let mut may_pass = vec![false; self.entries.len()];
+        while let Some(id) = open.pop() {
+            if !std::mem::replace(&mut may_pass[id as usize], true) {
+                open.extend(&holders[id as usize]);
+            }
+        }
+        may_pass
     }
 
     /// The reflectance of a material that is Lambertian, the same everywhere, and does not bend normals.

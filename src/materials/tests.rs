@@ -19,6 +19,7 @@ fn hit(n: Vec3) -> SurfaceHit {
         dpdu,
         dpdv,
         dpdus: dpdu,
+        dpdvs: dpdv,
         uv: Vec2::new(0.4, 0.6),
         vertex: Default::default(),
     }

@@ -40,7 +40,8 @@ impl RenderJob {
         let has_alpha = |geometry: GeometryId| scene.geometry.geometries[geometry as usize].alpha.is_some();
         let irradiances = Irradiances::new(&scene.lights, has_alpha);
         let plain = (0..scene.geometry.geometries.len() as GeometryId).map(|g| plain_reflectance(scene, g)).collect();
-        let may_pass: Vec<bool> = scene.surfaces.iter().map(|s| scene.materials.may_pass(s.material)).collect();
+        let of_material = scene.materials.may_pass();
+        let may_pass: Vec<bool> = scene.surfaces.iter().map(|s| of_material[s.material as usize]).collect();
         let shadows_pass = may_pass.contains(&true);
         let choice = light_choice(i, shadows_pass);
         let lights = LightSampling::new(Arc::clone(&scene.lights), choice, max_groups(i, lobes));

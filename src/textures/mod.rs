@@ -227,6 +227,10 @@ pub struct TextureSet {
     pub udims: Vec<Udim>,
     /// Textures of faces.
     pub face_maps: Vec<Arc<FaceMap>>,
+    /// By float texture, how many textures refer to each other, at most, from it on.
+    float_depths: Vec<u32>,
+    /// By RGB texture.
+    rgb_depths: Vec<u32>,
 }
 
 impl TextureSet {
@@ -247,6 +251,8 @@ impl TextureSet {
         };
         let id = self.floats.len() as FloatTextureId;
         assert!(children.iter().all(|&c| c < id), "a texture refers to earlier ones only");
+        let depths = children.iter().map(|&c| self.float_depths[c as usize]);
+        self.float_depths.push(1 + depths.max().unwrap_or(0));
         self.floats.push(texture);
         id
     }
@@ -255,12 +261,14 @@ impl TextureSet {
     pub fn reserve_float(&mut self) -> FloatTextureId {
         // Whoever asks too early must not take it for a constant
         self.floats.push(FloatTexture::VertexOpacity);
+        self.float_depths.push(1);
         (self.floats.len() - 1) as FloatTextureId
     }
 
     /// Makes a reserved place a copy of a texture.
     pub fn fill_float(&mut self, reserved: FloatTextureId, texture: FloatTextureId) {
         self.floats[reserved as usize] = self.floats[texture as usize];
+        self.float_depths[reserved as usize] = self.float_depths[texture as usize];
     }
 
     /// Adds an RGB texture. Panics if it refers to a texture that is not in the set yet; its image may come later,
@@ -280,8 +288,21 @@ impl TextureSet {
         let id = self.rgbs.len() as RgbTextureId;
         let known = children.iter().all(|&c| c < id) && weight.is_none_or(|w| (w as usize) < self.floats.len());
         assert!(known, "a texture refers to earlier ones only");
+        let weight = weight.map(|w| self.float_depths[w as usize]);
+        let depths = children.iter().map(|&c| self.rgb_depths[c as usize]).chain(weight);
+        self.rgb_depths.push(1 + depths.max().unwrap_or(0));
         self.rgbs.push(texture);
         id
+    }
+
+    /// How many textures refer to each other, at most, from a float texture on: its value is found by recursion.
+    pub fn float_depth(&self, id: FloatTextureId) -> u32 {
+        self.float_depths[id as usize]
+    }
+
+    /// As [`Self::float_depth`], from an RGB texture on.
+    pub fn rgb_depth(&self, id: RgbTextureId) -> u32 {
+        self.rgb_depths[id as usize]
     }
 
     /// Where the texels are that do not fit into memory: all images of a scene have the same store.

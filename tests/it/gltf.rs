@@ -6,7 +6,7 @@ use lumiris::import::cache::FileCache;
 use lumiris::import::gltf::LightUnits;
 use lumiris::import::{LoadOptions, Loaded, load, load_text};
 use lumiris::lights::{AreaLight, Light};
-use lumiris::render::output::channels;
+use lumiris::render::output::{Aov, channels};
 use lumiris::render::{RenderSettings, render};
 use lumiris::scene::AccelKind;
 use lumiris_numbers::math::{Bounds3, Rgb, Vec2, Vec3};
@@ -572,7 +572,7 @@ fn animations_move_nodes_and_bend_meshes_at_a_time() {
     let wrong = error(r#",{"sampler":9,"target":{"node":0,"path":"scale"}}"#);
     assert!(wrong.contains("is not there") && wrong.contains("animations[0].channels[3].sampler"), "{wrong}");
     let wrong = error(r#",{"sampler":1,"target":{"node":0,"path":"scale"}}"#);
-    assert!(wrong.contains("has not 3 numbers for each of 2 keys"), "{wrong}");
+    assert!(wrong.contains("has not 3 numbers for each key"), "{wrong}");
     let still = at(&triangle(), Some(1.0)).unwrap().warnings.to_string();
     assert!(still.contains("no animation"), "{still}");
 }
@@ -659,4 +659,173 @@ fn light_in_a_volume_has_the_colour_of_its_distance() {
     near(&format!(r#""thicknessFactor":1,{attenuation}"#), [0.9_f32.powi(4), 0.5_f32.powi(4), 1.0]);
     near(attenuation, [1.0; 3]);
     near(r#""thicknessFactor":1,"attenuationColor":[0.9,0.5,1]"#, [1.0; 3]);
+}
+
+/// A square of −1..1 with texture coordinates as images have them (0), turned by 90° (1), and tangents along x whose fourth
+/// components are −1 (`TANGENT` 4) and 1 (5); an orthographic camera sees it from +z.
+fn square(nodes: &str, attributes: &str, rest: &str) -> Vec<u8> {
+    let accessor = |(i, width): (usize, usize)| {
+        format!(r#"{{"bufferView":0,"byteOffset":{},"componentType":5126,"count":4,"type":"VEC{width}"}}"#, 64 * i)
+    };
+    let accessors: Vec<String> = [3, 3, 2, 2, 4, 4].into_iter().enumerate().map(accessor).collect();
+    let json = format!(
+        r#"{{"asset":{{"version":"2.0"}},"scenes":[{{"nodes":[0,1]}}],"nodes":[{{"translation":[0,0,5],"camera":0}},{nodes}],
+        "cameras":[{{"type":"orthographic","orthographic":{{"xmag":1,"ymag":1,"znear":0.1,"zfar":20}}}}],
+        "meshes":[{{"primitives":[{{"attributes":{{"POSITION":0,"NORMAL":1,"TEXCOORD_0":2{attributes}}},"indices":6,
+            "material":0}}]}}],"textures":[{{"source":0,"sampler":0}}],
+        "accessors":[{},{{"bufferView":0,"byteOffset":384,"componentType":5121,"count":6,"type":"SCALAR"}}],
+        "bufferViews":[{{"buffer":0,"byteLength":390}}],"buffers":[{{"byteLength":390}}],{rest}}}"#,
+        accessors.join(",")
+    );
+    let corners = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]];
+    let bytes = |element: &dyn Fn([f32; 2]) -> Vec<f32>| {
+        let mut bytes = floats(&corners.iter().flat_map(|&c| element(c)).collect::<Vec<f32>>());
+        bytes.resize(64, 0);
+        bytes
+    };
+    let all = [
+        bytes(&|[x, y]| vec![x, y, 0.0]),
+        bytes(&|_| vec![0.0, 0.0, 1.0]),
+        bytes(&|[x, y]| vec![(x + 1.0) / 2.0, (1.0 - y) / 2.0]),
+        bytes(&|[x, y]| vec![(y + 1.0) / 2.0, (x + 1.0) / 2.0]),
+        bytes(&|_| vec![1.0, 0.0, 0.0, -1.0]),
+        bytes(&|_| vec![1.0, 0.0, 0.0, 1.0]),
+    ];
+    container(&json, [all.concat(), vec![0, 1, 2, 0, 2, 3]].concat())
+}
+
+/// The channels of an image of 16 × 16 pixels, and their names.
+fn image_of(bytes: &[u8]) -> (Vec<String>, Vec<f32>) {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.glb");
+    std::fs::write(&path, bytes).unwrap();
+    let options = LoadOptions { resolution: Some([16, 16]), ..LoadOptions::default() };
+    let job = load(&path, &options).map_err(|r| r.to_string()).unwrap().job(AccelKind::Embree, None).unwrap();
+    let settings = RenderSettings { spp: 4, ..RenderSettings::default() };
+    let rendering = render(&job, &settings, &AtomicBool::new(false), &|_| ()).unwrap();
+    let image = channels(&rendering.film, &[Aov::Normal], None);
+    (image.names, image.data)
+}
+
+#[test]
+fn emitted_and_unlit_images_are_filtered_as_their_samplers_say() {
+    // Red in the first quadrant
+    let image = "iVBORw0KGgoAAAANSUhEUgAAAAIAAAACCAIAAAD91JpzAAAAEklEQVR4nGP4z8DAAMIM/4EAAB/uBfsL2WiLAAAAAElFTkSuQmCC";
+    let unlit = r#"{"pbrMetallicRoughness":{"baseColorTexture":{"index":0}},"extensions":{"KHR_materials_unlit":{}}}"#;
+    let emissive = r#"{"emissiveFactor":[1,1,1],"emissiveTexture":{"index":0},"extensions":{"KHR_materials_ior":{"ior":1}},
+        "pbrMetallicRoughness":{"baseColorFactor":[0,0,0,1],"metallicFactor":0}}"#;
+    for material in [unlit, emissive] {
+        for (filter, is_nearest) in [(9728, true), (9729, false)] {
+            let rest = format!(
+                r#""materials":[{material}],"samplers":[{{"magFilter":{filter}}}],
+                "images":[{{"uri":"data:image/png;base64,{image}"}}]"#
+            );
+            let (names, data) = image_of(&square(r#"{"mesh":0}"#, "", &rest));
+            // Within the quadrant, two pixels from the next: the pixel filter has a radius of 1.5
+            let pixel = &data[names.len() * (16 * 5 + 5)..][..3];
+            let is_red = (pixel[0] - 1.0).abs() < 1e-3 && pixel[1].max(pixel[2]) < 1e-3;
+            assert_eq!(is_red, is_nearest, "{material} {filter}: {pixel:?}");
+        }
+    }
+}
+
+#[test]
+fn normal_maps_have_the_bitangents_of_their_tangents_or_of_their_texture_coordinates() {
+    // (0, 0.6, 0.8) in tangent space
+    let image = "iVBORw0KGgoAAAANSUhEUgAAAAgAAAAICAIAAABLbSncAAAAEUlEQVR4nGNo2P8OK2IYWhIATXKLQdHJGNsAAAAASUVORK5CYII=";
+    let normal = |node: &str, attributes: &str, set: u32| {
+        let rest = format!(
+            r#""materials":[{{"normalTexture":{{"index":0,"texCoord":{set}}}}}],"samplers":[{{}}],
+            "images":[{{"uri":"data:image/png;base64,{image}"}}]"#
+        );
+        let (names, data) = image_of(&square(node, attributes, &rest));
+        let at = names.iter().position(|name| name == "normal.X").unwrap();
+        Vec3::from_slice(&data[names.len() * (16 * 5 + 5) + at..])
+    };
+    let plain = r#"{"mesh":0}"#;
+    let mirrored = r#"{"mesh":0,"scale":[-1,1,1]}"#;
+    let (up, down, left) = (Vec3::new(0.0, 0.6, 0.8), Vec3::new(0.0, -0.6, 0.8), Vec3::new(-0.6, 0.0, 0.8));
+    for (node, attributes, set, expected) in [
+        (plain, "", 0, up),
+        (plain, r#","TANGENT":5"#, 0, up),
+        (plain, r#","TANGENT":4"#, 0, down),
+        // A mirror image, which only turns what is along x
+        (mirrored, r#","TANGENT":5"#, 0, up),
+        (mirrored, r#","TANGENT":4"#, 0, down),
+        (plain, r#","TEXCOORD_1":3"#, 0, up),
+        (plain, r#","TEXCOORD_1":3"#, 1, left),
+        (mirrored, r#","TEXCOORD_1":3"#, 1, left * Vec3::new(-1.0, 1.0, 1.0)),
+        (plain, r#","TEXCOORD_1":3,"TANGENT":4"#, 1, down),
+    ] {
+        let found = normal(node, attributes, set);
+        assert!((found - expected).length() < 0.02, "{node} {attributes} {set}: {found}, not {expected}");
+    }
+}
+
+#[test]
+fn nodes_with_a_scale_of_zero_flatten_their_meshes() {
+    let mesh = r#""meshes":[{"primitives":[{"attributes":{"POSITION":1,"NORMAL":0}}]}]"#;
+    // With a z of its own
+    let mut values = VALUES;
+    values[9..18].copy_from_slice(&[0.0, 0.0, 0.0, 1.0, 0.0, 2.0, 0.0, 1.0, 4.0]);
+    values[..9].copy_from_slice(&[0.6, 0.0, 0.8, 0.6, 0.0, 0.8, 0.6, 0.0, 0.8]);
+    let flat = r#"{"mesh":0,"scale":[1,1,0],"translation":[0,0,7]}"#;
+    let (one, loaded) = bounds(&format!("{flat},{{}}"), mesh, &values).unwrap();
+    assert_eq!((one.min, one.max), (Vec3::new(0.0, 0.0, 7.0), Vec3::new(1.0, 1.0, 7.0)));
+    let hit = loaded.scene.geometry.surface_hit(0, 0, u32::MAX, [0.2, 0.2], 0.0);
+    assert_eq!((hit.n, hit.ns), (Vec3::Z, Vec3::Z));
+    // Beside instances, which have inverses
+    let nodes = format!(r#"{{"children":[2,3]}},{flat},{{"mesh":0}},{{"mesh":0,"translation":[1,0,0]}}"#);
+    let (all, loaded) = bounds(&nodes, mesh, &values).unwrap();
+    let geometry = &loaded.scene.geometry;
+    assert_eq!((geometry.instances.len(), geometry.geometries.len(), geometry.root.geometries.len()), (2, 2, 1));
+    assert_eq!(all.max, Vec3::new(2.0, 1.0, 7.0));
+    assert!(loaded.job(AccelKind::Embree, None).is_ok());
+}
+
+/// A document of `n` nodes in a chain, which have a mesh and a material each.
+fn chain(n: usize) -> String {
+    let list = |item: &dyn Fn(usize) -> String| (0..n).map(item).collect::<Vec<_>>().join(",");
+    let children = |i: usize| if i + 1 < n { format!(r#","children":[{}]"#, i + 1) } else { String::new() };
+    format!(
+        r#"{{"asset":{{"version":"2.0"}},"scenes":[{{"nodes":[0]}}],"nodes":[{}],"meshes":[{}],"materials":[{}],
+        "accessors":[{}]}}"#,
+        list(&|i| format!(r#"{{"mesh":{i},"translation":[1,0,0]{}}}"#, children(i))),
+        list(&|i| format!(r#"{{"primitives":[{{"attributes":{{"POSITION":{i}}},"material":{i}}}]}}"#)),
+        list(&|i| format!(r#"{{"name":"{i}"}}"#)),
+        list(&|_| r#"{"componentType":5126,"count":3,"type":"VEC3"}"#.to_owned()),
+    )
+}
+
+#[test]
+fn chains_of_nodes_may_be_as_deep_as_they_are_long() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.gltf");
+    std::fs::write(&path, chain(20_000)).unwrap();
+    let scene = load(&path, &LoadOptions::default()).map_err(|r| r.to_string()).unwrap().scene;
+    assert_eq!((scene.geometry.geometries.len(), scene.materials.entries().len()), (20_000, 20_001));
+    assert_eq!(scene.geometry.world_bounds().max.x, 20_000.0);
+}
+
+#[test]
+fn primitives_take_their_own_vertices_of_a_shared_accessor() {
+    let json = r#"{"asset":{"version":"2.0"},"nodes":[{"mesh":0}],
+        "meshes":[{"primitives":[{"attributes":{"POSITION":0,"COLOR_0":0},"indices":1}]}],
+        "accessors":[{"bufferView":0,"componentType":5126,"count":40,"type":"VEC3"},
+                     {"bufferView":1,"componentType":5121,"count":3,"type":"SCALAR"}],
+        "bufferViews":[{"buffer":0,"byteLength":480},{"buffer":0,"byteOffset":480,"byteLength":3}],
+        "buffers":[{"byteLength":483}]}"#;
+    let vertex = |i: usize| [i as f32, (i * i) as f32, 0.5];
+    let with = |indices: [u8; 3]| {
+        let bytes = [floats(&(0..40).flat_map(vertex).collect::<Vec<f32>>()), indices.to_vec()].concat();
+        let folder = tempfile::tempdir().unwrap();
+        loaded(folder.path(), &container(json, bytes))
+    };
+    let scene = with([30, 4, 17]).unwrap().scene;
+    let Shape::Mesh(mesh) = &scene.geometry.geometries[0].shape else { panic!("a mesh") };
+    assert_eq!((mesh.positions().len(), mesh.colors.len()), (3, 3));
+    assert_eq!(mesh.triangle(0), [30, 4, 17].map(|i| Vec3::from(vertex(i))));
+    assert_eq!(mesh.indices[0].map(|v| mesh.colors[v as usize][1]), [900.0, 16.0, 289.0]);
+    let error = with([0, 1, 40]).map(|_| ()).unwrap_err();
+    assert!(error.contains("[0, 1, 40], but there are 40 vertices"), "{error}");
 }

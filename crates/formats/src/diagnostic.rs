@@ -18,6 +18,8 @@ const REPORT_LIMIT: usize = 100;
 const KIND_LIMIT: usize = 5;
 /// Diagnostics that are kept at all.
 const KEEP_LIMIT: usize = 2000;
+/// Names that all unknown ones of a run are compared with: a scene of 10⁵ materials may miss them all.
+const COMPARISONS: usize = 200_000;
 
 /// How bad it is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -95,6 +97,8 @@ pub struct Diagnostics {
     errors: usize,
     dropped: usize,
     overflow: Option<Box<Diagnostic>>,
+    /// Names that unknown ones were compared with.
+    compared: usize,
 }
 
 impl Diagnostics {
@@ -106,6 +110,21 @@ impl Diagnostics {
     /// Adds an error at `span`.
     pub fn error(&mut self, span: Span, message: impl Into<String>) -> &mut Diagnostic {
         self.push(Severity::Error, Some(span), message.into())
+    }
+
+    /// Adds an error about a name that is not among the `known`, with the nearest of them as help.
+    pub fn unknown<'a>(
+        &mut self,
+        span: Span,
+        kind: &str,
+        name: &str,
+        known: impl ExactSizeIterator<Item = &'a str>,
+    ) -> &mut Diagnostic {
+        self.compared = self.compared.saturating_add(known.len());
+        let near = if self.compared <= COMPARISONS { did_you_mean(name, known) } else { None };
+        let diagnostic = self.error(span, format!("unknown {kind} `{name}`"));
+        diagnostic.help = near.map(|near| format!("did you mean `{near}`?"));
+        diagnostic
     }
 
     /// Adds an error that has no place in a file, such as that of an option.
@@ -450,6 +469,17 @@ fn edit_distance(a: &str, b: &str) -> usize {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_search_for_what_was_meant_does_not_grow_with_errors_times_names() {
+        let names: Vec<String> = (0..COMPARISONS / 4).map(|i| format!("{i}")).collect();
+        let mut d = Diagnostics::new();
+        for i in 0..5000 {
+            d.unknown(Span::default(), "material", &format!("{i}x"), names.iter().map(String::as_str));
+        }
+        let helped = d.list.iter().filter(|diagnostic| diagnostic.help.is_some()).count();
+        assert_eq!((helped, d.errors), (4, 5000));
+    }
 
     #[test]
     fn a_report_shows_place_line_and_help() {

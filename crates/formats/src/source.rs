@@ -5,7 +5,7 @@ use std::fmt;
 use std::fs::File;
 use std::io::{self, Read};
 use std::path::Path;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 /// Index of a file in a [`SourceMap`].
 pub type FileId = u32;
@@ -65,6 +65,36 @@ impl fmt::Display for Location {
 struct SourceFile {
     name: String,
     bytes: Arc<Vec<u8>>,
+    /// Line and column, from 0, of every byte at a multiple of [`STEP`]: a run may name places without number in a file
+    /// of one line.
+    positions: OnceLock<Vec<(usize, usize)>>,
+}
+
+/// Bytes between positions that are kept.
+const STEP: usize = 4096;
+
+/// Moves a line and a column, from 0, over bytes of text; a column is a character.
+fn advance((line, column): (usize, usize), bytes: &[u8]) -> (usize, usize) {
+    let rest = bytes.iter().rposition(|&b| b == b'\n').map_or(bytes, |i| &bytes[i + 1..]);
+    let column = if rest.len() == bytes.len() { column } else { 0 };
+    let starts_character = |b: &&u8| **b & 0xc0 != 0x80;
+    (line + bytes.iter().filter(|&&b| b == b'\n').count(), column + rest.iter().filter(starts_character).count())
+}
+
+impl SourceFile {
+    /// Line and column of a byte, from 0.
+    fn position(&self, at: usize) -> (usize, usize) {
+        let positions = self.positions.get_or_init(|| {
+            let blocks = self.bytes.chunks_exact(STEP);
+            let next = |position: &mut (usize, usize), block: &[u8]| {
+                *position = advance(*position, block);
+                Some(*position)
+            };
+            [(0, 0)].into_iter().chain(blocks.scan((0, 0), next)).collect()
+        });
+        let at = at.min(self.bytes.len());
+        advance(positions[at / STEP], &self.bytes[at / STEP * STEP..at])
+    }
 }
 
 /// All texts of a run.
@@ -87,7 +117,7 @@ impl SourceMap {
 
     /// Adds a text under a name.
     pub fn add_text(&mut self, name: impl Into<String>, bytes: Vec<u8>) -> FileId {
-        self.files.push(SourceFile { name: name.into(), bytes: Arc::new(bytes) });
+        self.files.push(SourceFile { name: name.into(), bytes: Arc::new(bytes), positions: OnceLock::new() });
         (self.files.len() - 1) as FileId
     }
 
@@ -126,15 +156,13 @@ impl SourceMap {
 
     /// Where a span starts.
     pub fn locate(&self, span: Span) -> Location {
-        let (name, bytes) = (self.name(span.file).to_owned(), self.bytes(span.file));
+        let name = self.name(span.file).to_owned();
         if self.is_binary(span.file) {
             return Location { name, position: Position::Byte(span.start as usize) };
         }
-        let before = &bytes[..(span.start as usize).min(bytes.len())];
-        let line_start = before.iter().rposition(|&b| b == b'\n').map_or(0, |i| i + 1);
-        let line = 1 + before.iter().filter(|&&b| b == b'\n').count();
-        let column = 1 + String::from_utf8_lossy(&before[line_start..]).chars().count();
-        Location { name, position: Position::Text { line, column } }
+        let file = self.files.get(span.file as usize);
+        let (line, column) = file.map_or((0, 0), |file| file.position(span.start as usize));
+        Location { name, position: Position::Text { line: line + 1, column: column + 1 } }
     }
 }
 
@@ -166,6 +194,23 @@ pub fn read_bytes(input: impl Read, expected: usize) -> io::Result<Vec<u8>> {
 mod tests {
     use super::*;
     use std::io::Write;
+
+    #[test]
+    fn positions_are_those_of_counting_from_the_start() {
+        let text: String = (0..3000).map(|i| ["é", "\n", "ab c", "\u{1f4a1}\t"][i * i % 7 % 4]).collect();
+        let long = text.clone() + &"ß".repeat(9000) + &text;
+        let mut sources = SourceMap::new();
+        let file = sources.add_text("a", long.clone().into_bytes());
+        for start in
+            (0..=long.len()).step_by(37).chain([STEP, 2 * STEP, long.len()]).filter(|&i| long.is_char_boundary(i))
+        {
+            let before = &long[..start];
+            let (line, column) =
+                (before.split('\n').count(), before.split('\n').next_back().unwrap().chars().count() + 1);
+            let found = sources.locate(Span { file, start: start as u32, end: start as u32 });
+            assert_eq!(found.position, Position::Text { line, column }, "byte {start}");
+        }
+    }
 
     #[test]
     fn gzip_files_are_read_as_their_content() {

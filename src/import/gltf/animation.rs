@@ -41,10 +41,11 @@ struct Position {
 /// What the animations of a file say of its nodes at a time (s).
 pub(super) fn changes(document: &Document, time: f32, messages: &mut Messages<'_>) -> Result<Changes, GltfError> {
     let animations = document.root().key("animations");
-    if animations.items().is_empty() {
+    if animations.is_empty() {
         messages.warning(&animations, "no animation: the time in the scene changes nothing");
     }
-    let mut changes = Changes::new();
+    let (mut changes, mut positions) = (Changes::new(), Positions::new());
+    let mut track = |sampler: &Place<'_>| Track::of(document, sampler, time, &mut positions);
     for animation in animations.items() {
         for channel in animation.key("channels").items() {
             let target = channel.key("target");
@@ -62,18 +63,17 @@ pub(super) fn changes(document: &Document, time: f32, messages: &mut Messages<'_
             let change = changes.entry(node).or_default();
             match path {
                 "translation" if change.translation.is_none() => {
-                    change.translation = Some(vector(&Track::of(document, &sampler, time)?, &sampler)?);
+                    change.translation = Some(vector(&track(&sampler)?, &sampler)?);
                 }
                 "scale" if change.scale.is_none() => {
-                    change.scale = Some(vector(&Track::of(document, &sampler, time)?, &sampler)?);
+                    change.scale = Some(vector(&track(&sampler)?, &sampler)?);
                 }
                 "rotation" if change.rotation.is_none() => {
-                    change.rotation = Some(rotation(&Track::of(document, &sampler, time)?, &sampler)?);
+                    change.rotation = Some(rotation(&track(&sampler)?, &sampler)?);
                 }
                 "weights" if change.weights.is_none() => {
-                    let track = Track::of(document, &sampler, time)?;
-                    let width = track.values.len() / (track.keys * track.per_key());
-                    change.weights = Some(track.at(width));
+                    let track = track(&sampler)?;
+                    change.weights = Some(track.at(track.numbers / track.per_key()));
                 }
                 "translation" | "scale" | "rotation" | "weights" => {}
                 other => messages.warning(&target, &format!("an animation of `{other}` is not rendered")),
@@ -83,35 +83,49 @@ pub(super) fn changes(document: &Document, time: f32, messages: &mut Messages<'_
     Ok(changes)
 }
 
+/// Numbers of keys and positions of a time among them, by the accessor of the times: many channels may have the same.
+type Positions = HashMap<usize, (usize, Position)>;
+
 /// The keys of a sampler around a time.
 struct Track {
     interpolation: Interpolation,
-    keys: usize,
     position: Position,
-    /// All numbers of all keys.
+    /// Numbers of each key.
+    numbers: usize,
+    /// All numbers of the key before the time, and of the next.
     values: Vec<f32>,
 }
 
 impl Track {
-    fn of(document: &Document, sampler: &Place<'_>, time: f32) -> Result<Self, GltfError> {
-        let index = |name: &str| {
+    fn of(document: &Document, sampler: &Place<'_>, time: f32, positions: &mut Positions) -> Result<Self, GltfError> {
+        let index = |name: &'static str| {
             let place = sampler.key(name);
             place.index().ok_or_else(|| place.error("is not there"))
         };
-        let times: Vec<f32> = document.accessor(index("input")?)?.elements::<1>(0.0).concat();
-        let values = document.accessor(index("output")?)?.values();
+        let input = index("input")?;
+        let (keys, position) = match positions.get(&input) {
+            Some(known) => *known,
+            None => {
+                let times: Vec<f32> = document.accessor(input)?.elements::<1>(0.0).concat();
+                if times.is_empty() || !times.is_sorted_by(|a, b| a < b) {
+                    return Err(sampler.key("input").error("the times of keys must increase"));
+                }
+                *positions.entry(input).or_insert((times.len(), position(&times, time)))
+            }
+        };
         let interpolation = match sampler.key("interpolation").text() {
             Some("STEP") => Interpolation::Step,
             Some("CUBICSPLINE") => Interpolation::CubicSpline,
             _ => Interpolation::Linear,
         };
-        if times.is_empty() || !times.is_sorted_by(|a, b| a < b) {
-            return Err(sampler.key("input").error("the times of keys must increase"));
-        }
-        let track = Track { interpolation, keys: times.len(), position: position(&times, time), values };
-        if track.values.is_empty() || !track.values.len().is_multiple_of(track.keys * track.per_key()) {
+        let accessor = document.open(index("output")?)?;
+        let of_key = accessor.count() / keys;
+        let mut track = Track { interpolation, position, numbers: of_key * accessor.width(), values: Vec::new() };
+        if of_key == 0 || !accessor.count().is_multiple_of(keys * track.per_key()) {
             return Err(sampler.key("output").error("has not the same number of values for every key"));
         }
+        let Position { key, .. } = position;
+        track.values = accessor.numbers(key * of_key..(key + 2).min(keys) * of_key).values();
         Ok(track)
     }
 
@@ -120,21 +134,22 @@ impl Track {
         if self.interpolation == Interpolation::CubicSpline { 3 } else { 1 }
     }
 
-    /// The `width` numbers of a key; `part` of a spline: tangent before, value, tangent after.
+    /// The `width` numbers of the key before the time (0) or of the next (1); `part` of a spline: tangent before, value,
+    /// tangent after.
     fn key(&self, key: usize, part: usize, width: usize) -> &[f32] {
-        let first = (key * self.per_key() + part) * width;
+        let first = key * self.numbers + part * width;
         &self.values[first..first + width]
     }
 
     /// The `width` numbers at the time.
     fn at(&self, width: usize) -> Vec<f32> {
-        let Position { key, fraction: s, seconds } = self.position;
+        let Position { fraction: s, seconds, .. } = self.position;
         let value = usize::from(self.interpolation == Interpolation::CubicSpline);
-        let a = self.key(key, value, width);
+        let a = self.key(0, value, width);
         if s == 0.0 {
             return a.to_vec();
         }
-        let b = self.key(key + 1, value, width);
+        let b = self.key(1, value, width);
         let blend = |weights: [f32; 4], [out, into]: [&[f32]; 2]| {
             let [p0, m0, p1, m1] = weights;
             (0..width).map(|i| p0 * a[i] + m0 * seconds * out[i] + p1 * b[i] + m1 * seconds * into[i]).collect()
@@ -145,17 +160,17 @@ impl Track {
             Interpolation::CubicSpline => {
                 let (s2, s3) = (s * s, s * s * s);
                 let weights = [2.0 * s3 - 3.0 * s2 + 1.0, s3 - 2.0 * s2 + s, 3.0 * s2 - 2.0 * s3, s3 - s2];
-                blend(weights, [self.key(key, 2, width), self.key(key + 1, 0, width)])
+                blend(weights, [self.key(0, 2, width), self.key(1, 0, width)])
             }
         }
     }
 
     /// True if there are `width` numbers at each key.
     fn has(&self, width: usize, sampler: &Place<'_>) -> Result<(), GltfError> {
-        if self.values.len() == self.keys * self.per_key() * width {
+        if self.numbers == self.per_key() * width {
             return Ok(());
         }
-        Err(sampler.key("output").error(format!("has not {width} numbers for each of {} keys", self.keys)))
+        Err(sampler.key("output").error(format!("has not {width} numbers for each key")))
     }
 }
 
@@ -167,11 +182,11 @@ fn vector(track: &Track, sampler: &Place<'_>) -> Result<[f32; 3], GltfError> {
 /// Linear ones turn with an even speed on the shorter way.
 fn rotation(track: &Track, sampler: &Place<'_>) -> Result<[f32; 4], GltfError> {
     track.has(4, sampler)?;
-    let Position { key, fraction, .. } = track.position;
+    let fraction = track.position.fraction;
     if track.interpolation != Interpolation::Linear || fraction == 0.0 {
         return Ok(Quat::from_slice(&track.at(4)).to_array());
     }
-    let [a, b] = [0, 1].map(|i| Quat::from_slice(track.key(key + i, 0, 4)).normalize());
+    let [a, b] = [0, 1].map(|i| Quat::from_slice(track.key(i, 0, 4)).normalize());
     Ok(a.slerp(b, fraction).to_array())
 }
 
@@ -192,7 +207,8 @@ mod tests {
     use super::*;
 
     fn track(interpolation: Interpolation, times: &[f32], values: &[f32], time: f32) -> Track {
-        Track { interpolation, keys: times.len(), position: position(times, time), values: values.to_vec() }
+        let (position, numbers) = (position(times, time), values.len() / times.len());
+        Track { interpolation, position, numbers, values: values[position.key * numbers..].to_vec() }
     }
 
     #[test]

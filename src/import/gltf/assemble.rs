@@ -4,12 +4,13 @@ use super::Messages;
 use super::animation::changes;
 use super::choice::{Names, chosen, name_of, shown};
 use super::materials::{Look, Materials};
-use super::meshes::{Primitive, placed, primitive};
+use super::meshes::{Primitive, primitive};
 use super::nodes::{Node, instances, nodes};
-use super::pose::Pose;
-use super::textures::EmissionSource;
+use super::pose::{Pose, PoseKey, Skins};
+use super::textures::{EmissionKey, EmissionSource};
 use super::view::{camera, cameras, chosen_camera};
 use crate::geometry::{Geometry, GeometryId, GeometrySet, Group, Instance, Shape, TriangleMesh, Visibility};
+use crate::imaging::Filter;
 use crate::imaging::oiio::ImageError;
 use crate::import::LoadOptions;
 use crate::import::cache::FileCache;
@@ -37,7 +38,7 @@ pub(super) struct Assembly<'a> {
     set: GeometrySet,
     surfaces: Vec<Surface>,
     emitters: Vec<(GeometryId, Emission)>,
-    emission_images: HashMap<MaterialId, Option<Arc<EmissionImage>>>,
+    emission_images: HashMap<EmissionKey, Option<Arc<EmissionImage>>>,
     lights: Vec<Light>,
     media: MediumSet,
     /// What is inside of materials.
@@ -79,7 +80,7 @@ impl<'a> Assembly<'a> {
         let changes = self.options.time.map(|time| changes(self.document, time, messages)).transpose()?;
         let Some((scene, mut choices)) = self.chosen_scene(messages) else { return Ok(None) };
         let nodes = nodes(self.document, &scene, &changes.unwrap_or_default())?;
-        let (placed, camera_names) = cameras(self.document, &nodes);
+        let (placed, camera_names) = cameras(self.document, &nodes, messages);
         choices.cameras = shown(&camera_names);
         if let Err(error) = self.add_meshes(&nodes, files, messages) {
             messages.error(&error);
@@ -123,7 +124,7 @@ impl<'a> Assembly<'a> {
     /// The scene that is asked for, or that of the file, and what there is to choose from but for cameras.
     fn chosen_scene(&self, messages: &mut Messages<'_>) -> Option<(Place<'a>, Choices)> {
         let scenes = self.document.root().key("scenes");
-        let names: Names<'a> = scenes.items().iter().map(|scene| [name_of(scene), None]).collect();
+        let names: Names<'a> = scenes.items().map(|scene| [name_of(&scene), None]).collect();
         let usual = self.document.root().key("scene").index().unwrap_or(0);
         let index = match &self.options.scene {
             Some(wanted) => chosen(["scene", "--scene-in-file"], wanted, &names),
@@ -153,62 +154,74 @@ impl<'a> Assembly<'a> {
     }
 
     /// Adds all meshes, each once for every pose.
-    fn add_meshes(
-        &mut self,
-        nodes: &[Node<'a>],
-        files: &FileCache,
-        messages: &mut Messages<'_>,
-    ) -> Result<(), GltfError> {
-        let meshes = self.document.root().key("meshes").items();
-        let mut users: Vec<Vec<&Node<'a>>> = vec![Vec::new(); meshes.len()];
-        for node in nodes {
+    fn add_meshes(&mut self, nodes: &[Node], files: &FileCache, messages: &mut Messages<'_>) -> Result<(), GltfError> {
+        let meshes = self.document.root().key("meshes");
+        let mut users: Vec<Vec<u32>> = vec![Vec::new(); meshes.len()];
+        for (i, node) in nodes.iter().enumerate() {
             if let Some(list) = node.mesh.and_then(|mesh| users.get_mut(mesh)) {
-                list.push(node);
+                list.push(i as u32);
             }
         }
-        for (place, users) in meshes.iter().zip(users) {
-            let mut poses: Vec<(Pose, Vec<Affine3A>)> = Vec::new();
-            for node in users {
-                let pose = Pose::of(self.document, place, node, nodes)?;
-                let world_from_node = if pose.is_skinned() { Affine3A::IDENTITY } else { node.world_from_node };
-                let placements = instances(self.document, &node.place)?.into_iter().map(|m| world_from_node * m);
-                // What has no inverse is flat, and has no normals
-                let placements = placements.filter(|m| m.is_finite() && m.matrix3.determinant() != 0.0);
-                match poses.iter_mut().find(|(p, _)| *p == pose) {
-                    Some((_, all)) => all.extend(placements),
-                    None => poses.push((pose, placements.collect())),
-                }
+        let mut skins = Skins::new(self.document, nodes);
+        for (place, users) in meshes.items().zip(users) {
+            // In the order of the nodes
+            let (mut poses, mut indices): (Vec<(Pose, Vec<u32>)>, HashMap<PoseKey, usize>) = Default::default();
+            for i in users {
+                let node = &nodes[i as usize];
+                let of_node = node.place(self.document);
+                instances(self.document, &of_node)?;
+                let pose = Pose::of(&place, node, &of_node, &mut skins)?;
+                let index = *indices.entry(pose.key()).or_insert_with(|| {
+                    poses.push((pose, Vec::new()));
+                    poses.len() - 1
+                });
+                poses[index].1.push(i);
             }
-            for (pose, placements) in poses.iter().filter(|(_, placements)| !placements.is_empty()) {
-                self.add_mesh(place, pose, placements, files, messages)?;
+            for (pose, users) in &poses {
+                self.add_mesh(&place, pose, (nodes, users), files, messages)?;
             }
         }
         Ok(())
     }
 
-    /// Primitives that stand once, or that emit, are placed in world space; others are a group with instances.
+    /// Primitives that stand once, that emit, or that are flattened, are placed in world space; others are a group with
+    /// instances, whose placements have inverses.
     fn add_mesh(
         &mut self,
         place: &Place<'a>,
         pose: &Pose,
-        placements: &[Affine3A],
+        (nodes, users): (&[Node], &[u32]),
         files: &FileCache,
         messages: &mut Messages<'_>,
     ) -> Result<(), GltfError> {
         let name = place.key("name").text().unwrap_or("mesh").to_owned();
+        let document = self.document;
+        let placements = || users.iter().flat_map(move |&i| placements(document, &nodes[i as usize], pose));
+        let (mut count, mut invertible) = (0, 0);
+        for m in placements() {
+            (count, invertible) = (count + 1, invertible + usize::from(has_inverse(&m)));
+        }
+        if count == 0 {
+            return Ok(());
+        }
         let mut group = Vec::new();
         for place in place.key("primitives").items() {
-            let Some(Primitive { mesh, material }) = primitive(self.document, &place, pose, messages)? else {
+            let Some(Primitive { mut mesh, material }) = primitive(self.document, &place, pose, messages)? else {
                 continue;
             };
             let looks = &self.materials.looks;
             let look = looks[material.unwrap_or(looks.len() - 1).min(looks.len() - 1)].clone();
-            if placements.len() > 1 && look.emission.is_black() {
+            mesh.tangents_along_second = look.tangents_along_second;
+            let is_instanced = invertible > 1 && look.emission.is_black();
+            if is_instanced && invertible == count {
                 group.push(self.add_geometry(mesh, &look, &name));
                 continue;
             }
-            for m in placements {
-                let id = self.add_geometry(placed(&mesh, m).map_err(|e| place.error(e))?, &look, &name);
+            if is_instanced {
+                group.push(self.add_geometry(mesh.clone(), &look, &name));
+            }
+            for m in placements().filter(|m| !is_instanced || !has_inverse(m)) {
+                let id = self.add_geometry(mesh.transformed(&m), &look, &name);
                 self.set.root.geometries.push(id);
                 self.add_emission(id, &look, files, messages);
             }
@@ -216,8 +229,8 @@ impl<'a> Assembly<'a> {
         if !group.is_empty() {
             let id = self.set.groups.len() as u32;
             self.set.groups.push(Group { geometries: group });
-            let instance = |m: &Affine3A| Instance { group: id, world_from_group: vec![*m] };
-            self.set.instances.extend(placements.iter().map(instance));
+            let instance = |m: Affine3A| Instance { group: id, world_from_group: vec![m] };
+            self.set.instances.extend(placements().filter(has_inverse).map(instance));
         }
         Ok(())
     }
@@ -244,7 +257,7 @@ impl<'a> Assembly<'a> {
         }
         let image = look.emission_image.as_ref().and_then(|source| {
             let read = || emission_image(source, files, messages);
-            self.emission_images.entry(look.material).or_insert_with(read).clone()
+            self.emission_images.entry(source.key()).or_insert_with(read).clone()
         });
         let (two_sided, has_vertex_colors) = (look.is_double_sided, look.emits_vertex_colors);
         let emission = Emission { two_sided, image, has_vertex_colors, ..Emission::constant(look.emission) };
@@ -252,8 +265,8 @@ impl<'a> Assembly<'a> {
     }
 
     /// `KHR_lights_punctual`: lights shine along −z.
-    fn add_light(&mut self, node: &Node<'a>, messages: &mut Messages<'_>) {
-        let light = node.place.extension("KHR_lights_punctual").key("light").index();
+    fn add_light(&mut self, node: &Node, messages: &mut Messages<'_>) {
+        let light = node.place(self.document).extension("KHR_lights_punctual").key("light").index();
         let Some(index) = light.filter(|_| node.is_visible) else { return };
         let light = self.document.root().extension("KHR_lights_punctual").key("lights").item(index);
         let color = Rgb::from_array(light.key("color").numbers().unwrap_or([1.0; 3])).map(|c| c.max(0.0));
@@ -279,6 +292,20 @@ impl<'a> Assembly<'a> {
             _ => self.lights.push(Light::Point { p, intensity }),
         }
     }
+}
+
+/// Where a node has its mesh in a pose, as far as that is finite. They are computed anew wherever they are needed: a scene
+/// of 10⁶ nodes needs the memory for other things.
+fn placements<'n>(document: &Document, node: &'n Node, pose: &Pose) -> impl Iterator<Item = Affine3A> + use<'n> {
+    let world_from_node = if pose.is_skinned() { Affine3A::IDENTITY } else { node.world_from_node };
+    // What is wrong with them was said before
+    let within = instances(document, &node.place(document)).unwrap_or_default();
+    within.into_iter().map(move |m| world_from_node * m).filter(Affine3A::is_finite)
+}
+
+/// False for what makes everything flat, or thinner than f32 can invert.
+fn has_inverse(m: &Affine3A) -> bool {
+    m.matrix3.determinant() != 0.0 && m.inverse().is_finite()
 }
 
 /// All lights, those of surfaces last.
@@ -307,8 +334,8 @@ fn emission_image(
     let image =
         files.rgb(&source.path).map_err(|error| report(&error, &source.path, source.span, messages.diagnostics));
     let (texels, [width, height]) = Arc::unwrap_or_clone(image.ok()?);
-    let image = EmissionImage::new(width, height, texels).ok()?;
-    Some(Arc::new(image.placed(source.wrap, source.mapping)))
+    let image = EmissionImage::new(width, height, texels).ok()?.placed(source.wrap, source.mapping);
+    Some(Arc::new(if source.filter == Filter::Point { image.nearest() } else { image }))
 }
 
 /// An environment by an image, whose z becomes the y of the scene. Its middle is in direction +x, and it is seen as it

@@ -6,7 +6,7 @@ use crate::import::images::{ImageChannels, ImageEncoding};
 use crate::materials::principled::{Anisotropy, AnisotropyDirection};
 use crate::materials::{Dispersion, Material, MaterialEntry, MaterialId, NormalMap, PrincipledMaterial};
 use crate::media::Homogeneous;
-use crate::textures::{FloatTexture, FloatTextureId, ImageTexture, RgbTexture, RgbTextureId};
+use crate::textures::{FloatTexture, FloatTextureId, ImageTexture, Mapping2d, RgbTexture, RgbTextureId};
 use lumiris_formats::gltf::{Document, GltfError, Place};
 use lumiris_formats::spectra::Spectrum;
 use lumiris_numbers::math::Rgb;
@@ -24,6 +24,8 @@ pub(super) struct Look {
     /// True if the colours of the vertices are a factor of it.
     pub emits_vertex_colors: bool,
     pub is_double_sided: bool,
+    /// True if a normal map has the second texture coordinates, which then have the tangents as well.
+    pub tangents_along_second: bool,
     /// What absorbs light inside.
     pub interior: Option<Homogeneous>,
 }
@@ -68,9 +70,8 @@ impl<'a> Materials<'a> {
 
     /// Understands all materials, and the one of primitives without a material as the last.
     pub(super) fn read(&mut self, messages: &mut Messages<'_>) -> Result<(), GltfError> {
-        let mut places = self.document.root().key("materials").items();
-        places.push(self.document.root().key("default material"));
-        for place in places {
+        let root = self.document.root();
+        for place in root.key("materials").items().chain([root.key("default material")]) {
             let look = self.look(&place, messages)?;
             self.looks.push(look);
         }
@@ -107,6 +108,8 @@ impl<'a> Materials<'a> {
         let normal = place.key("normalTexture");
         let strength = normal.key("scale").number().unwrap_or(1.0);
         let normal_map = self.textures.image(&normal, ImageChannels::Color, ImageEncoding::Linear, messages)?;
+        let is_second = |map: &ImageTexture| matches!(map.mapping, Mapping2d::Affine { second: true, .. });
+        let tangents_along_second = normal_map.as_ref().is_some_and(is_second);
         let normal_map = normal_map.map(|image| NormalMap { image, strength, is_along_v: true });
         let name = place.key("name").text().unwrap_or("default").to_owned();
         let dispersion = if is_unlit { None } else { dispersion(place) };
@@ -121,6 +124,7 @@ impl<'a> Materials<'a> {
             emission_image,
             emits_vertex_colors: is_unlit,
             is_double_sided: place.key("doubleSided").is_true(),
+            tangents_along_second,
             interior: absorption(place),
         })
     }
@@ -148,7 +152,7 @@ impl<'a> Materials<'a> {
         let mut number = |place: &Place<'a>, key: &str, default: f32, texture: &Place<'a>, channel: usize| {
             t.scaled(factor(&place.key(key), default), texture, channel, messages)
         };
-        let of_coat = |key: &str| coat.key(key);
+        let of_coat = |key: &'static str| coat.key(key);
         let mut material = PrincipledMaterial {
             base_color,
             metalness: number(&pbr, "metallicFactor", 1.0, &packed, 2)?,

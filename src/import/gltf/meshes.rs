@@ -2,9 +2,10 @@
 
 use super::Messages;
 use super::pose::{Pose, Vertices};
+use super::vertices::InUse;
 use crate::geometry::TriangleMesh;
 use lumiris_formats::gltf::{Document, GltfError, Place};
-use lumiris_numbers::math::{Affine3A, Vec2, Vec3};
+use lumiris_numbers::math::{Vec2, Vec3};
 
 /// A primitive in the space of its mesh.
 pub(super) struct Primitive {
@@ -30,50 +31,36 @@ pub(super) fn primitive(
         messages.warning(&attributes, "without POSITION there is nothing to render");
         return Ok(None);
     };
-    let count = document.accessor(positions)?.count();
-    let mut vertices = Vertices {
-        positions: vectors(document, &attributes.key("POSITION"), count)?,
-        normals: vectors(document, &attributes.key("NORMAL"), count)?,
-        tangents: vectors(document, &attributes.key("TANGENT"), count)?,
-    };
-    pose.bend(document, place, &mut vertices, messages)?;
-    let Vertices { positions, normals, tangents } = vertices;
-    if let Some(i) = positions.iter().position(|p| !p.is_finite()) {
-        return Err(attributes.key("POSITION").error(format!("vertex {i} is not finite")));
-    }
+    let count = document.open(positions)?.count();
     let indices = match place.key("indices").index() {
         Some(index) => document.accessor(index)?.values.iter().map(|&v| v as u32).collect(),
         None => (0..count as u32).collect::<Vec<u32>>(),
     };
-    let triangles = triangles(&indices, mode);
+    let mut triangles = triangles(&indices, mode);
+    let in_use = InUse::of(count, &mut triangles, &place.key("indices"))?;
+    let read = |name| in_use.read::<3>(document, &attributes.key(name), 0.0);
+    let vectors = |values: Vec<[f32; 3]>| values.into_iter().map(Vec3::from).collect::<Vec<_>>();
+    let tangents = in_use.read::<4>(document, &attributes.key("TANGENT"), 1.0)?;
+    let mut vertices = Vertices {
+        positions: vectors(read("POSITION")?),
+        normals: vectors(read("NORMAL")?),
+        tangents: tangents.iter().map(|&[x, y, z, _]| Vec3::new(x, y, z)).collect(),
+    };
+    pose.bend(document, place, &in_use, &mut vertices, messages)?;
+    let Vertices { positions, normals, tangents: moved } = vertices;
+    if let Some(i) = positions.iter().position(|p| !p.is_finite()) {
+        return Err(attributes.key("POSITION").error(format!("vertex {} is not finite", in_use.vertex(i))));
+    }
     let mut mesh = TriangleMesh::new(positions, triangles).map_err(|message| place.key("indices").error(message))?;
-    let uvs = |name: &str| -> Result<Vec<Vec2>, GltfError> {
-        let uvs = per_vertex::<2>(document, &attributes.key(name), count, 0.0)?;
+    let uvs = |name| -> Result<Vec<Vec2>, GltfError> {
+        let uvs = in_use.read::<2>(document, &attributes.key(name), 0.0)?;
         Ok(uvs.into_iter().map(|[u, v]| Vec2::new(u, 1.0 - v)).collect())
     };
     (mesh.uvs, mesh.uvs1) = (uvs("TEXCOORD_0")?, uvs("TEXCOORD_1")?);
-    (mesh.normals, mesh.tangents) = (normals, tangents);
-    mesh.colors = per_vertex(document, &attributes.key("COLOR_0"), count, 1.0)?;
+    (mesh.normals, mesh.tangents) = (normals, moved);
+    mesh.tangent_signs = tangents.iter().map(|&[.., w]| if w < 0.0 { -1 } else { 1 }).collect();
+    mesh.colors = in_use.read(document, &attributes.key("COLOR_0"), 1.0)?;
     Ok(Some(Primitive { mesh, material: place.key("material").index() }))
-}
-
-/// Elements of an attribute, one per vertex, or none if it is not there.
-fn per_vertex<const N: usize>(
-    document: &Document,
-    place: &Place<'_>,
-    count: usize,
-    fill: f32,
-) -> Result<Vec<[f32; N]>, GltfError> {
-    let Some(index) = place.index() else { return Ok(Vec::new()) };
-    let elements = document.accessor(index)?.elements::<N>(fill);
-    if let Some(i) = elements.iter().position(|e| e.iter().any(|x| !x.is_finite())) {
-        return Err(place.error(format!("vertex {i} is not finite")));
-    }
-    if elements.len() == count { Ok(elements) } else { Err(place.error("has not one element per vertex")) }
-}
-
-fn vectors(document: &Document, place: &Place<'_>, count: usize) -> Result<Vec<Vec3>, GltfError> {
-    Ok(per_vertex::<3>(document, place, count, 0.0)?.into_iter().map(Vec3::from).collect())
 }
 
 /// Corners of a list, a strip or a fan.
@@ -87,16 +74,4 @@ fn triangles(indices: &[u32], mode: usize) -> Vec<[u32; 3]> {
         6 => indices.get(1..).unwrap_or_default().windows(2).map(|w| [indices[0], w[0], w[1]]).collect(),
         _ => indices.as_chunks::<3>().0.to_vec(),
     }
-}
-
-/// The mesh placed by a transformation.
-pub(super) fn placed(mesh: &TriangleMesh, m: &Affine3A) -> Result<TriangleMesh, String> {
-    let positions = mesh.positions().iter().map(|&p| m.transform_point3(p)).collect();
-    let mut out = TriangleMesh::new(positions, mesh.indices.clone())?;
-    let normal = |&n: &Vec3| lumiris_numbers::math::transform::transform_normal(m, n);
-    out.normals = mesh.normals.iter().map(normal).collect();
-    out.tangents = mesh.tangents.iter().map(|&t| m.transform_vector3(t)).collect();
-    (out.uvs, out.uvs1, out.colors) = (mesh.uvs.clone(), mesh.uvs1.clone(), mesh.colors.clone());
-    out.flip_normal = m.matrix3.determinant() < 0.0;
-    Ok(out)
 }

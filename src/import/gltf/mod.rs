@@ -1,7 +1,8 @@
 //! glTF 2.0 scenes. Light of 1 cd/m² is taken for a radiance of 1 where surfaces emit; what lights in candela and lux are
 //! beside it, [`LightUnits`] says. Single-sided surfaces are rendered from both sides.
 //!
-//! Reading order: [`choice`], [`textures`], [`materials`], [`animation`], [`nodes`], [`pose`], [`meshes`], [`view`],
+//! Reading order: [`choice`], [`textures`], [`materials`], [`animation`], [`nodes`], [`vertices`], [`pose`],
+//! [`meshes`], [`view`],
 //! [`assemble`].
 
 mod animation;
@@ -12,6 +13,7 @@ mod meshes;
 mod nodes;
 mod pose;
 mod textures;
+mod vertices;
 mod view;
 
 use super::cache::FileCache;
@@ -23,7 +25,7 @@ use lumiris_formats::diagnostic::{Diagnostics, Report};
 use lumiris_formats::gltf::document::Unread;
 use lumiris_formats::gltf::{Document, GltfError, Place, locate, locate_members};
 use lumiris_formats::source::{FileId, SourceMap, Span};
-use std::collections::BTreeSet;
+use std::collections::{BTreeSet, HashMap};
 use std::ops::Range;
 use std::path::Path;
 use strum::{EnumString, IntoStaticStr, VariantNames};
@@ -80,8 +82,8 @@ struct Messages<'d> {
     diagnostics: &'d mut Diagnostics,
     file: FileId,
     bytes: &'d [u8],
-    /// Where images are named, once that is asked for.
-    images: Option<Vec<Span>>,
+    /// Where images and buffers are named, once that is asked for.
+    named: HashMap<&'static str, Vec<Span>>,
     warned: BTreeSet<String>,
 }
 
@@ -91,13 +93,13 @@ impl Messages<'_> {
         Span { file: self.file, start: start as u32, end: end as u32 }
     }
 
-    /// Where an image is named.
-    fn image_span(&mut self, index: usize) -> Span {
+    /// Where the file of an element of `images` or `buffers` is named.
+    fn file_span(&mut self, array: &'static str, index: usize) -> Span {
         let (file, bytes) = (self.file, self.bytes);
         let span = |Range { start, end }| Span { file, start: start as u32, end: end as u32 };
-        let all = || locate_members(bytes, "images", "uri").into_iter().map(span).collect();
-        let images: &mut Vec<Span> = self.images.get_or_insert_with(all);
-        images.get(index).copied().unwrap_or(Span { file, start: 0, end: 0 })
+        let all = || locate_members(bytes, array, "uri").into_iter().map(span).collect();
+        let spans = self.named.entry(array).or_insert_with(all);
+        spans.get(index).copied().unwrap_or(Span { file, start: 0, end: 0 })
     }
 
     fn error(&mut self, error: &GltfError) {
@@ -108,8 +110,8 @@ impl Messages<'_> {
     fn unread(&mut self, buffers: &[Unread]) {
         for buffer in buffers {
             match buffer {
-                Unread::File { place, path, reason } => {
-                    let span = self.span_of(place);
+                Unread::File { buffer, path, reason } => {
+                    let span = self.file_span("buffers", *buffer);
                     self.diagnostics.missing_file(path, reason, Some(span));
                 }
                 Unread::Content(error) => self.error(error),
@@ -120,8 +122,9 @@ impl Messages<'_> {
     /// A warning, given for the first place only.
     fn warning(&mut self, place: &Place<'_>, message: &str) {
         if self.warned.insert(message.to_owned()) {
-            let span = self.span_of(&place.path);
-            self.diagnostics.warning(span, message).remark(place.path.as_str());
+            let path = place.path();
+            let span = self.span_of(&path);
+            self.diagnostics.warning(span, message).remark(path);
         }
     }
 }
@@ -138,7 +141,7 @@ pub fn load(path: &Path, options: &LoadOptions, files: &FileCache) -> Result<Loa
     };
     let bytes = sources.shared_bytes(file);
     let mut messages =
-        Messages { diagnostics: &mut diagnostics, file, bytes: &bytes, images: None, warned: BTreeSet::new() };
+        Messages { diagnostics: &mut diagnostics, file, bytes: &bytes, named: HashMap::new(), warned: BTreeSet::new() };
     let folder = path.parent().unwrap_or(Path::new(""));
     let mut others = Vec::new();
     let scene = match Document::parse(&bytes, folder, KNOWN) {

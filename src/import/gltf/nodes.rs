@@ -7,8 +7,7 @@ use lumiris_numbers::math::{Affine3A, Vec3};
 use std::collections::HashSet;
 
 /// A node of the scene with its placement.
-pub(super) struct Node<'a> {
-    pub place: Place<'a>,
+pub(super) struct Node {
     /// Index of the node.
     pub index: usize,
     /// Index of its mesh, if it is seen.
@@ -20,26 +19,29 @@ pub(super) struct Node<'a> {
     pub weights: Option<Vec<f32>>,
 }
 
+impl Node {
+    /// Where the file has it.
+    pub(super) fn place<'d>(&self, document: &'d Document) -> Place<'d> {
+        document.root().key("nodes").item(self.index)
+    }
+}
+
 /// All nodes of a scene, parents first, with what animations change; of all without parents if there is no such scene. A node
 /// that is met twice is an error, so that no tree is endless.
-pub(super) fn nodes<'d>(
-    document: &'d Document,
-    scene: &Place<'d>,
-    changes: &Changes,
-) -> Result<Vec<Node<'d>>, GltfError> {
+pub(super) fn nodes<'d>(document: &'d Document, scene: &Place<'d>, changes: &Changes) -> Result<Vec<Node>, GltfError> {
     let all = document.root().key("nodes");
-    let count = all.items().len();
+    let count = all.len();
     let at_root = |i| (i, Affine3A::IDENTITY, true);
     let mut open: Vec<(usize, Affine3A, bool)> = if scene.exists() {
-        scene.key("nodes").items().iter().filter_map(Place::index).map(at_root).collect()
+        scene.key("nodes").items().filter_map(|root| root.index()).map(at_root).collect()
     } else {
         let children: HashSet<usize> =
-            all.items().iter().flat_map(|n| n.key("children").items()).filter_map(|child| child.index()).collect();
+            all.items().flat_map(|n| n.key("children").items()).filter_map(|child| child.index()).collect();
         (0..count).filter(|i| !children.contains(i)).map(at_root).collect()
     };
     open.reverse();
     let mut is_met = vec![false; count];
-    let mut nodes = Vec::new();
+    let mut nodes = Vec::with_capacity(count);
     while let Some((index, parent, is_parent_visible)) = open.pop() {
         let place = all.item(index);
         match is_met.get_mut(index) {
@@ -51,10 +53,10 @@ pub(super) fn nodes<'d>(
         let world_from_node = parent * transform(&place, &change);
         let is_hidden = place.extension("KHR_node_visibility").key("visible").flag() == Some(false);
         let is_visible = is_parent_visible && !is_hidden;
-        let children = place.key("children").items();
-        open.extend(children.iter().rev().filter_map(Place::index).map(|i| (i, world_from_node, is_visible)));
+        let children = place.key("children").items().rev().filter_map(|child| child.index());
+        open.extend(children.map(|i| (i, world_from_node, is_visible)));
         let mesh = place.key("mesh").index().filter(|_| is_visible);
-        nodes.push(Node { mesh, is_visible, place, index, world_from_node, weights: change.weights });
+        nodes.push(Node { mesh, is_visible, index, world_from_node, weights: change.weights });
     }
     Ok(nodes)
 }

@@ -3,18 +3,69 @@
 
 use super::Messages;
 use super::nodes::Node;
+use super::vertices::InUse;
 use glam::Mat4;
 use lumiris_formats::gltf::{Document, GltfError, Place};
 use lumiris_numbers::math::transform::transform_normal;
 use lumiris_numbers::math::{Affine3A, Vec3};
+use std::collections::HashMap;
+use std::sync::Arc;
 
 /// How a mesh is bent.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct Pose {
     /// Weights of the morph targets.
     weights: Vec<f32>,
+    /// The skin, and world from mesh by each of its joints.
+    skin: Option<(usize, Arc<[Affine3A]>)>,
+}
+
+/// Poses of a mesh with equal keys are the same: bits of the weights, and the skin.
+pub(super) type PoseKey = (Vec<u32>, Option<usize>);
+
+/// The joints of skins as they stand, each skin once: many meshes may have the same.
+pub(super) struct Skins<'a> {
+    document: &'a Document,
+    nodes: &'a [Node],
+    /// By index of the node in the file.
+    in_scene: HashMap<usize, usize>,
+    joints: HashMap<usize, Arc<[Affine3A]>>,
+}
+
+impl<'a> Skins<'a> {
+    /// The skins of a scene of these nodes.
+    pub(super) fn new(document: &'a Document, nodes: &'a [Node]) -> Self {
+        let has_skins = !document.root().key("skins").is_empty();
+        let in_scene = nodes.iter().enumerate().filter(|_| has_skins).map(|(i, node)| (node.index, i)).collect();
+        Skins { document, nodes, in_scene, joints: HashMap::new() }
+    }
+
     /// World from mesh by each joint.
-    joints: Option<Vec<Affine3A>>,
+    fn joints(&mut self, index: usize) -> Result<Arc<[Affine3A]>, GltfError> {
+        if let Some(joints) = self.joints.get(&index) {
+            return Ok(Arc::clone(joints));
+        }
+        let skin = self.document.root().key("skins").item(index);
+        let inverses = match skin.key("inverseBindMatrices").index() {
+            Some(index) => self.document.accessor(index)?.elements::<16>(0.0),
+            None => Vec::new(),
+        };
+        let mut joints = Vec::new();
+        for (i, place) in skin.key("joints").items().enumerate() {
+            let Some(&joint) = place.index().and_then(|joint| self.in_scene.get(&joint)) else {
+                return Err(place.error("the joint is not in the scene"));
+            };
+            let inverse = match inverses.get(i) {
+                Some(m) => Affine3A::from_mat4(Mat4::from_cols_array(m)),
+                None if inverses.is_empty() => Affine3A::IDENTITY,
+                None => return Err(skin.key("inverseBindMatrices").error("has not one matrix per joint")),
+            };
+            joints.push(self.nodes[joint].world_from_node * inverse);
+        }
+        let joints: Arc<[Affine3A]> = joints.into();
+        self.joints.insert(index, Arc::clone(&joints));
+        Ok(joints)
+    }
 }
 
 /// Vertices of a primitive.
@@ -25,44 +76,33 @@ pub(super) struct Vertices {
 }
 
 fn weights(place: &Place<'_>) -> Option<Vec<f32>> {
-    place.exists().then(|| place.items().iter().map(|w| w.number().unwrap_or(0.0)).collect())
+    place.exists().then(|| place.items().map(|w| w.number().unwrap_or(0.0)).collect())
 }
 
 impl Pose {
-    /// The pose of a mesh at a node.
+    /// The pose of a mesh at a node, which is at `of_node` in the file.
     pub(super) fn of(
-        document: &Document,
         mesh: &Place<'_>,
-        node: &Node<'_>,
-        nodes: &[Node<'_>],
+        node: &Node,
+        of_node: &Place<'_>,
+        skins: &mut Skins<'_>,
     ) -> Result<Self, GltfError> {
-        let of_node = || weights(&node.place.key("weights"));
+        let by_node = || weights(&of_node.key("weights"));
         let weights =
-            node.weights.clone().or_else(of_node).or_else(|| weights(&mesh.key("weights"))).unwrap_or_default();
-        let Some(skin) = node.place.key("skin").index() else { return Ok(Pose { weights, joints: None }) };
-        let skin = document.root().key("skins").item(skin);
-        let inverses = match skin.key("inverseBindMatrices").index() {
-            Some(index) => document.accessor(index)?.elements::<16>(0.0),
-            None => Vec::new(),
-        };
-        let mut joints = Vec::new();
-        for (i, place) in skin.key("joints").items().iter().enumerate() {
-            let Some(joint) = nodes.iter().find(|n| Some(n.index) == place.index()) else {
-                return Err(place.error("the joint is not in the scene"));
-            };
-            let inverse = match inverses.get(i) {
-                Some(m) => Affine3A::from_mat4(Mat4::from_cols_array(m)),
-                None if inverses.is_empty() => Affine3A::IDENTITY,
-                None => return Err(skin.key("inverseBindMatrices").error("has not one matrix per joint")),
-            };
-            joints.push(joint.world_from_node * inverse);
-        }
-        Ok(Pose { weights, joints: Some(joints) })
+            node.weights.clone().or_else(by_node).or_else(|| weights(&mesh.key("weights"))).unwrap_or_default();
+        let skin = of_node.key("skin").index();
+        let skin = skin.map(|skin| Ok((skin, skins.joints(skin)?))).transpose()?;
+        Ok(Pose { weights, skin })
+    }
+
+    /// What tells it from other poses of the mesh.
+    pub(super) fn key(&self) -> PoseKey {
+        (self.weights.iter().map(|w| w.to_bits()).collect(), self.skin.as_ref().map(|(skin, _)| *skin))
     }
 
     /// True if vertices become points of the world, whatever the transformation of their node.
     pub(super) fn is_skinned(&self) -> bool {
-        self.joints.is_some()
+        self.skin.is_some()
     }
 
     /// Bends the vertices of a primitive.
@@ -70,37 +110,40 @@ impl Pose {
         &self,
         document: &Document,
         primitive: &Place<'_>,
+        in_use: &InUse,
         vertices: &mut Vertices,
         messages: &mut Messages<'_>,
     ) -> Result<(), GltfError> {
-        for (target, &weight) in primitive.key("targets").items().iter().zip(&self.weights).filter(|(_, w)| **w != 0.0)
-        {
+        for (target, &weight) in primitive.key("targets").items().zip(&self.weights).filter(|(_, w)| **w != 0.0) {
             let parts = [
                 ("POSITION", &mut vertices.positions),
                 ("NORMAL", &mut vertices.normals),
                 ("TANGENT", &mut vertices.tangents),
             ];
             for (name, values) in parts {
-                add_target(document, &target.key(name), weight, values)?;
+                add_target(document, &target.key(name), (in_use, weight), values)?;
             }
-            if target.names().iter().any(|name| name.starts_with("TEXCOORD") || name.starts_with("COLOR")) {
-                messages.warning(target, "morph targets move vertices, not their colours and texture coordinates");
+            if target.members().any(|(name, _)| name.starts_with("TEXCOORD") || name.starts_with("COLOR")) {
+                messages.warning(&target, "morph targets move vertices, not their colours and texture coordinates");
             }
         }
-        match &self.joints {
-            Some(joints) => skin(document, &primitive.key("attributes"), joints, vertices),
+        match &self.skin {
+            Some((_, joints)) => skin(document, &primitive.key("attributes"), (in_use, joints), vertices),
             None => Ok(()),
         }
     }
 }
 
-fn add_target(document: &Document, place: &Place<'_>, weight: f32, values: &mut [Vec3]) -> Result<(), GltfError> {
-    let Some(index) = place.index().filter(|_| !values.is_empty()) else { return Ok(()) };
-    let changes = document.accessor(index)?.elements::<3>(0.0);
-    if changes.len() != values.len() {
-        return Err(place.error("has not one element per vertex"));
+fn add_target(
+    document: &Document,
+    place: &Place<'_>,
+    (in_use, weight): (&InUse, f32),
+    values: &mut [Vec3],
+) -> Result<(), GltfError> {
+    if values.is_empty() {
+        return Ok(());
     }
-    for (value, change) in values.iter_mut().zip(changes) {
+    for (value, change) in values.iter_mut().zip(in_use.read::<3>(document, place, 0.0)?) {
         *value += Vec3::from(change) * weight;
     }
     Ok(())
@@ -110,23 +153,20 @@ fn add_target(document: &Document, place: &Place<'_>, weight: f32, values: &mut 
 fn skin(
     document: &Document,
     attributes: &Place<'_>,
-    joints: &[Affine3A],
+    (in_use, joints): (&InUse, &[Affine3A]),
     vertices: &mut Vertices,
 ) -> Result<(), GltfError> {
-    let count = vertices.positions.len();
-    let mut sums = vec![(Mat4::ZERO, 0.0_f32); count];
+    let mut sums = vec![(Mat4::ZERO, 0.0_f32); vertices.positions.len()];
     for set in 0.. {
-        let [of_joints, of_weights] = ["JOINTS", "WEIGHTS"].map(|name| attributes.key(&format!("{name}_{set}")));
-        let (Some(indices), Some(weights)) = (of_joints.index(), of_weights.index()) else { break };
+        let attribute = |name: &str| attributes.members().find(|(other, _)| *other == format!("{name}_{set}"));
+        let (Some((_, of_joints)), Some((_, of_weights))) = (attribute("JOINTS"), attribute("WEIGHTS")) else { break };
         let (indices, weights) =
-            (document.accessor(indices)?.elements::<4>(0.0), document.accessor(weights)?.elements::<4>(0.0));
-        if indices.len() != count || weights.len() != count {
-            return Err(of_joints.error("has not one element per vertex"));
-        }
+            (in_use.read::<4>(document, &of_joints, 0.0)?, in_use.read::<4>(document, &of_weights, 0.0)?);
         for (i, (sum, total)) in sums.iter_mut().enumerate() {
             for (&joint, &weight) in indices[i].iter().zip(&weights[i]).filter(|(_, w)| **w > 0.0) {
                 let Some(joint) = joints.get(joint as usize) else {
-                    return Err(of_joints.error(format!("vertex {i} refers to joint {joint}, of {}", joints.len())));
+                    let (i, count) = (in_use.vertex(i), joints.len());
+                    return Err(of_joints.error(format!("vertex {i} refers to joint {joint}, of {count}")));
                 };
                 *sum += Mat4::from(*joint) * weight;
                 *total += weight;

@@ -14,23 +14,42 @@ use lumiris_formats::gltf::{Document, GltfError, Place};
 use lumiris_formats::output::Temporary;
 use lumiris_formats::source::Span;
 use lumiris_numbers::math::{Rgb, Vec2};
+use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
 /// An image that a material emits.
 #[derive(Clone, Debug)]
 pub(super) struct EmissionSource {
+    /// Index of the texture, which has an image and a sampler.
+    pub texture: usize,
     pub path: PathBuf,
     /// Where the file names it.
     pub span: Span,
     pub wrap: [AxisWrap; 2],
+    pub filter: Filter,
     pub mapping: Option<EmissionMapping>,
 }
+
+/// Images of sources with equal keys are the same: the texture, and the bits of its mapping.
+pub(super) type EmissionKey = (usize, Option<(bool, [u32; 6])>);
+
+impl EmissionSource {
+    pub(super) fn key(&self) -> EmissionKey {
+        let bits = |m: &EmissionMapping| (m.second, m.image_from_uv.to_cols_array().map(f32::to_bits));
+        (self.texture, self.mapping.as_ref().map(bits))
+    }
+}
+
+/// The file of an image, and where it is named.
+type ImageFile = Option<(PathBuf, Span)>;
 
 /// Textures while a scene is read.
 pub(super) struct Textures<'a> {
     document: &'a Document,
     pub set: TextureSet,
     pub resources: Resources,
+    /// By index of the image: many textures may have one.
+    image_files: HashMap<usize, ImageFile>,
     /// Holds images that are in the document.
     folder: tempfile::TempDir,
     _temporary: Temporary,
@@ -39,9 +58,9 @@ pub(super) struct Textures<'a> {
 impl<'a> Textures<'a> {
     pub(super) fn new(document: &'a Document) -> std::io::Result<Self> {
         let (set, resources) = (TextureSet::default(), Resources::default());
-        let folder = tempfile::tempdir()?;
+        let (image_files, folder) = (HashMap::new(), tempfile::tempdir()?);
         let _temporary = Temporary::new(folder.path());
-        Ok(Textures { document, set, resources, folder, _temporary })
+        Ok(Textures { document, set, resources, image_files, folder, _temporary })
     }
 
     pub(super) fn float(&mut self, value: f32) -> FloatTextureId {
@@ -90,26 +109,34 @@ impl<'a> Textures<'a> {
         })
     }
 
-    /// The file of a texture, and where it is named; an image of the document becomes one.
-    fn file(&self, place: &Place<'a>, messages: &mut Messages<'_>) -> Result<Option<(PathBuf, Span)>, GltfError> {
+    /// The file of a texture.
+    fn file(&mut self, place: &Place<'a>, messages: &mut Messages<'_>) -> Result<ImageFile, GltfError> {
         let Some(index) = place.key("index").index() else { return Ok(None) };
         let texture = self.document.root().key("textures").item(index);
         let Some(source) = texture.key("source").index() else {
             messages.warning(&texture, "a texture without an image in PNG or JPEG is left out");
             return Ok(None);
         };
+        if let Some(file) = self.image_files.get(&source) {
+            return Ok(file.clone());
+        }
+        let file = self.image_file(source, messages)?;
+        self.image_files.insert(source, file.clone());
+        Ok(file)
+    }
+
+    /// The file of an image; one in the document becomes a file.
+    fn image_file(&self, source: usize, messages: &mut Messages<'_>) -> Result<ImageFile, GltfError> {
         let image = self.document.root().key("images").item(source);
         let bytes = match self.document.content(&image)? {
-            Content::File(path) => return Ok(Some((path, messages.image_span(source)))),
+            Content::File(path) => return Ok(Some((path, messages.file_span("images", source)))),
             Content::Bytes(bytes) => bytes,
             Content::Unread => return Ok(None),
         };
         let extension = if bytes.starts_with(&[0xff, 0xd8]) { "jpg" } else { "png" };
         let path = self.folder.path().join(format!("image{source}.{extension}"));
-        if !path.exists() {
-            std::fs::write(&path, bytes).map_err(|e| image.error(e.to_string()))?;
-        }
-        Ok(Some((path, messages.image_span(source))))
+        std::fs::write(&path, bytes).map_err(|e| image.error(e.to_string()))?;
+        Ok(Some((path, messages.file_span("images", source))))
     }
 
     /// How an image goes on beyond its edges, along its rows and columns, and how it is filtered.
@@ -129,15 +156,18 @@ impl<'a> Textures<'a> {
 
     /// An image that is emitted.
     pub(super) fn emission(
-        &self,
+        &mut self,
         place: &Place<'a>,
         messages: &mut Messages<'_>,
     ) -> Result<Option<EmissionSource>, GltfError> {
-        let Some((path, span)) = self.file(place, messages)? else { return Ok(None) };
+        let Some(((path, span), texture)) = self.file(place, messages)?.zip(place.key("index").index()) else {
+            return Ok(None);
+        };
         let (second, image_from_uv) = mapping(place, messages);
         let is_plain = !second && image_from_uv == Affine2::IDENTITY;
         let mapping = (!is_plain).then_some(EmissionMapping { second, image_from_uv });
-        Ok(Some(EmissionSource { path, span, wrap: self.sampler(place).0, mapping }))
+        let (wrap, filter) = self.sampler(place);
+        Ok(Some(EmissionSource { texture, path, span, wrap, filter, mapping }))
     }
 
     pub(super) fn image(

@@ -19,15 +19,23 @@ const AUTO_FOV: f32 = 40.0;
 const AUTO_DIRECTION: Vec3 = Vec3::new(0.5, 0.35, 0.8);
 
 /// A camera that stands in the scene.
-pub(super) type Placed<'n, 'd> = (&'n Node<'d>, Place<'d>);
+pub(super) type Placed<'n, 'd> = (&'n Node, Place<'d>);
 
 /// The cameras of the scene, in the order of its nodes, and their names: those of the nodes before their own.
-pub(super) fn cameras<'n, 'd>(document: &'d Document, nodes: &'n [Node<'d>]) -> (Vec<Placed<'n, 'd>>, Names<'d>) {
+pub(super) fn cameras<'n, 'd>(
+    document: &'d Document,
+    nodes: &'n [Node],
+    messages: &mut Messages<'_>,
+) -> (Vec<Placed<'n, 'd>>, Names<'d>) {
     let all = document.root().key("cameras");
-    let stands = |n: &&Node<'_>| n.world_from_node.is_finite() && n.world_from_node.matrix3.determinant() != 0.0;
-    let camera = |n: &'n Node<'d>| Some((n, all.item(n.place.key("camera").index()?)));
-    let placed: Vec<Placed<'n, 'd>> = nodes.iter().filter(stands).filter_map(camera).collect();
-    let names = placed.iter().map(|(node, camera)| [name_of(&node.place), name_of(camera)]).collect();
+    let stands = |n: &Node| n.world_from_node.is_finite() && n.world_from_node.matrix3.determinant() != 0.0;
+    let camera = |n: &'n Node| Some((n, all.item(n.place(document).key("camera").index()?)));
+    let mut placed: Vec<Placed<'n, 'd>> = nodes.iter().filter_map(camera).collect();
+    for (node, _) in placed.iter().filter(|(node, _)| !stands(node)) {
+        messages.warning(&node.place(document), "a camera cannot be flattened by its node: it is left out");
+    }
+    placed.retain(|(node, _)| stands(node));
+    let names = placed.iter().map(|(node, camera)| [name_of(&node.place(document)), name_of(camera)]).collect();
     (placed, names)
 }
 
@@ -92,7 +100,7 @@ fn half_size(orthographic: &Place<'_>) -> Option<[f32; 2]> {
 
 /// A camera of the file: it looks along −z; scales of its node do not count. In an image of another aspect ratio, a perspective
 /// camera keeps its angle of view upwards, and an orthographic one sees more, to the sides or upwards.
-fn of_file(node: &Node<'_>, camera: &Place<'_>, aspect: f32, resolution: [u32; 2]) -> Camera {
+fn of_file(node: &Node, camera: &Place<'_>, aspect: f32, resolution: [u32; 2]) -> Camera {
     let (_, rotation, translation) = node.world_from_node.to_scale_rotation_translation();
     let world_from_camera = Affine3A::from_scale_rotation_translation(Vec3::new(1.0, 1.0, -1.0), rotation, translation);
     let orthographic = camera.key("orthographic");

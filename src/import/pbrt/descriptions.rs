@@ -54,6 +54,8 @@ pub(super) struct LateInstance {
     /// The object that it is in.
     pub holder: Option<usize>,
     pub ctm: Ctm,
+    /// Of the directive.
+    pub span: Span,
 }
 
 /// The material of a shape: known, or by a name that may be defined later.
@@ -222,6 +224,8 @@ pub struct InstanceDesc {
     pub object: usize,
     /// Its transformation.
     pub ctm: Ctm,
+    /// Where it is placed.
+    pub span: Span,
 }
 
 /// Where the numbers of a shape come from.

@@ -4,7 +4,7 @@ use super::descriptions::{InstanceDesc, LateInstance, MaterialUse, MediumNames, 
 use super::state::Builder;
 use super::transform::{Ctm, matrix_of};
 use lumiris_formats::color_space::ColorSpace;
-use lumiris_formats::diagnostic::{Diagnostics, did_you_mean};
+use lumiris_formats::diagnostic::Diagnostics;
 use lumiris_formats::pbrt::directive::{ActiveTimes, AttributeTarget, Directive, DirectiveKind, Name};
 use lumiris_formats::pbrt::params::ParamSet;
 use lumiris_formats::pbrt::parser::Visitor;
@@ -32,10 +32,11 @@ impl Visitor for Builder<'_> {
             D::AttributeEnd => self.pop(),
             D::Attribute(target) => {
                 let defaults = params.in_color_space(self.state.color_space);
-                self.state.defaults.of(target).extend(defaults);
+                self.state.defaults.add(target, defaults);
             }
             D::Option { name, value } => self.options.option(&name, &value, diagnostics),
             D::ColorSpace(name) => self.color_space(&name, diagnostics),
+            D::Camera(_) if !self.has_inverse("a camera", span, diagnostics) => {}
             D::Camera(name) => {
                 self.coordinate_systems.insert("camera".to_owned(), self.state.ctm.inverse());
                 let place = (self.state.ctm, self.folder.as_path());
@@ -112,10 +113,10 @@ impl Builder<'_> {
         let sets = matches!(kind, DirectiveKind::Identity | DirectiveKind::Transform(_));
         let mut ctm = self.state.ctm;
         ctm.apply(self.state.active, |m| if sets { matrix } else { m * matrix });
-        if ctm.is_invertible() {
+        if ctm.is_finite() {
             self.state.ctm = ctm;
         } else {
-            diagnostics.error(span, "this transformation has no inverse");
+            diagnostics.error(span, "this transformation is not finite");
         }
     }
 
@@ -123,13 +124,8 @@ impl Builder<'_> {
         match self.coordinate_systems.get(&name.text) {
             Some(ctm) => self.state.ctm = *ctm,
             None => {
-                let message = format!("unknown coordinate system `{}`", name.text);
-                let near =
-                    did_you_mean(&name.text, self.coordinate_systems.keys().map(String::as_str)).map(str::to_owned);
-                let diagnostic = diagnostics.error(name.span, message);
-                if let Some(near) = near {
-                    diagnostic.help(format!("did you mean `{near}`?"));
-                }
+                let known = self.coordinate_systems.keys().map(String::as_str);
+                diagnostics.unknown(name.span, "coordinate system", &name.text, known);
             }
         }
     }
@@ -166,10 +162,10 @@ impl Builder<'_> {
 
     fn object_instance(&mut self, name: Name, span: Span, diagnostics: &mut Diagnostics) {
         let Some(&object) = self.object_names.get(&name.text) else {
-            self.late_instances.push(LateInstance { name, holder: self.current_object, ctm: self.state.ctm });
+            self.late_instances.push(LateInstance { name, holder: self.current_object, ctm: self.state.ctm, span });
             return;
         };
-        let instance = InstanceDesc { object, ctm: self.state.ctm };
+        let instance = InstanceDesc { object, ctm: self.state.ctm, span };
         match self.current_object {
             Some(current) if current == object => {
                 diagnostics.error(span, format!("the object `{}` cannot contain itself", name.text));
@@ -187,6 +183,6 @@ impl Builder<'_> {
     }
 
     fn with_defaults(&mut self, target: AttributeTarget, params: &mut ParamSet) {
-        params.inherit(self.state.defaults.of(target).iter());
+        params.inherit(self.state.defaults.of(target));
     }
 }

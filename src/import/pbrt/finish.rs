@@ -1,7 +1,7 @@
 //! The end of an import: reads all files in parallel, and assembles the scene in the order of its text.
 
 use super::descriptions::{AreaLightDesc, ShapeDesc};
-use super::instances::Objects;
+use super::instances::{Objects, flattened};
 use super::lights::power_factor;
 use super::measured;
 use super::media::MediaInUse;
@@ -23,6 +23,7 @@ use crate::settings::Settings;
 use crate::textures::TextureSet;
 use lumiris_formats::diagnostic::Diagnostics;
 use lumiris_formats::ply::PlyMesh;
+use lumiris_formats::source::Span;
 use lumiris_numbers::math::{Affine3A, Rgb};
 use rayon::prelude::*;
 use std::collections::{BTreeSet, HashMap};
@@ -45,6 +46,33 @@ struct Assembly {
     moving: Vec<Vec<(GroupId, Vec<Affine3A>)>>,
 }
 
+impl Assembly {
+    /// Adds the shapes of an instance without an inverse to the root.
+    fn add_flat(&mut self, instance: &Instance, span: Span, d: &mut Diagnostics) {
+        let [world_from_group] = instance.world_from_group[..] else {
+            d.error(span, "an object cannot be flattened while it moves");
+            return;
+        };
+        let mut is_flat = true;
+        for id in self.set.groups[instance.group as usize].geometries.clone() {
+            let Geometry { shape, alpha, visibility } = &self.set.geometries[id as usize];
+            let Some(shape) = flattened(shape, &world_from_group) else {
+                is_flat = false;
+                continue;
+            };
+            let geometry = Geometry { shape, alpha: *alpha, visibility: *visibility };
+            self.set.root.geometries.push(self.set.geometries.len() as GeometryId);
+            self.set.geometries.push(geometry);
+            self.surfaces.push(self.surfaces[id as usize].clone());
+        }
+        if !is_flat {
+            let message =
+                "spheres, cylinders and curves of the object cannot be flattened: the transformation has no inverse";
+            d.error(span, message);
+        }
+    }
+}
+
 impl Builder<'_> {
     /// Reads the files that the text names and builds the scene; `None` after an error. Also returns its settings, and which of
     /// them the text gives.
@@ -60,8 +88,8 @@ impl Builder<'_> {
             || {
                 let emission_images = load_emission_images(&emission_paths, files);
                 let textures = self.resources.load(files, d);
-                let face_maps = ptex::load(&self.face_maps, files);
-                let measured = measured::load(&self.measured_files, files);
+                let face_maps = ptex::load(self.face_maps.list(), files);
+                let measured = measured::load(self.measured_files.list(), files);
                 (load_images(&environment_paths, files), emission_images, textures, face_maps, measured)
             },
             || {
@@ -72,8 +100,8 @@ impl Builder<'_> {
             },
         );
         self.textures.images = texture_images;
-        self.textures.face_maps = ptex::check(face_maps, &self.face_maps, d);
-        let materials = materials.with_measured(measured::check(measured, &self.measured_files, d));
+        self.textures.face_maps = ptex::check(face_maps, self.face_maps.list(), d);
+        let materials = materials.with_measured(measured::check(measured, self.measured_files.list(), d));
         let made = if d.has_errors() { made } else { with_displaced(made, &mut shapes, files, &self.textures) };
         self.add_environments(images, d);
         let images = self.check_emission_images(emission_images, &shapes, d);
@@ -104,7 +132,10 @@ impl Builder<'_> {
             }
         }
         match (Objects { objects: &self.objects, moving: &assembly.moving, shutter }).place(&self.instances) {
-            Ok(instances) => assembly.set.instances.extend(instances),
+            Ok(placed) => {
+                assembly.set.instances.extend(placed.instances);
+                placed.flat.iter().for_each(|(instance, span)| assembly.add_flat(instance, *span, d));
+            }
             Err(reason) => {
                 d.error_without_place(reason);
             }
@@ -229,9 +260,11 @@ impl Builder<'_> {
         d: &mut Diagnostics,
     ) -> HashMap<PathBuf, Arc<EmissionImage>> {
         let mut found = HashMap::new();
+        // Where each is named first
+        let users = shapes.iter().rev().filter_map(|s| s.area_light.as_ref()?.image.as_ref());
+        let spans: HashMap<&PathBuf, Span> = users.map(|(path, span)| (path, *span)).collect();
         for (path, image) in images {
-            let users = shapes.iter().filter_map(|s| s.area_light.as_ref()?.image.as_ref());
-            let span = users.filter(|(p, _)| *p == path).map(|(_, span)| *span).next().unwrap_or_default();
+            let span = spans.get(&path).copied().unwrap_or_default();
             match image {
                 Ok(image) => {
                     found.insert(path, Arc::new(image));

@@ -1,9 +1,11 @@
 //! Placements of objects, and of what moves or is placed inside of them.
 
 use super::descriptions::{InstanceDesc, ObjectDesc};
-use crate::geometry::{GroupId, Instance};
+use super::shapes::placed_quadric;
+use crate::geometry::{GroupId, Instance, Quadric, Shape};
+use lumiris_formats::source::Span;
 use lumiris_numbers::math::Affine3A;
-use lumiris_numbers::math::transform::compose_placements;
+use lumiris_numbers::math::transform::{compose_placements, swaps_handedness};
 
 /// Most placements of groups in a scene.
 pub(super) const MAX_INSTANCES: u64 = 100_000_000;
@@ -18,9 +20,42 @@ pub(super) struct Objects<'a> {
     pub shutter: [f32; 2],
 }
 
+/// Placements of groups.
+#[derive(Default)]
+pub(super) struct Placed {
+    pub instances: Vec<Instance>,
+    /// Those without an inverse, which ray tracers need: what they place is flat. And where each is asked for.
+    pub flat: Vec<(Instance, Span)>,
+}
+
+impl Placed {
+    fn push(&mut self, instance: Instance, span: Span) {
+        let has_inverse = |m: &Affine3A| m.matrix3.determinant() != 0.0 && m.inverse().is_finite();
+        if instance.world_from_group.iter().all(has_inverse) {
+            self.instances.push(instance);
+        } else {
+            self.flat.push((instance, span));
+        }
+    }
+}
+
+/// The shape in world space that a placement without an inverse makes; `None` if it cannot be flat.
+pub(super) fn flattened(shape: &Shape, world_from_group: &Affine3A) -> Option<Shape> {
+    match shape {
+        Shape::Mesh(mesh) => Some(Shape::Mesh(mesh.transformed(world_from_group))),
+        Shape::Bilinear(patches) => Some(Shape::Bilinear(patches.transformed(world_from_group))),
+        Shape::Quadric(q) => {
+            let placed = placed_quadric(q.kind, &(*world_from_group * q.group_from_local))?;
+            let reverse = q.flip_normal ^ swaps_handedness(&q.group_from_local);
+            Some(Shape::Quadric(Quadric { flip_normal: placed.flip_normal ^ reverse, ..placed }))
+        }
+        Shape::Curves(_) => None,
+    }
+}
+
 impl Objects<'_> {
     /// The placements of groups that these of objects make; `Err` if they are too many.
-    pub(super) fn place(&self, instances: &[InstanceDesc]) -> Result<Vec<Instance>, String> {
+    pub(super) fn place(&self, instances: &[InstanceDesc]) -> Result<Placed, String> {
         let mut sizes: Vec<u64> = Vec::new();
         for (object, moving) in self.objects.iter().zip(self.moving) {
             let nested = object.instances.iter().map(|i| sizes[i.object]).fold(0, u64::saturating_add);
@@ -30,17 +65,18 @@ impl Objects<'_> {
         if all > MAX_INSTANCES {
             return Err(format!("objects within objects make {all} instances; at most {MAX_INSTANCES} are"));
         }
-        let mut placed = Vec::with_capacity(all as usize);
+        let mut placed = Placed { instances: Vec::with_capacity(all as usize), flat: Vec::new() };
         for instance in instances {
             // Not by recursion: nothing limits how deep objects nest
             let mut open = vec![(instance.object, instance.ctm.samples(self.shutter))];
             while let Some((object, placement)) = open.pop() {
                 for (group, within) in &self.moving[object] {
-                    placed.push(Instance { group: *group, world_from_group: compose_placements(&placement, within) });
+                    let world_from_group = compose_placements(&placement, within);
+                    placed.push(Instance { group: *group, world_from_group }, instance.span);
                 }
                 let within = |i: &InstanceDesc| compose_placements(&placement, &i.ctm.samples(self.shutter));
                 open.extend(self.objects[object].instances.iter().map(|i| (i.object, within(i))));
-                placed.push(Instance { group: object as GroupId, world_from_group: placement });
+                placed.push(Instance { group: object as GroupId, world_from_group: placement }, instance.span);
             }
         }
         Ok(placed)

@@ -22,6 +22,7 @@ impl Builder<'_> {
     pub fn light(&mut self, kind: &Name, p: &ParamSet, d: &mut Diagnostics) {
         let world_from_light = self.still_transform("lights", p.span, d);
         let scale = light_scale(p, d);
+        let images = self.environments.len();
         let light = match kind.text.as_str() {
             "point" => self.point(p, &world_from_light, scale, d),
             "spot" => self.spot(p, &world_from_light, scale, d),
@@ -35,6 +36,9 @@ impl Builder<'_> {
                 return;
             }
         };
+        if self.environments.len() > images && !self.has_inverse("a light with an image", p.span, d) {
+            self.environments.truncate(images);
+        }
         p.ignore("nsamples");
         p.ignore("samples");
         let group = light_group(p, d);

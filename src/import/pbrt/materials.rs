@@ -10,7 +10,7 @@ use crate::materials::{
     ConductorSpectrum, Dispersion, EvaluatedMaterial, Material, MaterialEntry, MaterialId, NormalMap, Roughness,
 };
 use crate::textures::{Filter, FloatTexture, RgbTexture, RgbTextureId, Wrap};
-use lumiris_formats::diagnostic::{Diagnostics, did_you_mean};
+use lumiris_formats::diagnostic::Diagnostics;
 use lumiris_formats::names::{file_in, nfc};
 use lumiris_formats::pbrt::directive::Name;
 use lumiris_formats::pbrt::params::{Input, ParamSet, ParamType, SpectrumValue};
@@ -409,11 +409,7 @@ impl Builder<'_> {
     fn named_material(&self, name: &str, span: Span, d: &mut Diagnostics) -> Option<MaterialId> {
         let found = self.named_materials.get(&*nfc(name)).map(|(id, _)| *id);
         if found.is_none() {
-            let near = did_you_mean(name, self.named_materials.keys().map(String::as_str)).map(str::to_owned);
-            let diagnostic = d.error(span, format!("unknown material `{name}`"));
-            if let Some(near) = near {
-                diagnostic.help(format!("did you mean `{near}`?"));
-            }
+            d.unknown(span, "material", name, self.named_materials.keys().map(String::as_str));
         }
         found
     }

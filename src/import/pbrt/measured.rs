@@ -24,13 +24,8 @@ impl Builder<'_> {
                 .help("a file `.bsdf` of the RGL material database, or of the same form");
             return Material::Interface;
         };
-        let (path, span) = (file_in(&self.folder, name), p.span_of("filename"));
-        let known = self.measured_files.iter().position(|(file, _)| *file == path);
-        let tables = known.unwrap_or_else(|| {
-            self.measured_files.push((path, span));
-            self.measured_files.len() - 1
-        });
-        Material::Measured { tables: tables as u32 }
+        let path = file_in(&self.folder, name);
+        Material::Measured { tables: self.measured_files.index(&path, path.clone(), p.span_of("filename")) }
     }
 }
 

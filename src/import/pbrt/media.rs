@@ -11,7 +11,7 @@ use crate::media::{
     Temperature, UniformGrid,
 };
 use lumiris_formats::color_space::Colored;
-use lumiris_formats::diagnostic::{Diagnostics, did_you_mean};
+use lumiris_formats::diagnostic::Diagnostics;
 use lumiris_formats::pbrt::directive::Name;
 use lumiris_formats::pbrt::params::{ParamSet, ParamType};
 use lumiris_formats::spectra::{Y_INTEGRAL, glow_rgb};
@@ -53,12 +53,18 @@ impl Builder<'_> {
         if name.text.is_empty() {
             d.error(name.span, "a medium needs a name");
         }
-        if let Some(first) = self.media.iter().find(|m| m.name.text == name.text) {
+        let first = *self.medium_names.entry(name.text.clone()).or_insert(self.media.len());
+        if let Some(first) = self.media.get(first) {
             let message = format!("medium `{}` is defined twice", name.text);
             d.error(name.span, message).label(first.name.span, "first defined here");
         }
         let world_from_medium = self.still_transform("media", name.span, d);
         let kind = p.string("type", d).unwrap_or("homogeneous").to_owned();
+        if kind != "homogeneous" && !self.has_inverse("a medium of a grid", name.span, d) {
+            p.ignore_all();
+            self.media.push(MediumDesc { name, medium: None, volume: None });
+            return;
+        }
         let mut volume = None;
         let medium = match kind.as_str() {
             "homogeneous" => self.homogeneous(p, d),
@@ -206,16 +212,11 @@ impl Builder<'_> {
     pub(super) fn media_in_use(&self, shapes: &[ShapeDesc], d: &mut Diagnostics) -> MediaInUse {
         let mut media = MediaInUse::default();
         let used = |media: &mut MediaInUse, name: &Name, d: &mut Diagnostics| {
-            let Some(desc) = self.media.iter().find(|m| m.name.text == name.text) else {
-                let message = format!("unknown medium `{}`", name.text);
-                let near = did_you_mean(&name.text, self.media.iter().map(|m| m.name.text.as_str())).map(str::to_owned);
-                let diagnostic = d.error(name.span, message);
-                if let Some(near) = near {
-                    diagnostic.help(format!("did you mean `{near}`?"));
-                }
+            let Some(&index) = self.medium_names.get(&name.text) else {
+                d.unknown(name.span, "medium", &name.text, self.medium_names.keys().map(String::as_str));
                 return None;
             };
-            let medium = desc.medium.as_ref()?;
+            let medium = self.media[index].medium.as_ref()?;
             let MediaInUse { set, ids, .. } = media;
             Some(*ids.entry(name.text.clone()).or_insert_with(|| {
                 set.media.push(medium.clone());

@@ -32,13 +32,9 @@ impl Builder<'_> {
             d.error(p.span, "a texture `ptex` needs a `string filename`");
             return None;
         };
-        let (request, span) = (FaceMapRequest { path: file_in(&self.folder, name), encoding }, p.span_of("filename"));
-        let known = self.face_maps.iter().position(|(known, _)| *known == request);
-        let map = known.unwrap_or_else(|| {
-            self.face_maps.push((request, span));
-            self.face_maps.len() - 1
-        });
-        Some(FaceTexture { map: map as u32, scale })
+        let path = file_in(&self.folder, name);
+        let request = FaceMapRequest { path: path.clone(), encoding };
+        Some(FaceTexture { map: self.face_maps.index(&path, request, p.span_of("filename")), scale })
     }
 }
 

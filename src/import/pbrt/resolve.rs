@@ -8,8 +8,9 @@ use super::descriptions::{InstanceDesc, LateInstance, ParamState};
 use super::state::Builder;
 use crate::materials::{Material, MaterialId};
 use crate::textures::FloatTextureId;
-use lumiris_formats::diagnostic::{Diagnostics, did_you_mean};
+use lumiris_formats::diagnostic::Diagnostics;
 use lumiris_formats::source::Span;
+use std::collections::HashMap;
 
 impl Builder<'_> {
     /// What the parameters of a texture or a material mean something by, here.
@@ -68,21 +69,25 @@ impl Builder<'_> {
     }
 
     /// Mixtures that hold themselves are errors.
-    fn check_mixtures(&self, mut mixtures: Vec<(MaterialId, [MaterialId; 2], Span)>, d: &mut Diagnostics) {
-        // Those that are left are in a ring, or hold one that is; most are in their order, which takes one pass
-        let mut is_open = vec![false; self.materials.len()];
-        mixtures.iter().for_each(|(id, ..)| is_open[*id as usize] = true);
-        loop {
-            let before = mixtures.len();
-            mixtures.retain(|(id, parts, _)| {
-                is_open[*id as usize] = parts.iter().any(|&part| is_open[part as usize]);
-                is_open[*id as usize]
-            });
-            if mixtures.len() == before {
-                break;
+    fn check_mixtures(&self, mixtures: Vec<(MaterialId, [MaterialId; 2], Span)>, d: &mut Diagnostics) {
+        // Mixtures that hold a mixture, by that; and how many each of them holds that are not known to be sound
+        let mut holders: HashMap<MaterialId, Vec<MaterialId>> =
+            mixtures.iter().map(|(id, ..)| (*id, Vec::new())).collect();
+        let mut open: HashMap<MaterialId, usize> = HashMap::new();
+        for (id, parts, _) in &mixtures {
+            let parts = parts.iter().filter_map(|part| holders.get_mut(part).map(|of| of.push(*id)));
+            open.insert(*id, parts.count());
+        }
+        let mut sound: Vec<MaterialId> = open.iter().filter_map(|(id, parts)| (*parts == 0).then_some(*id)).collect();
+        while let Some(id) = sound.pop() {
+            for holder in &holders[&id] {
+                let parts = open.entry(*holder).or_default();
+                *parts -= 1;
+                sound.extend((*parts == 0).then_some(*holder));
             }
         }
-        for (id, _, span) in mixtures {
+        // Those that are left are in a ring, or hold one that is
+        for (id, _, span) in mixtures.into_iter().filter(|(id, ..)| open[id] > 0) {
             let name = &self.materials[id as usize].name;
             d.error(span, format!("the mixture `{name}` holds itself, or one that does"));
         }
@@ -109,21 +114,16 @@ impl Builder<'_> {
     }
 
     fn place_late_instances(&mut self, d: &mut Diagnostics) {
-        for LateInstance { name, holder, ctm } in std::mem::take(&mut self.late_instances) {
+        for LateInstance { name, holder, ctm, span } in std::mem::take(&mut self.late_instances) {
             match (self.object_names.get(&name.text), holder) {
-                (Some(&object), None) => self.instances.push(InstanceDesc { object, ctm }),
+                (Some(&object), None) => self.instances.push(InstanceDesc { object, ctm, span }),
                 // Objects hold earlier ones only, so that none can contain itself
                 (Some(&object), Some(_)) => {
                     let message = format!("object `{}` is defined after the one that holds it", name.text);
                     d.error(name.span, message).label(self.objects[object].span, "defined here");
                 }
                 (None, _) => {
-                    let near = did_you_mean(&name.text, self.object_names.keys().map(String::as_str));
-                    let near = near.map(|near| format!("did you mean `{near}`?"));
-                    let diagnostic = d.error(name.span, format!("unknown object `{}`", name.text));
-                    if let Some(near) = near {
-                        diagnostic.help(near);
-                    }
+                    d.unknown(name.span, "object", &name.text, self.object_names.keys().map(String::as_str));
                 }
             }
         }

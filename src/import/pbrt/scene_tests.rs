@@ -293,3 +293,68 @@ fn what_pbrt_leaves_out_of_meshes_is_left_out_with_a_warning() {
     let outside = load_with("", &triangles("\"integer indices\" [ 0 1 9 ]")).unwrap_err();
     assert!(outside.contains("index 9 is out of range"), "{outside}");
 }
+
+#[test]
+fn flattened_meshes_patches_and_disks_are_flat_and_others_are_errors_with_their_places() {
+    let triangle = "Shape \"trianglemesh\" \"point3 P\" [0 0 1 1 0 2 0 1 3] \"normal N\" [.6 0 .8 .6 0 .8 .6 0 .8]";
+    let patch = "Shape \"bilinearmesh\" \"point3 P\" [0 0 1 1 0 2 0 1 3 1 1 7]";
+    let disk = "Shape \"disk\" \"float height\" 3";
+    for (shape, max) in [(triangle, [1.0, 1.0]), (patch, [1.0, 1.0]), (disk, [1.0, 1.0])] {
+        let in_object = format!("ObjectBegin \"o\" {shape} ObjectEnd Translate 0 0 5 Scale 1 1 0 ObjectInstance \"o\"");
+        for world in [format!("Translate 0 0 5 Scale 1 1 0 {shape}"), in_object] {
+            let geometry = load_with("", &world).unwrap().scene.geometry;
+            let bounds = geometry.world_bounds();
+            assert_eq!(bounds.max.to_array(), [max[0], max[1], 5.0], "{world}");
+            assert_eq!((bounds.min.z, geometry.instances.len()), (5.0, 0), "{world}");
+            let hit = geometry.surface_hit(geometry.root.geometries[0], 0, u32::MAX, [0.3, 0.2], 0.0);
+            assert_eq!((hit.n.z, hit.ns.z), (1.0, 1.0), "{world}");
+        }
+    }
+    let flat = |rest: &str| load_with("", &format!("Scale 1 1 0\n{rest}")).unwrap_err();
+    for (rest, what) in [
+        ("Shape \"sphere\"", "a sphere"),
+        ("Shape \"curve\" \"point3 P\" [0 0 0 1 0 0 2 0 0 3 0 0]", "a curve"),
+        ("LightSource \"infinite\" \"string filename\" \"sky.exr\"", "a light with an image"),
+        ("Texture \"t\" \"float\" \"fbm\"", "a texture in space"),
+        ("MakeNamedMedium \"m\" \"string type\" \"cloud\"", "a medium of a grid"),
+        ("ActiveTransform EndTime Translate 1 0 0 ActiveTransform All Shape \"disk\"", "a moving disk"),
+    ] {
+        let error = flat(rest);
+        assert!(error.contains(&format!("{what} cannot be flattened")) && error.contains("scene.pbrt:6:"), "{error}");
+    }
+    let object = "ObjectBegin \"o\" Shape \"sphere\" ObjectEnd\nScale 1 1 0 ObjectInstance \"o\"";
+    let error = load_with("", object).unwrap_err();
+    assert!(error.contains("of the object cannot be flattened") && error.contains("scene.pbrt:6:13"), "{error}");
+    let error = load_with("Scale 0 1 1 Camera \"perspective\"", "").unwrap_err();
+    assert!(error.contains("a camera cannot be flattened") && error.contains("scene.pbrt:2:13"), "{error}");
+    assert!(load_with("", "Scale 1 1 0 Shape \"disk\" Scale 1e39 1 1").unwrap_err().contains("not finite"));
+}
+
+#[test]
+fn mixtures_that_hold_themselves_are_named_in_whatever_order_they_are_defined() {
+    let mix = |name: &str, parts: [&str; 2]| {
+        let [a, b] = parts;
+        format!("MakeNamedMaterial \"{name}\" \"string type\" \"mix\" \"string materials\" [\"{a}\" \"{b}\"]\n")
+    };
+    let plain = "MakeNamedMaterial \"p\" \"string type\" \"diffuse\"\n";
+    let sound = mix("a", ["b", "b"]) + &mix("b", ["c", "p"]) + &mix("c", ["p", "p"]);
+    assert!(load_with("", &(sound.clone() + plain)).is_ok());
+    let ring = mix("r", ["p", "s"]) + &mix("s", ["r", "a"]) + &mix("t", ["p", "s"]);
+    let error = load_with("", &(sound + &ring + plain)).unwrap_err();
+    for (name, is_wrong) in [("r", true), ("s", true), ("t", true), ("a", false), ("b", false), ("c", false)] {
+        assert_eq!(error.contains(&format!("the mixture `{name}` holds itself")), is_wrong, "{error}");
+    }
+}
+
+#[test]
+fn chains_of_textures_have_a_limit() {
+    let chain = |n: usize| {
+        let next = |i| format!("Texture \"t{}\" \"float\" \"scale\" \"texture tex\" \"t{i}\"\n", i + 1);
+        let first = "Texture \"t0\" \"float\" \"constant\"\n";
+        let text = first.to_owned() + &(0..n).map(next).collect::<String>();
+        load_with("", &format!("{text}Shape \"sphere\" \"texture alpha\" \"t{n}\""))
+    };
+    assert!(chain(490).is_ok());
+    let error = chain(30_000).unwrap_err();
+    assert!(error.contains("textures refer to each other more than 500 deep"), "{error}");
+}

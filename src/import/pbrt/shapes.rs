@@ -14,6 +14,7 @@ use lumiris_formats::names::file_in;
 use lumiris_formats::pbrt::directive::Name;
 use lumiris_formats::pbrt::params::{Input, ParamSet, ParamType};
 use lumiris_formats::ply::{PlyError, PlyMesh};
+use lumiris_formats::source::Span;
 use lumiris_numbers::math::transform::{swaps_handedness, transform_normal};
 use lumiris_numbers::math::{Affine3A, Vec2, Vec3};
 use std::path::{Path, PathBuf};
@@ -93,7 +94,7 @@ impl Builder<'_> {
             .is_some_and(|s| matches!(s, ShapeSource::Mesh(_) | ShapeSource::Ply(_) | ShapeSource::Loop(..)));
         let displacement = if is_mesh { self.displacement(&p, d) } else { None };
         p.report_unused(d);
-        if let Some(source) = source {
+        if let Some(source) = source.filter(|source| self.can_be_placed(source, &kind.text, p.span, d)) {
             let emits = self.state.area_light.is_some();
             let is_curve = matches!(source, ShapeSource::Curves(_));
             if is_curve && emits {
@@ -114,6 +115,16 @@ impl Builder<'_> {
             };
             let rest = if is_curve { merged(self.shapes.last_mut(), desc) } else { Some(desc) };
             self.shapes.extend(rest);
+        }
+    }
+
+    /// Whether the current transformation can place a shape; an error if it flattens what cannot be flat.
+    fn can_be_placed(&self, source: &ShapeSource, kind: &str, span: Span, d: &mut Diagnostics) -> bool {
+        match source {
+            _ if self.state.ctm.is_moving() => self.has_inverse(&format!("a moving {kind}"), span, d),
+            ShapeSource::Quadric(quadric) if placed_quadric(*quadric, &affine(&self.state.ctm.start)).is_some() => true,
+            ShapeSource::Quadric(_) | ShapeSource::Curves(_) => self.has_inverse(&format!("a {kind}"), span, d),
+            ShapeSource::Mesh(_) | ShapeSource::Ply(_) | ShapeSource::Loop(..) | ShapeSource::Bilinear(_) => true,
         }
     }
 
@@ -319,12 +330,10 @@ impl ShapeDesc {
         let wrong = |reason: String| ShapeError::Wrong(reason);
         let mut made = Made::default();
         match source {
-            ShapeSource::Quadric(kind) => made.shapes.push(Shape::Quadric(Quadric {
-                kind,
-                group_from_local: m,
-                local_from_group: m.inverse(),
-                flip_normal: flip,
-            })),
+            ShapeSource::Quadric(kind) => {
+                let quadric = placed_quadric(kind, &m).ok_or_else(|| wrong("the shape is flattened".to_owned()))?;
+                made.shapes.push(Shape::Quadric(Quadric { flip_normal: flip, ..quadric }));
+            }
             ShapeSource::Mesh(data) => {
                 made.shapes.push(Shape::Mesh(triangles(finished(data)?, &placement).map_err(wrong)?));
             }
@@ -383,6 +392,25 @@ impl ShapeDesc {
         }
         Ok(made)
     }
+}
+
+/// A quadric that a transformation places; `None` if that flattens anything but a disk along its axis.
+pub(super) fn placed_quadric(kind: QuadricKind, m: &Affine3A) -> Option<Quadric> {
+    let with = |kind, m: Affine3A| {
+        let local_from_group = m.inverse();
+        let flip_normal = swaps_handedness(&m);
+        let quadric = Quadric { kind, group_from_local: m, local_from_group, flip_normal };
+        (m.matrix3.determinant() != 0.0 && local_from_group.is_finite()).then_some(quadric)
+    };
+    let flat_disk = || {
+        let QuadricKind::Disk { height, radius, inner_radius, phi_max } = kind else { return None };
+        // The disk has no thickness of its own: any third axis will do
+        let mut upright = *m;
+        upright.matrix3.z_axis = m.matrix3.x_axis.cross(m.matrix3.y_axis).normalize_or_zero();
+        upright.translation += m.matrix3.z_axis * height;
+        with(QuadricKind::Disk { height: 0.0, radius, inner_radius, phi_max }, upright)
+    };
+    with(kind, *m).or_else(flat_disk)
 }
 
 fn place(points: &mut [Vec3], m: &Affine3A) {

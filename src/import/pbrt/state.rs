@@ -9,7 +9,7 @@ use super::texture_names::TextureNames;
 use super::transform::{Ctm, affine};
 use crate::import::LoadOptions;
 use crate::import::face_maps::FaceMapRequest;
-use crate::import::resources::Resources;
+use crate::import::resources::{Requests, Resources};
 use crate::lights::{Light, Portal};
 use crate::materials::{Material, MaterialEntry, MaterialId};
 use crate::textures::{FloatTextureId, RgbTexture, RgbTextureId, TextureSet};
@@ -22,6 +22,7 @@ use lumiris_numbers::math::{Affine3A, Rgb};
 use std::cell::RefCell;
 use std::collections::{BTreeMap, HashMap};
 use std::path::{Path, PathBuf};
+use std::rc::Rc;
 use std::sync::Arc;
 
 /// What a block saves and restores.
@@ -45,25 +46,32 @@ pub struct GraphicsState {
     pub(super) defaults: Defaults,
 }
 
-/// Default parameters by what they are for.
+/// Default parameters by what they are for, each name once; blocks share them until one changes them.
 #[derive(Clone, Default)]
-pub(super) struct Defaults {
-    shape: Vec<Param>,
-    light: Vec<Param>,
-    material: Vec<Param>,
-    medium: Vec<Param>,
-    texture: Vec<Param>,
-}
+pub(super) struct Defaults([Rc<Vec<Param>>; 5]);
 
 impl Defaults {
-    /// Those of a target.
-    pub(super) fn of(&mut self, target: AttributeTarget) -> &mut Vec<Param> {
+    fn index(target: AttributeTarget) -> usize {
         match target {
-            AttributeTarget::Shape => &mut self.shape,
-            AttributeTarget::Light => &mut self.light,
-            AttributeTarget::Material => &mut self.material,
-            AttributeTarget::Medium => &mut self.medium,
-            AttributeTarget::Texture => &mut self.texture,
+            AttributeTarget::Shape => 0,
+            AttributeTarget::Light => 1,
+            AttributeTarget::Material => 2,
+            AttributeTarget::Medium => 3,
+            AttributeTarget::Texture => 4,
+        }
+    }
+
+    /// Those of a target.
+    pub(super) fn of(&self, target: AttributeTarget) -> &[Param] {
+        &self.0[Self::index(target)]
+    }
+
+    /// Adds defaults for a target, which replace those of their names.
+    pub(super) fn add(&mut self, target: AttributeTarget, params: impl Iterator<Item = Param>) {
+        let all = Rc::make_mut(&mut self.0[Self::index(target)]);
+        for param in params {
+            all.retain(|other| other.name != param.name);
+            all.push(param);
         }
     }
 }
@@ -102,6 +110,8 @@ pub struct Builder<'a> {
     pub(super) interiors: HashMap<MaterialId, Interior>,
     /// Media.
     pub media: Vec<MediumDesc>,
+    /// Indices of media by name.
+    pub(super) medium_names: HashMap<String, usize>,
     /// Lights that are no surfaces.
     pub lights: Vec<Light>,
     /// Their groups.
@@ -127,9 +137,9 @@ pub struct Builder<'a> {
     /// Images to be read.
     pub resources: Resources,
     /// Textures of faces that wait to be read.
-    pub(super) face_maps: Vec<(FaceMapRequest, Span)>,
+    pub(super) face_maps: Requests<FaceMapRequest>,
     /// Files of measured materials that wait to be read.
-    pub(super) measured_files: Vec<(PathBuf, Span)>,
+    pub(super) measured_files: Requests<PathBuf>,
     /// Files of spectra that were read.
     pub(super) spectrum_files: RefCell<Vec<PathBuf>>,
 }
@@ -166,6 +176,7 @@ impl<'a> Builder<'a> {
             named_materials: HashMap::new(),
             interiors: HashMap::new(),
             media: Vec::new(),
+            medium_names: HashMap::new(),
             lights: Vec::new(),
             light_groups: Vec::new(),
             environments: Vec::new(),
@@ -178,8 +189,8 @@ impl<'a> Builder<'a> {
             instances: Vec::new(),
             late_instances: Vec::new(),
             resources: Resources::default(),
-            face_maps: Vec::new(),
-            measured_files: Vec::new(),
+            face_maps: Requests::default(),
+            measured_files: Requests::default(),
             spectrum_files: RefCell::default(),
         }
     }
@@ -191,8 +202,8 @@ impl<'a> Builder<'a> {
             _ => None,
         };
         let mut files = self.spectrum_files.borrow().clone();
-        files.extend(self.measured_files.iter().map(|(path, _)| path.clone()));
-        files.extend(self.face_maps.iter().map(|(request, _)| request.path.clone()));
+        files.extend(self.measured_files.list().iter().map(|(path, _)| path.clone()));
+        files.extend(self.face_maps.list().iter().map(|(request, _)| request.path.clone()));
         files.extend(self.shapes.iter().filter_map(mesh));
         files.extend(self.media.iter().filter_map(|m| Some(m.volume.as_ref()?.path.clone())));
         files.extend(self.environments.iter().map(|e| e.path.clone()));
@@ -200,6 +211,16 @@ impl<'a> Builder<'a> {
         files.extend(self.resources.paths().map(Path::to_path_buf));
         files.extend(self.options.camera_files());
         files
+    }
+
+    /// Whether the current transformation has an inverse, which `what` needs; an error if it has none.
+    pub fn has_inverse(&self, what: &str, span: Span, diagnostics: &mut Diagnostics) -> bool {
+        let has = self.state.ctm.is_invertible();
+        if !has {
+            let message = format!("{what} cannot be flattened: the current transformation has no inverse");
+            diagnostics.error(span, message).help("meshes, patches and disks can be flattened, by `Scale 1 1 0`");
+        }
+        has
     }
 
     /// The current transformation of something that cannot move; a motion is reported and left out.

@@ -1,6 +1,6 @@
 //! Textures of one type by their names, which may be used before they are defined.
 
-use lumiris_formats::diagnostic::{Diagnostics, did_you_mean};
+use lumiris_formats::diagnostic::Diagnostics;
 use lumiris_formats::pbrt::directive::Name;
 use lumiris_formats::source::Span;
 use std::collections::HashMap;
@@ -48,12 +48,10 @@ impl<I: Copy> TextureNames<I> {
                     .help("textures of images are made first, then the others in their order, spectra after floats");
             }
             None => {
-                let near = did_you_mean(name, self.by_name.keys().map(String::as_str)).map(str::to_owned);
-                let diagnostic = d.error(span, format!("unknown {kind} texture `{name}`"));
+                let known = self.by_name.keys().map(String::as_str);
+                let diagnostic = d.unknown(span, &format!("{kind} texture"), name, known);
                 if other.by_name.contains_key(name) {
                     diagnostic.help(format!("a {} texture of this name exists", other.kind));
-                } else if let Some(near) = near {
-                    diagnostic.help(format!("did you mean `{near}`?"));
                 }
             }
         }

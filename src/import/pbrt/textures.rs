@@ -17,6 +17,9 @@ use lumiris_formats::pbrt::params::{Input, ParamSet, ParamType, SpectrumValue};
 use lumiris_formats::source::Span;
 use lumiris_numbers::math::{Affine3A, Rgb, Vec2, Vec3};
 
+/// Textures that may refer to each other in a chain.
+const MAX_DEPTH: u32 = 500;
+
 impl Builder<'_> {
     /// `Texture "name" "float|spectrum" "class"`, of which textures are made at the end of the text.
     pub fn texture(&mut self, name: Name, value: &Name, class: Name, params: ParamSet, d: &mut Diagnostics) {
@@ -39,14 +42,19 @@ impl Builder<'_> {
     /// Makes a texture, when those that it may refer to are there.
     pub(super) fn make_texture(&mut self, desc: &TextureDesc, d: &mut Diagnostics) {
         let (class, p) = (&desc.class, &desc.params);
-        if desc.is_float {
+        let depth = if desc.is_float {
             let texture = self.float_texture(class, p, d);
             let id = self.textures.add_float(texture);
             self.float_textures.set(&desc.name, id);
+            self.textures.float_depth(id)
         } else {
             let texture = self.rgb_texture(class, p, d);
             let id = self.textures.add_rgb(texture);
             self.rgb_textures.set(&desc.name, id);
+            self.textures.rgb_depth(id)
+        };
+        if depth > MAX_DEPTH {
+            d.error(desc.name.span, format!("textures refer to each other more than {MAX_DEPTH} deep"));
         }
         p.report_unused(d);
     }
@@ -137,7 +145,7 @@ impl Builder<'_> {
                 octaves: octaves(p, d),
                 scale: p.float("scale", d).unwrap_or(1.0),
                 variation: p.float("variation", d).unwrap_or(0.2),
-                texture_from_world: self.texture_from_world(),
+                texture_from_world: self.texture_from_world(p, d),
             }),
             "dots" => RgbTexture::Dots {
                 dots: Dots { mapping: self.mapping(p, d) },
@@ -163,7 +171,7 @@ impl Builder<'_> {
             "wrinkled" => NoiseKind::Wrinkled(octaves(p, d)),
             _ => NoiseKind::Windy,
         };
-        NoiseTexture { kind, texture_from_world: self.texture_from_world() }
+        NoiseTexture { kind, texture_from_world: self.texture_from_world(p, d) }
     }
 
     fn direction(&self, p: &ParamSet, d: &mut Diagnostics) -> Vec3 {
@@ -174,7 +182,7 @@ impl Builder<'_> {
     fn checker_mapping(&self, p: &ParamSet, d: &mut Diagnostics) -> CheckerboardMapping {
         match p.integer("dimension", d).unwrap_or(2) {
             2 => CheckerboardMapping::Squares(self.mapping(p, d)),
-            3 => CheckerboardMapping::Cubes { texture_from_world: self.texture_from_world() },
+            3 => CheckerboardMapping::Cubes { texture_from_world: self.texture_from_world(p, d) },
             other => {
                 d.error(p.span_of("dimension"), format!("a checkerboard has 2 or 3 dimensions, not {other}"));
                 CheckerboardMapping::Squares(self.mapping(p, d))
@@ -182,20 +190,23 @@ impl Builder<'_> {
         }
     }
 
-    fn texture_from_world(&self) -> Affine3A {
-        affine(&self.state.ctm.start.inverse())
+    /// For textures that depend on the point, which cannot be flattened.
+    fn texture_from_world(&self, p: &ParamSet, d: &mut Diagnostics) -> Affine3A {
+        match self.has_inverse("a texture in space", p.span, d) {
+            true => affine(&self.state.ctm.start.inverse()),
+            false => Affine3A::IDENTITY,
+        }
     }
 
     fn mapping(&self, p: &ParamSet, d: &mut Diagnostics) -> Mapping2d {
-        let texture_from_world = self.texture_from_world();
         match p.string("mapping", d).unwrap_or("uv") {
-            "spherical" => Mapping2d::Spherical { texture_from_world },
-            "cylindrical" => Mapping2d::Cylindrical { texture_from_world },
+            "spherical" => Mapping2d::Spherical { texture_from_world: self.texture_from_world(p, d) },
+            "cylindrical" => Mapping2d::Cylindrical { texture_from_world: self.texture_from_world(p, d) },
             "planar" => Mapping2d::Planar {
                 vs: p.triple("v1", ParamType::Vector3, d).map_or(Vec3::X, Vec3::from_array),
                 vt: p.triple("v2", ParamType::Vector3, d).map_or(Vec3::Y, Vec3::from_array),
                 delta: Vec2::new(p.float("udelta", d).unwrap_or(0.0), p.float("vdelta", d).unwrap_or(0.0)),
-                texture_from_world,
+                texture_from_world: self.texture_from_world(p, d),
             },
             other => {
                 if other != "uv" {

@@ -39,7 +39,12 @@ impl Ctm {
         Ctm { start: self.start.inverse(), end: self.end.inverse() }
     }
 
-    /// True if it can be inverted and all its numbers are finite.
+    /// True if all its numbers are finite.
+    pub fn is_finite(&self) -> bool {
+        self.start.is_finite() && self.end.is_finite()
+    }
+
+    /// True if it can be inverted and all its numbers are finite. What it places is flat otherwise: meshes are rendered so.
     pub fn is_invertible(&self) -> bool {
         [self.start, self.end].iter().all(|m| {
             let scale = m.x_axis.length() * m.y_axis.length() * m.z_axis.length();
@@ -109,7 +114,6 @@ pub fn matrix_of(kind: &DirectiveKind) -> Option<Result<Mat4, &'static str>> {
     Some(match kind {
         DirectiveKind::Identity => Ok(Mat4::IDENTITY),
         DirectiveKind::Translate(v) => Ok(Mat4::from_translation(Vec3::from_array(*v))),
-        DirectiveKind::Scale(v) if v.contains(&0.0) => Err("a scale of 0 has no inverse"),
         DirectiveKind::Scale(v) => Ok(Mat4::from_scale(Vec3::from_array(*v))),
         DirectiveKind::Rotate([degrees, x, y, z]) => match Vec3::new(*x, *y, *z).try_normalize() {
             Some(axis) => Ok(Mat4::from_axis_angle(axis, degrees.to_radians())),

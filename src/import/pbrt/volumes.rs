@@ -14,21 +14,15 @@ use lumiris_formats::pbrt::params::ParamSet;
 use lumiris_formats::source::Span;
 use lumiris_numbers::math::{Affine3A, Bounds3, Rgb, Vec3};
 use rayon::prelude::*;
+use std::collections::{HashMap, HashSet};
 use std::path::Path;
 use std::sync::Arc;
 
-/// Requests of all media, each once, and what came of them.
-#[derive(Default)]
-struct Volumes {
-    requests: Vec<VolumeRequest>,
-    read: Vec<Result<Arc<Volume>, NanoError>>,
-}
+/// Requests of all media, and what came of them.
+type Volumes = HashMap<VolumeRequest, Result<Arc<Volume>, NanoError>>;
 
-impl Volumes {
-    fn find(&self, path: &Path, grid: &str, usage: VolumeUse) -> Option<&Result<Arc<Volume>, NanoError>> {
-        let place = self.requests.iter().position(|r| r.path == path && r.grid == grid && r.usage == usage);
-        self.read.get(place?)
-    }
+fn request(path: &Path, grid: &str, usage: VolumeUse) -> VolumeRequest {
+    VolumeRequest { path: path.to_owned(), grid: grid.to_owned(), usage }
 }
 
 impl Builder<'_> {
@@ -72,18 +66,16 @@ impl Builder<'_> {
 
     /// Reads the files of all media that wait for one.
     pub(super) fn load_volumes(&mut self, files: &FileCache, d: &mut Diagnostics) {
-        let mut volumes = Volumes::default();
+        let mut requests = HashSet::new();
         for desc in self.media.iter().filter_map(|m| m.volume.as_ref()) {
             let density = Some((&desc.density.0, VolumeUse::Density));
             let temperature = desc.temperature.as_ref().map(|(name, _)| (name, VolumeUse::Temperature));
             for (grid, usage) in density.into_iter().chain(temperature) {
-                let request = VolumeRequest { path: desc.path.clone(), grid: grid.clone(), usage };
-                if !volumes.requests.contains(&request) {
-                    volumes.requests.push(request);
-                }
+                requests.insert(request(&desc.path, grid, usage));
             }
         }
-        volumes.read = volumes.requests.par_iter().map(|request| files.volume(request)).collect();
+        let read = |request: VolumeRequest| (files.volume(&request), request);
+        let volumes: Volumes = requests.into_par_iter().map(read).map(|(volume, request)| (request, volume)).collect();
         for medium in &mut self.media {
             if let Some(desc) = &medium.volume {
                 medium.medium = medium_of(desc, &volumes, d);
@@ -131,10 +123,11 @@ fn checked(
 /// The medium of a description; `None` after an error.
 fn medium_of(desc: &VolumeDesc, volumes: &Volumes, d: &mut Diagnostics) -> Option<Medium> {
     let (name, span) = &desc.density;
-    let density = checked(desc, (name.as_str(), *span), volumes.find(&desc.path, name, VolumeUse::Density), d)?;
+    let density =
+        checked(desc, (name.as_str(), *span), volumes.get(&request(&desc.path, name, VolumeUse::Density)), d)?;
     let mut hot = None;
     if let Some((name, span)) = &desc.temperature {
-        let read = volumes.find(&desc.path, name, VolumeUse::Temperature);
+        let read = volumes.get(&request(&desc.path, name, VolumeUse::Temperature));
         match (read, span) {
             // As in pbrt-v4, nothing glows then
             (Some(Err(NanoError::NoGrid { .. })), None) => {}

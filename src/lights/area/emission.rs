@@ -77,6 +77,8 @@ pub struct EmissionImage {
     mean: Rgb,
     wrap: [AxisWrap; 2],
     mapping: Option<EmissionMapping>,
+    /// True if the nearest pixel counts, else the four nearest ones.
+    is_nearest: bool,
 }
 
 /// Texture coordinates of an image on triangles, where they are not those of other textures.
@@ -103,7 +105,7 @@ impl EmissionImage {
             }
         }
         let mean = Rgb::from_array(sums.map(|s| (s / data.len() as f64) as f32));
-        Ok(EmissionImage { width, height, data, mean, wrap: [AxisWrap::Clamp; 2], mapping: None })
+        Ok(EmissionImage { width, height, data, mean, wrap: [AxisWrap::Clamp; 2], mapping: None, is_nearest: false })
     }
 
     /// The image with other edges, columns first, and with texture coordinates of its own.
@@ -112,12 +114,18 @@ impl EmissionImage {
         EmissionImage { wrap, mapping, ..self }
     }
 
+    /// The image without interpolation between pixels.
+    #[must_use]
+    pub fn nearest(self) -> Self {
+        EmissionImage { is_nearest: true, ..self }
+    }
+
     /// How texture coordinates become those of the image, if they do.
     pub fn mapping(&self) -> Option<&EmissionMapping> {
         self.mapping.as_ref()
     }
 
-    /// Bilinear lookup at `uv`.
+    /// The radiance at `uv`: bilinear, unless the nearest pixel counts.
     pub fn lookup(&self, uv: Vec2) -> Rgb {
         // Beyond these, floats have no fractions to interpolate by
         let limit = |v: f32, count: usize, wrap: AxisWrap| match wrap {
@@ -126,12 +134,15 @@ impl EmissionImage {
         };
         let x = limit(uv.x * self.width as f32 - 0.5, self.width, self.wrap[0]);
         let y = limit((1.0 - uv.y) * self.height as f32 - 0.5, self.height, self.wrap[1]);
-        let (x0, y0) = (x.floor(), y.floor());
         let texel = |x: f32, y: f32| {
             let column = self.wrap[0].pixel(x as i64, self.width as i64) as usize;
             let row = self.wrap[1].pixel(y as i64, self.height as i64) as usize;
             self.data[row * self.width + column]
         };
+        if self.is_nearest {
+            return texel((x + 0.5).floor(), (y + 0.5).floor());
+        }
+        let (x0, y0) = (x.floor(), y.floor());
         let (dx, dy) = (x - x0, y - y0);
         let top = texel(x0, y0).lerp(texel(x0 + 1.0, y0), dx);
         let bottom = texel(x0, y0 + 1.0).lerp(texel(x0 + 1.0, y0 + 1.0), dx);
@@ -153,6 +164,9 @@ mod tests {
         let repeated = image.clone().placed([AxisWrap::Repeat, AxisWrap::Mirror], None);
         assert_eq!(repeated.lookup(Vec2::new(-0.75, 1.25)).r, 1.0);
         assert_eq!(repeated.lookup(Vec2::new(3.75, -0.75)).r, 2.0);
+        let nearest = image.clone().nearest();
+        let at = |u, v| nearest.lookup(Vec2::new(u, v)).r;
+        assert_eq!((at(0.49, 0.51), at(0.51, 0.51), at(0.0, 0.0), at(7.0, -3.0)), (1.0, 2.0, 3.0, 4.0));
         assert!(EmissionImage::new(2, 2, vec![Rgb::WHITE; 3]).is_err());
         let emission = Emission { image: Some(Arc::new(image)), ..Emission::constant(Rgb::splat(2.0)) };
         assert!((emission.mean_luminance() - 5.0).abs() < 1e-5);

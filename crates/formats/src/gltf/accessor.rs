@@ -1,6 +1,7 @@
 //! Accessors: arrays of numbers in buffers, dense or sparse.
 
 use super::{Document, GltfError, Place};
+use std::collections::HashMap;
 
 /// Greatest number of elements of an accessor without bytes of its own, which are zeros.
 const MAX_ZEROS: usize = 1 << 24;
@@ -89,7 +90,67 @@ fn width_of(kind: &str) -> Option<usize> {
     })
 }
 
-/// `count` elements of some bytes.
+/// Elements in a buffer view.
+#[derive(Clone, Copy, Debug)]
+struct Elements<'a> {
+    /// From the first element on.
+    bytes: &'a [u8],
+    stride: usize,
+    component: Component,
+    width: usize,
+    normalized: bool,
+}
+
+impl Elements<'_> {
+    fn read(&self, index: usize) -> impl Iterator<Item = f64> {
+        let Elements { bytes, stride, component, width, normalized } = *self;
+        (0..width).map(move |c| {
+            let (value, divisor) = component.read(&bytes[index * stride + c * component.bytes()..]);
+            if normalized { (value / divisor).max(-1.0) } else { value }
+        })
+    }
+}
+
+/// An accessor whose elements are known to be in their buffer views, and are read when they are asked for: primitives may
+/// share the accessor of all their vertices.
+#[derive(Debug)]
+pub struct Accessor<'a> {
+    count: usize,
+    width: usize,
+    /// Without these, elements are 0.
+    elements: Option<Elements<'a>>,
+    /// Elements that replace others, by the indices of those.
+    sparse: Option<(HashMap<usize, usize>, Elements<'a>)>,
+}
+
+impl Accessor<'_> {
+    /// Number of elements.
+    pub fn count(&self) -> usize {
+        self.count
+    }
+
+    /// Components of an element.
+    pub fn width(&self) -> usize {
+        self.width
+    }
+
+    /// The numbers of elements by their indices, which are below [`Self::count`].
+    pub fn numbers(&self, indices: impl ExactSizeIterator<Item = usize>) -> Numbers {
+        let mut values = Vec::with_capacity(indices.len() * self.width);
+        for index in indices {
+            let replaced = self.sparse.as_ref().and_then(|(of, elements)| Some((*of.get(&index)?, elements)));
+            match (replaced, &self.elements) {
+                (Some((index, elements)), _) => values.extend(elements.read(index)),
+                (None, Some(elements)) => values.extend(elements.read(index)),
+                (None, None) => values.extend(std::iter::repeat_n(0.0, self.width)),
+            }
+        }
+        Numbers { width: self.width, values }
+    }
+}
+
+/// Numbers of an accessor, or of a part of it.
+#[derive(Clone, Copy)]
 struct Layout {
     component: Component,
     width: usize,
@@ -100,6 +161,12 @@ struct Layout {
 impl Document {
     /// The numbers of an accessor; normalised integers are −1..1.
     pub fn accessor(&self, index: usize) -> Result<Numbers, GltfError> {
+        let accessor = self.open(index)?;
+        Ok(accessor.numbers(0..accessor.count))
+    }
+
+    /// An accessor, of which nothing has been read; normalised integers are −1..1.
+    pub fn open(&self, index: usize) -> Result<Accessor<'_>, GltfError> {
         let place = self.root().key("accessors").item(index);
         let component = place.key("componentType").index().and_then(Component::of);
         let width = place.key("type").text().and_then(width_of);
@@ -107,58 +174,51 @@ impl Document {
             return Err(place.error("has no valid type or count"));
         };
         let layout = Layout { component, width, count, normalized: place.key("normalized").is_true() };
-        let mut values = match place.key("bufferView").index() {
-            Some(_) => self.read(&place, &layout)?,
+        let elements = match place.key("bufferView").index() {
+            Some(_) => Some(self.elements(&place, &layout)?),
             None if count > MAX_ZEROS => return Err(place.error(format!("{count} elements have no bytes"))),
-            None => vec![0.0; count * width],
+            None => None,
         };
-        let sparse = place.key("sparse");
-        if sparse.exists() {
-            self.replace(&sparse, &layout, &mut values)?;
-        }
-        Ok(Numbers { width, values })
+        let sparse = Some(place.key("sparse")).filter(Place::exists);
+        let sparse = sparse.map(|sparse| self.sparse(&sparse, &layout)).transpose()?;
+        Ok(Accessor { count, width, elements, sparse })
     }
 
-    fn read(&self, place: &Place<'_>, layout: &Layout) -> Result<Vec<f64>, GltfError> {
+    fn elements(&self, place: &Place<'_>, layout: &Layout) -> Result<Elements<'_>, GltfError> {
         let Some(view) = place.key("bufferView").index() else { return Err(place.error("has no buffer view")) };
         let bytes = self.view(view)?;
-        let size = layout.component.bytes() * layout.width;
+        let Layout { component, width, count, normalized } = *layout;
+        let size = component.bytes() * width;
         let stride = self.root().key("bufferViews").item(view).key("byteStride").index().unwrap_or(size).max(1);
         let offset = place.key("byteOffset").index().unwrap_or(0);
-        let length = layout.count.checked_sub(1).map_or(Some(0), |n| n.checked_mul(stride)?.checked_add(size));
+        let length = count.checked_sub(1).map_or(Some(0), |n| n.checked_mul(stride)?.checked_add(size));
         let end = length.and_then(|length| offset.checked_add(length)).filter(|&end| end <= bytes.len());
-        if end.is_none() || stride < layout.component.bytes() {
-            let (count, have) = (layout.count, bytes.len());
+        let Some(end) = end.filter(|_| stride >= component.bytes()) else {
+            let have = bytes.len();
             let message = format!("{count} elements from byte {offset} on are not in the buffer view of {have} bytes");
             return Err(place.error(message));
-        }
-        let mut values = Vec::with_capacity(layout.count * layout.width);
-        for i in 0..layout.count {
-            for c in 0..layout.width {
-                let at = offset + i * stride + c * layout.component.bytes();
-                let (value, divisor) = layout.component.read(&bytes[at..]);
-                values.push(if layout.normalized { (value / divisor).max(-1.0) } else { value });
-            }
-        }
-        Ok(values)
+        };
+        Ok(Elements { bytes: &bytes[offset..end], stride, component, width, normalized })
     }
 
-    fn replace(&self, sparse: &Place<'_>, layout: &Layout, values: &mut [f64]) -> Result<(), GltfError> {
+    /// The elements that replace others, by the indices of those.
+    fn sparse(&self, sparse: &Place<'_>, layout: &Layout) -> Result<(HashMap<usize, usize>, Elements<'_>), GltfError> {
         let count = sparse.key("count").index().unwrap_or(0);
         let place = sparse.key("indices");
         let Some(component) = place.key("componentType").index().and_then(Component::of) else {
             return Err(place.error("has no valid type"));
         };
-        let indices = self.read(&place, &Layout { component, width: 1, count, normalized: false })?;
-        let new = self.read(&sparse.key("values"), &Layout { count, ..*layout })?;
-        for (index, element) in indices.iter().zip(new.chunks_exact(layout.width)) {
-            let at = *index as usize * layout.width;
-            match values.get_mut(at..at + layout.width) {
-                Some(old) => old.copy_from_slice(element),
-                None => return Err(place.error(format!("element {index} is not there"))),
+        let indices = self.elements(&place, &Layout { component, width: 1, count, normalized: false })?;
+        let values = self.elements(&sparse.key("values"), &Layout { count, ..*layout })?;
+        let mut replaced = HashMap::with_capacity(count);
+        for nth in 0..count {
+            let index = indices.read(nth).next().unwrap_or_default();
+            if index >= layout.count as f64 {
+                return Err(place.error(format!("element {index} is not there")));
             }
+            replaced.insert(index as usize, nth);
         }
-        Ok(())
+        Ok((replaced, values))
     }
 }
 
@@ -169,15 +229,18 @@ mod tests {
     use std::path::Path;
 
     /// A document of one accessor, whose buffer has views of 12 bytes and of 4.
-    fn accessor(json: &str, bytes: [u8; 16]) -> Result<Vec<f64>, GltfError> {
+    fn document(json: &str, bytes: [u8; 16]) -> Result<Document, GltfError> {
         let data = base64::engine::general_purpose::STANDARD.encode(bytes);
         let text = format!(
             r#"{{"asset":{{"version":"2.0"}},"accessors":[{json}],
             "bufferViews":[{{"buffer":0,"byteLength":12}},{{"buffer":0,"byteOffset":12,"byteLength":4}}],
             "buffers":[{{"byteLength":16,"uri":"data:application/octet-stream;base64,{data}"}}]}}"#
         );
-        let document = Document::parse(text.as_bytes(), Path::new(""), &[]).map_err(|errors| errors[0].clone())?;
-        document.accessor(0).map(|numbers| numbers.values)
+        Document::parse(text.as_bytes(), Path::new(""), &[]).map_err(|errors| errors[0].clone())
+    }
+
+    fn accessor(json: &str, bytes: [u8; 16]) -> Result<Vec<f64>, GltfError> {
+        document(json, bytes)?.accessor(0).map(|numbers| numbers.values)
     }
 
     const BYTES: [u8; 16] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 255, 2, 0, 128, 9];
@@ -204,6 +267,19 @@ mod tests {
         outside[12] = 3;
         let error = accessor(&of(""), outside).unwrap_err();
         assert_eq!(error.to_string(), "accessors[0].sparse.indices: element 3 is not there");
+    }
+
+    #[test]
+    fn elements_are_read_alone_as_among_all() {
+        let sparse = r#""sparse":{"count":2,"indices":{"bufferView":1,"componentType":5121},
+            "values":{"bufferView":0,"byteOffset":4}}"#;
+        let json = format!(r#"{{"bufferView":0,"componentType":5121,"count":4,"type":"VEC2",{sparse}}}"#);
+        let document = document(&json, BYTES).unwrap();
+        let (accessor, all) = (document.open(0).unwrap(), document.accessor(0).unwrap());
+        assert_eq!(all.values, [6.0, 7.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0]);
+        for (index, element) in all.values.chunks(2).enumerate() {
+            assert_eq!(accessor.numbers([index].into_iter()).values, element);
+        }
     }
 
     #[test]

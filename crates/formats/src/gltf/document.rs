@@ -1,18 +1,18 @@
 //! A document: its JSON, checked, and its buffers.
 
 use super::container::chunks;
+use super::json::Json;
 use super::place::{GltfError, Place};
 use super::schema;
 use crate::names::file_in;
 use base64::engine::{DecodePaddingMode, GeneralPurpose, GeneralPurposeConfig};
 use base64::{Engine, alphabet};
-use serde_json::Value;
 use std::path::{Path, PathBuf};
 
 /// A document with its buffers.
 #[derive(Debug)]
 pub struct Document {
-    json: Value,
+    json: Json,
     /// `None` for those that could not be read.
     buffers: Vec<Option<Vec<u8>>>,
     /// Files that hold buffers.
@@ -27,8 +27,8 @@ pub struct Document {
 pub enum Unread {
     /// Its file could not.
     File {
-        /// Where it is named.
-        place: String,
+        /// Index of the buffer.
+        buffer: usize,
         /// The file.
         path: PathBuf,
         /// The reason.
@@ -89,7 +89,7 @@ impl Document {
     pub fn parse(file: &[u8], folder: &Path, required: &[&str]) -> Result<Document, Vec<GltfError>> {
         let (text, embedded) = chunks(file).map_err(|e| vec![e])?;
         let text = text.strip_prefix(b"\xef\xbb\xbf").unwrap_or(text);
-        let json: Value = serde_json::from_slice(text).map_err(|e| vec![syntax_error(file, text, &e)])?;
+        let json = Json::parse(text).map_err(|e| vec![syntax_error(file, text, &e)])?;
         check_asset(&json, required)?;
         let errors = schema::errors(&Place::root(&json));
         if !errors.is_empty() {
@@ -128,7 +128,7 @@ impl Document {
     }
 
     fn read_buffers(&mut self, embedded: Option<&[u8]>) {
-        for index in 0..self.root().key("buffers").items().len() {
+        for index in 0..self.root().key("buffers").len() {
             let (read, file) = self.read_buffer(index, embedded);
             self.files.extend(file);
             self.buffers.push(read.map_err(|unread| self.unread.push(unread)).ok());
@@ -149,7 +149,7 @@ impl Document {
                 let read = std::fs::read(&path).map_err(|e| {
                     let is_missing = e.kind() == std::io::ErrorKind::NotFound;
                     let reason = if is_missing { "no such file".to_owned() } else { e.to_string() };
-                    Unread::File { place: place.key("uri").path, path: path.clone(), reason }
+                    Unread::File { buffer: index, path: path.clone(), reason }
                 });
                 (read.and_then(|bytes| checked(bytes, &place)), Some(path))
             }
@@ -193,7 +193,7 @@ fn syntax_error(file: &[u8], text: &[u8], e: &serde_json::Error) -> GltfError {
 }
 
 /// Checks the version and the extensions that must be understood.
-fn check_asset(json: &Value, known: &[&str]) -> Result<(), Vec<GltfError>> {
+fn check_asset(json: &Json, known: &[&str]) -> Result<(), Vec<GltfError>> {
     let root = Place::root(json);
     let version = root.key("asset").key("version");
     match version.text() {
@@ -202,7 +202,7 @@ fn check_asset(json: &Value, known: &[&str]) -> Result<(), Vec<GltfError>> {
         None => return Err(vec![version.error("is missing")]),
     }
     let required = root.key("extensionsRequired").items();
-    let unknown = required.iter().filter(|p| p.text().is_some_and(|name| !known.contains(&name)));
+    let unknown = required.filter(|p| p.text().is_some_and(|name| !known.contains(&name)));
     let errors: Vec<GltfError> = unknown
         .map(|place| {
             place.error(format!("the file needs the extension {}, which is not read", place.text().unwrap_or("")))

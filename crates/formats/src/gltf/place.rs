@@ -1,6 +1,7 @@
-//! A place in the JSON: its value, if it has one, and its path for messages.
+//! A place in the JSON: its value, if it has one, and the way to it, whose text is made for messages only.
 
-use serde_json::Value;
+use super::json::{Json, Value};
+use std::fmt::Write;
 
 /// What is wrong, and where.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -19,81 +20,142 @@ impl std::fmt::Display for GltfError {
 
 impl std::error::Error for GltfError {}
 
+/// Steps of a way that are kept: the way to the numbers of a texture's transformation has nine.
+const STEPS: usize = 12;
+
+/// From a value to one of its children.
+#[derive(Clone, Copy, Debug)]
+enum Step<'a> {
+    Member(&'a str),
+    Element(usize),
+}
+
 /// A place in the JSON; by default, none where anything is.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Copy, Debug)]
 pub struct Place<'a> {
-    value: Option<&'a Value>,
-    /// Such as `meshes[0].primitives[1]`.
-    pub path: String,
+    found: Option<(&'a Json, Value)>,
+    steps: [Step<'a>; STEPS],
+    /// Number of steps; those beyond [`STEPS`] are missing in the path.
+    depth: usize,
+}
+
+impl Default for Place<'_> {
+    fn default() -> Self {
+        Place { found: None, steps: [Step::Element(0); STEPS], depth: 0 }
+    }
 }
 
 impl<'a> Place<'a> {
     /// The whole.
-    pub fn root(value: &'a Value) -> Self {
-        Place { value: Some(value), path: String::new() }
+    pub fn root(json: &'a Json) -> Self {
+        Place { found: Some((json, json.root())), ..Place::default() }
+    }
+
+    /// Such as `meshes[0].primitives[1]`.
+    pub fn path(&self) -> String {
+        let mut path = String::new();
+        for step in &self.steps[..self.depth.min(STEPS)] {
+            let dot = if path.is_empty() { "" } else { "." };
+            let written = match step {
+                Step::Member(name) => write!(path, "{dot}{name}"),
+                Step::Element(index) => write!(path, "[{index}]"),
+            };
+            written.expect("strings can be written to");
+        }
+        path
+    }
+
+    fn to(&self, step: Step<'a>, value: Option<Value>) -> Place<'a> {
+        #[cfg(test)]
+        super::json::count_work();
+        let mut place = Place { found: self.found.and_then(|(json, _)| Some((json, value?))), ..*self };
+        if let Some(slot) = place.steps.get_mut(self.depth) {
+            *slot = step;
+        }
+        place.depth += 1;
+        place
     }
 
     /// A member of an object.
     #[must_use]
-    pub fn key(&self, key: &str) -> Place<'a> {
-        let path = if self.path.is_empty() { key.to_owned() } else { format!("{}.{key}", self.path) };
-        Place { value: self.value.and_then(|v| v.get(key)), path }
+    pub fn key(&self, key: &'a str) -> Place<'a> {
+        self.to(Step::Member(key), self.found.and_then(|(json, value)| json.member(value, key)))
     }
 
     /// An extension.
     #[must_use]
-    pub fn extension(&self, name: &str) -> Place<'a> {
+    pub fn extension(&self, name: &'a str) -> Place<'a> {
         self.key("extensions").key(name)
+    }
+
+    fn elements(&self) -> &'a [Value] {
+        self.found.map_or(&[], |(json, value)| json.elements(value))
     }
 
     /// An element of an array.
     #[must_use]
     pub fn item(&self, index: usize) -> Place<'a> {
-        Place { value: self.value.and_then(|v| v.get(index)), path: format!("{}[{index}]", self.path) }
+        self.to(Step::Element(index), self.elements().get(index).copied())
+    }
+
+    /// Number of elements of an array; 0 for anything else.
+    pub fn len(&self) -> usize {
+        self.elements().len()
+    }
+
+    /// True if it is no array, or has no elements.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
     }
 
     /// All elements of an array.
-    pub fn items(&self) -> Vec<Place<'a>> {
-        let count = self.value.and_then(Value::as_array).map_or(0, Vec::len);
-        (0..count).map(|i| self.item(i)).collect()
+    pub fn items(&self) -> impl DoubleEndedIterator<Item = Place<'a>> + ExactSizeIterator + use<'a> {
+        let place = *self;
+        self.elements().iter().enumerate().map(move |(i, value)| place.to(Step::Element(i), Some(*value)))
     }
 
-    /// Names of the members of an object.
-    pub fn names(&self) -> Vec<&'a str> {
-        self.value.and_then(Value::as_object).map_or_else(Vec::new, |o| o.keys().map(String::as_str).collect())
+    /// All members of an object, with their names.
+    pub fn members(&self) -> impl Iterator<Item = (&'a str, Place<'a>)> + use<'a> {
+        let place = *self;
+        let members = self.found.map(|(json, value)| json.members(value));
+        members.into_iter().flatten().map(move |(name, value)| (name, place.to(Step::Member(name), Some(value))))
     }
 
     /// An error at this place.
     pub fn error(&self, message: impl Into<String>) -> GltfError {
-        GltfError { place: self.path.clone(), message: message.into() }
+        GltfError { place: self.path(), message: message.into() }
     }
 
     /// True if there is something.
     pub fn exists(&self) -> bool {
-        self.value.is_some()
+        self.found.is_some()
+    }
+
+    fn value(&self) -> Option<Value> {
+        self.found.map(|(_, value)| value)
     }
 
     /// A finite number.
     pub fn number(&self) -> Option<f32> {
-        self.value.and_then(Value::as_f64).map(|v| v as f32).filter(|v| v.is_finite())
+        self.value()?.number().map(|v| v as f32).filter(|v| v.is_finite())
     }
 
     /// An integer that is not negative, which may be written with a fraction of 0.
     pub fn index(&self) -> Option<usize> {
         // Integers of floats are exact up to 2⁵³
         let whole = |v: f64| (v >= 0.0 && v.fract() == 0.0 && v < 9e15).then_some(v as u64);
-        let value = self.value.and_then(|v| v.as_u64().or_else(|| v.as_f64().and_then(whole)));
-        value.and_then(|v| usize::try_from(v).ok())
+        let value = self.value()?;
+        usize::try_from(value.whole().or_else(|| value.number().and_then(whole))?).ok()
     }
 
     /// Text.
     pub fn text(&self) -> Option<&'a str> {
-        self.value.and_then(Value::as_str)
+        self.found.and_then(|(json, value)| json.text(value))
     }
 
     /// True or false.
     pub fn flag(&self) -> Option<bool> {
-        self.value.and_then(Value::as_bool)
+        self.value()?.flag()
     }
 
     /// True if it is there and true.
@@ -103,22 +165,21 @@ impl<'a> Place<'a> {
 
     /// True for an array.
     pub fn is_array(&self) -> bool {
-        self.value.is_some_and(Value::is_array)
+        self.value().is_some_and(Value::is_array)
     }
 
     /// True for an object.
     pub fn is_object(&self) -> bool {
-        self.value.is_some_and(Value::is_object)
+        self.value().is_some_and(Value::is_object)
     }
 
     /// An array of numbers, as many as asked for.
     pub fn numbers<const N: usize>(&self) -> Option<[f32; N]> {
-        let items = self.items();
-        if items.len() != N {
+        if self.len() != N {
             return None;
         }
         let mut numbers = [0.0; N];
-        for (number, item) in numbers.iter_mut().zip(&items) {
+        for (number, item) in numbers.iter_mut().zip(self.items()) {
             *number = item.number()?;
         }
         Some(numbers)

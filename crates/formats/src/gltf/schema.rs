@@ -4,6 +4,7 @@
 //! reference to a texture. What is absent is no error here; who needs it says so.
 
 use super::place::{GltfError, Place};
+use std::sync::LazyLock;
 
 /// Greatest number of errors of one file that are named.
 const MAX_ERRORS: usize = 20;
@@ -180,39 +181,77 @@ const TEXTURES: &[&str] = &[
     "extensions.KHR_materials_transmission.transmissionTexture",
 ];
 
+/// Rules by place: what a value must be, and the rules of its children. One walk over a document checks all of them, and
+/// takes no time for members of extensions that are not there.
+#[derive(Default)]
+struct Level {
+    rules: Vec<Rule>,
+    members: Vec<(&'static str, Level)>,
+    any_member: Option<Box<Level>>,
+    elements: Option<Box<Level>>,
+}
+
+static LEVELS: LazyLock<Level> = LazyLock::new(|| {
+    let mut root = Level::default();
+    for &(path, rule) in RULES {
+        match path.split_once('@') {
+            Some((before, after)) => {
+                let material = root.below(before.trim_end_matches('.'));
+                TEXTURES.iter().for_each(|texture| material.below(texture).below(after).rules.push(rule));
+            }
+            None => root.below(path).rules.push(rule),
+        }
+    }
+    root
+});
+
+impl Level {
+    /// The level of a path from here.
+    fn below(&mut self, path: &'static str) -> &mut Level {
+        path.split('.').filter(|part| !part.is_empty()).fold(self, |level, part| {
+            let level = match part.trim_end_matches("[]") {
+                "*" => level.any_member.get_or_insert_default(),
+                name => level.member(name),
+            };
+            if part.ends_with("[]") { level.elements.get_or_insert_default() } else { level }
+        })
+    }
+
+    fn member(&mut self, name: &'static str) -> &mut Level {
+        let index = self.members.iter().position(|(other, _)| *other == name).unwrap_or_else(|| {
+            self.members.push((name, Level::default()));
+            self.members.len() - 1
+        });
+        &mut self.members[index].1
+    }
+
+    /// Checks a place and all below; stops at the limit of errors.
+    fn check(&self, root: &Place<'_>, place: &Place<'_>, errors: &mut Vec<GltfError>) {
+        for rule in &self.rules {
+            errors.extend(rule.check(root, place).err().map(|message| place.error(message)));
+        }
+        let mut check = |level: &Level, place: &Place<'_>| {
+            if errors.len() < MAX_ERRORS {
+                level.check(root, place, errors);
+            }
+        };
+        for (name, level) in &self.members {
+            Some(place.key(name)).filter(Place::exists).iter().for_each(|place| check(level, place));
+        }
+        if let Some(level) = &self.any_member {
+            place.members().for_each(|(_, place)| check(level, &place));
+        }
+        if let Some(level) = &self.elements {
+            place.items().for_each(|place| check(level, &place));
+        }
+    }
+}
+
 /// All that is not what it must be, up to a limit.
 pub fn errors(root: &Place<'_>) -> Vec<GltfError> {
     let mut errors = Vec::new();
-    for (path, rule) in RULES {
-        let textures = if path.contains('@') { TEXTURES } else { &[""] };
-        for texture in textures {
-            for place in places(root, &path.replace('@', texture)) {
-                if let Err(message) = rule.check(root, &place) {
-                    errors.push(place.error(message));
-                }
-                if errors.len() == MAX_ERRORS {
-                    return errors;
-                }
-            }
-        }
-    }
+    LEVELS.check(root, root, &mut errors);
     errors
-}
-
-/// The places of a path that exist.
-fn places<'a>(root: &Place<'a>, path: &str) -> Vec<Place<'a>> {
-    let mut places = vec![root.clone()];
-    for part in path.split('.') {
-        let key = part.trim_end_matches("[]");
-        places = match key {
-            "*" => places.iter().flat_map(|p| p.names().into_iter().map(|name| p.key(name))).collect(),
-            _ => places.iter().map(|p| p.key(key)).filter(Place::exists).collect(),
-        };
-        if part.ends_with("[]") {
-            places = places.iter().flat_map(Place::items).collect();
-        }
-    }
-    places
 }
 
 impl Rule {
@@ -225,7 +264,7 @@ impl Rule {
                 return if is_one { Ok(()) } else { Err(format!("must be one of {values:?}")) };
             }
             Numbers(count) => {
-                let is_right = place.items().len() == count && place.items().iter().all(|n| n.number().is_some());
+                let is_right = place.len() == count && place.items().all(|n| n.number().is_some());
                 return if is_right { Ok(()) } else { Err(format!("must be {count} numbers")) };
             }
             Word(words) => {
@@ -257,16 +296,17 @@ impl Rule {
 
 fn check_index(place: &Place<'_>, array: &Place<'_>) -> Result<(), String> {
     let Some(index) = place.index() else { return Err("must be an integer that is not negative".to_owned()) };
-    let count = array.items().len();
-    if index < count { Ok(()) } else { Err(format!("{}[{index}] is not there, of {count}", array.path)) }
+    let count = array.len();
+    if index < count { Ok(()) } else { Err(format!("{}[{index}] is not there, of {count}", array.path())) }
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::json::{Json, WORK};
     use super::*;
 
     fn messages(json: &str) -> Vec<String> {
-        errors(&Place::root(&serde_json::from_str(json).unwrap())).iter().map(ToString::to_string).collect()
+        errors(&Place::root(&Json::parse(json.as_bytes()).unwrap())).iter().map(ToString::to_string).collect()
     }
 
     #[test]
@@ -334,6 +374,27 @@ mod tests {
         let said = of("volume", r#""attenuationColor":1,"attenuationDistance":"far""#).join("\n");
         assert!(said.contains("attenuationColor: must be 3 numbers"), "{said}");
         assert!(said.contains("attenuationDistance: must be a number"), "{said}");
+    }
+
+    #[test]
+    fn twice_as_many_elements_take_twice_the_work() {
+        let work = |n: usize| {
+            let all = |element: &dyn Fn(usize) -> String| (0..n).map(element).collect::<Vec<_>>().join(",");
+            let text = format!(
+                r#"{{"scenes":[{{"nodes":[{}]}}],"nodes":[{}],"meshes":[{}],"materials":[{}],"accessors":[{}]}}"#,
+                all(&|i| i.to_string()),
+                all(&|i| format!(r#"{{"mesh":{i},"children":[{}],"translation":[0,0,{i}]}}"#, n - 1 - i)),
+                all(&|i| format!(r#"{{"primitives":[{{"attributes":{{"POSITION":{i}}},"material":{i}}}]}}"#)),
+                all(&|i| format!(r#"{{"name":"{i}","pbrMetallicRoughness":{{"metallicFactor":0.5}}}}"#)),
+                all(&|i| format!(r#"{{"count":{i},"type":"VEC3","componentType":5126}}"#)),
+            );
+            let json = Json::parse(text.as_bytes()).unwrap();
+            WORK.set(0);
+            assert_eq!(errors(&Place::root(&json)), []);
+            WORK.get()
+        };
+        let [few, many] = [100, 200].map(work);
+        assert!(few > 100 && many as f64 <= 2.1 * few as f64, "{few} values, then {many}");
     }
 
     #[test]
