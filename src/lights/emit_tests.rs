@@ -45,7 +45,7 @@ fn skylight() -> Light {
     };
     let at = |x: f32, y: f32| Vec3::new(x, y, 1.5 + 0.2 * x);
     let portal = Portal::new([at(-0.4, -0.5), at(-0.4, 0.7), at(0.8, 0.7), at(0.8, -0.5)]).unwrap();
-    Light::Portal(Arc::new(PortalLight::new(&map, world_from_light, scale, portal)))
+    Light::Portal(Arc::new(PortalLight::new(map, world_from_light, scale, portal)))
 }
 
 /// A light that points down, with an image of its intensity.

@@ -13,8 +13,11 @@ use lumiris_numbers::math::sphere_map::{
     pdf_lat_long_to_sphere, sphere_to_lat_long, wrap_equal_area_texel,
 };
 use lumiris_numbers::math::{Affine3A, Mat3, Rgb, TexelDistribution, Vec2, Vec3};
+use rayon::prelude::*;
 use std::f64::consts::PI;
 
+/// Parts of texels that are looked up for an integral, at least.
+const PARTS: usize = 1 << 18;
 /// Directions that are looked up together.
 const CHUNK: usize = 64;
 
@@ -282,29 +285,28 @@ impl EnvironmentMap {
         }
     }
 
-    /// Calls `visit` with directions, radiances and solid angles (sr) of small parts of all texels that have, or are next to
-    /// one that has, a luminance above `bright`.
-    pub(super) fn each_bright_part(&self, bright: f32, mut visit: impl FnMut(Vec3, Rgb, f32)) {
-        let is_bright = |x: usize, y: usize| {
-            (0..9).any(|k| {
-                color(self.texels[y * (self.width + 2) + x + k / 3 * (self.width + 2) + k % 3]).luminance() > bright
-            })
-        };
-        let all = (0..self.height).flat_map(|y| (0..self.width).map(move |x| [x, y]));
-        let texels: Vec<[usize; 2]> = all.filter(|&[x, y]| is_bright(x, y)).collect();
-        // As fine as takes a second or so
-        let parts = ((1 << 24) / texels.len().max(1)).isqrt().clamp(4, 64);
-        let area = 1.0 / (self.width * self.height * parts * parts) as f32;
-        for [x, y] in texels {
-            for k in 0..parts * parts {
-                let within = |k: usize| (k as f32 + 0.5) / parts as f32;
-                let p = Vec2::new(
-                    (x as f32 + within(k % parts)) / self.width as f32,
-                    (y as f32 + within(k / parts)) / self.height as f32,
-                );
+    /// ∫ luminance · `weight` dω over the sphere, by lookups in parts of texels.
+    pub(super) fn integral(&self, weight: impl Fn(Vec3) -> f32 + Sync) -> f64 {
+        let parts = (PARTS / (self.width * self.height)).isqrt().max(1);
+        let (width, height) = (self.width * parts, self.height * parts);
+        let row = |y: usize| -> f64 {
+            let at = |x: usize| {
+                let p = Vec2::new((x as f32 + 0.5) / width as f32, (y as f32 + 0.5) / height as f32);
                 let (w, density) = self.to_sphere(p);
-                visit(w, self.lookup(p), area / density);
-            }
+                f64::from(self.lookup(p).luminance() * weight(w) / density)
+            };
+            (0..width).map(at).sum()
+        };
+        // Rows have their places, so that the sum does not depend on threads
+        let rows: Vec<f64> = (0..height).into_par_iter().map(row).collect();
+        rows.iter().sum::<f64>() / (width * height) as f64
+    }
+
+    /// Angle that a texel is wide and high, roughly (radians).
+    pub(super) fn texel_angle(&self) -> f32 {
+        match self.mapping {
+            EnvironmentMapping::EqualArea => (4.0 * PI).sqrt() as f32 / self.width as f32,
+            EnvironmentMapping::LatLong => PI as f32 / self.height as f32,
         }
     }
 

@@ -1,26 +1,36 @@
 //! An environment map that is seen through a rectangle: portal-masked sampling [Bitterli et al. 2015], with the portals of
 //! pbrt-v4.
 //!
-//! In the frame of the portal (x and y along its edges, z towards the sky) a direction is u = atan(x/z)/π + ½ and
-//! v = atan(y/z)/π + ½. Straight edges are lines of constant u or v there, so what a point sees through the portal is a
-//! rectangle, the window. The map is resampled to cells of (u, v), by its means over them, so that no light is lost however
-//! small its source is. Within a window the density is proportional to luminance times the mean of J over the cell, per
-//! steradian, where J = dω/d(u, v) = π²(1 − x²)(1 − y²)/z: running sums over the cells give the integral over any rectangle,
-//! and are inverted.
+//! In the frame of the portal (x and y along its edges, z towards the sky) a direction (x, y, 1)/√(1 + x² + y²) has the
+//! coordinates (s, t), each by x = 4a(1 + a²)/(1 − a²)² with a = 2s − 1. Straight edges are lines of constant s or t, so a
+//! point sees a rectangle of (s, t) through the portal, the window.
+//!
+//! Samples have the density of a table of (s, t) within the window: running sums over its cells give the integral over any
+//! rectangle, and are inverted. A cell has the root mean square of the luminance in it, the best of all densities that are
+//! constant there, times the mean of J = dω/d(s, t). Near the horizon x grows as (1 − |a|)⁻²: the least power by which J, and with it
+//! the weight of a sample, is bounded where both x and y are large.
+//!
+//! The radiance of a direction is the map's own. The table is no more than a density, and positive everywhere: what is estimated
+//! does not depend on its cells.
 
 use super::emit::EmissionSample;
 use super::environment::infinite_sample;
 use super::{EnvironmentMap, LightCtx, LightSample};
 use lumiris_numbers::math::{Bounds3, Mat3, PiecewiseConstant2D, Rgb, Vec3};
 use rayon::prelude::*;
-use std::f64::consts::PI;
+use std::sync::Arc;
 
 /// Cells along each side, at least and at most.
-const CELLS: [usize; 2] = [256, 4096];
-/// Steps of the lookups of the map along each side of a cell.
-const LOOKUPS: usize = 3;
-/// Luminance by the mean beyond which light is placed by where it comes from, and not found by lookups.
-const BRIGHT: f32 = 4.0;
+const CELLS: [usize; 2] = [512, 4096];
+/// Lookups of the map along a side of a cell, at least and at most; otherwise as many for each texel.
+const LOOKUPS: [f32; 2] = [2.0, 64.0];
+const LOOKUPS_PER_TEXEL: f32 = 1.5;
+/// Part of the mean square of a cell that each of its neighbours along an axis gets: lookups may miss the corner of a sun.
+const SMOOTHING: f64 = 1.0 / 16.0;
+/// Part of the mean over all cells that each cell has at least.
+const FLOOR: f64 = 0.01;
+/// Sum of the table, in units of its rounding: sums of whole numbers below 2⁵³ are exact, so no cell is lost in them.
+const TOTAL: f64 = (1_u64 << 50) as f64;
 /// By how much edges may miss being perpendicular and of the same length, relatively.
 const TOLERANCE: f32 = 1e-3;
 
@@ -28,13 +38,16 @@ const TOLERANCE: f32 = 1e-3;
 #[derive(Clone, Debug)]
 pub struct PortalLight {
     portal: Portal,
-    /// Cells along each side.
+    map: Arc<EnvironmentMap>,
+    /// Orthogonal.
+    light_from_world: Mat3,
+    /// Factor of the radiances of the map.
+    scale: f32,
+    /// Cells of the table along each side.
     cells: usize,
-    /// Radiances of the cells, row by row.
-    radiances: Vec<Rgb>,
-    /// Integrals of luminance times J from (0, 0) to the corners of the cells, row by row; 1 at the last one.
+    /// Integrals of the table from (0, 0) to the corners of the cells, row by row: whole numbers.
     sums: Vec<f64>,
-    /// What passes through the portal by (u, v): luminance times z.
+    /// Density of emitted directions by (s, t).
     emitted: PiecewiseConstant2D,
     /// Luminance of the power that passes.
     phi: f32,
@@ -50,7 +63,7 @@ pub struct Portal {
     extent: [f32; 2],
 }
 
-/// The cells that a point sees: its corners in (u, v).
+/// The directions that a point sees: its corners in (s, t).
 type Window = [[f64; 2]; 2];
 
 impl Portal {
@@ -94,46 +107,52 @@ impl Portal {
     fn window(&self, p: Vec3) -> Option<Window> {
         let a = (self.world_from_portal.transpose() * (self.corner - p)).as_dvec3();
         let [width, height] = self.extent.map(f64::from);
-        let at = |x: f64| (x / a.z).atan() / PI + 0.5;
+        let at = |x: f64| coordinate(x / a.z);
         (a.z > 0.0).then(|| [[at(a.x), at(a.y)], [at(a.x + width), at(a.y + height)]])
     }
 }
 
+/// The coordinate s, in 0..=1, of x.
+#[inline]
+fn coordinate(x: f64) -> f64 {
+    // With x = tan θ: h = tan(θ/2) = 2a/(1 + a²), and 1 − h² = 2/(1 + r)
+    let r = (1.0 + x * x).sqrt();
+    let h = x / (1.0 + r);
+    0.5 + 0.5 * h / (1.0 + (2.0 / (1.0 + r)).sqrt())
+}
+
+/// x and dx/ds at the coordinate s.
+#[inline]
+fn tangent(s: f64) -> (f64, f64) {
+    let a = 2.0 * s - 1.0;
+    let (a2, rest) = (a * a, (1.0 - a) * (1.0 + a));
+    (4.0 * a * (1.0 + a2) / (rest * rest), 8.0 * (1.0 + a2 * (6.0 + a2)) / (rest * rest * rest))
+}
+
 /// The direction in the frame of the portal, and J.
 #[inline]
-fn direction([u, v]: [f64; 2]) -> (Vec3, f64) {
-    let (x, y) = ((PI * (u - 0.5)).tan(), (PI * (v - 0.5)).tan());
-    let z2 = 1.0 / (1.0 + x * x + y * y);
-    let z = z2.sqrt();
-    // 1 − (xz)² = z²(1 + y²)
-    let jacobian = PI * PI * z2 * (1.0 + y * y) * (1.0 + x * x) * z;
-    (Vec3::new((x * z) as f32, (y * z) as f32, z as f32), jacobian)
+fn direction([s, t]: [f64; 2]) -> (Vec3, f64) {
+    let ((x, dx), (y, dy)) = (tangent(s), tangent(t));
+    let z = 1.0 / (1.0 + x * x + y * y).sqrt();
+    (Vec3::new((x * z) as f32, (y * z) as f32, z as f32), dx * dy * z * z * z)
 }
 
 impl PortalLight {
     /// Light of `map`, whose directions the orthogonal `world_from_light` turns, through `portal`.
-    pub fn new(map: &EnvironmentMap, world_from_light: Mat3, scale: f32, portal: Portal) -> Self {
+    pub fn new(map: Arc<EnvironmentMap>, world_from_light: Mat3, scale: f32, portal: Portal) -> Self {
         let [width, height] = map.resolution();
-        let cells = width.max(height).clamp(CELLS[0], CELLS[1]);
-        let light_from_portal = world_from_light.transpose() * portal.world_from_portal;
-        let mut means = means(map, light_from_portal, cells, f32::INFINITY);
-        let mean = means.iter().map(|m| f64::from(m.radiance.luminance()) * m.jacobian).sum::<f64>()
-            / means.iter().map(|m| m.jacobian).sum::<f64>();
-        let bright = BRIGHT * mean as f32;
-        if means.iter().any(|m| m.radiance.luminance() > bright) {
-            // Those of a large map are half a gigabyte: not twice at once
-            drop(means);
-            means = self::means(map, light_from_portal, cells, bright);
-            add_bright(map, light_from_portal, cells, bright, &mut means);
-        }
-        let flux = |m: &Cell| f64::from(m.radiance.luminance()) * m.projected;
-        let sums = running_sums(means.iter().map(|m| f64::from(m.radiance.luminance()) * m.jacobian), cells);
-        let area = f64::from(portal.extent[0] * portal.extent[1] * scale);
-        let phi = area * means.iter().map(flux).sum::<f64>() / means.len() as f64;
-        let emitted: Vec<f32> = means.iter().map(|m| flux(m) as f32).collect();
-        let emitted = PiecewiseConstant2D::new(&emitted, cells);
-        let radiances = means.iter().map(|m| m.radiance * scale).collect();
-        PortalLight { portal, cells, radiances, sums, emitted, phi: phi as f32 }
+        let n = (2 * width.max(height)).clamp(CELLS[0], CELLS[1]);
+        let light_from_world = world_from_light.transpose();
+        let cells = cells(&map, light_from_world * portal.world_from_portal, n);
+        let luminances = smoothed_luminances(&cells, n);
+        let of = |measure: fn(&Cell) -> f32| luminances.iter().zip(&cells).map(move |(l, cell)| l * measure(cell));
+        let sums = running_sums(|| of(|cell| cell.jacobian), n);
+        let emitted = PiecewiseConstant2D::new(&of(|cell| cell.projected).collect::<Vec<f32>>(), n);
+
+        let to_sky = portal.world_from_portal.z_axis;
+        let flux = map.integral(|w| (world_from_light * w).dot(to_sky).max(0.0));
+        let phi = flux as f32 * portal.extent[0] * portal.extent[1] * scale;
+        PortalLight { portal, map, light_from_world, scale, cells: n, sums, emitted, phi }
     }
 
     /// Luminance of the power that passes through the portal (W).
@@ -141,26 +160,16 @@ impl PortalLight {
         self.phi
     }
 
-    /// Index of the cell of a place.
+    /// Radiance of the sky in the unit direction `w`.
     #[inline]
-    fn cell(&self, uv: [f64; 2]) -> usize {
-        let [x, y] = uv.map(|x| self.place(x).0);
-        y * self.cells + x
-    }
-
-    /// Where a direction lies, and J.
-    #[inline]
-    fn project(&self, w: Vec3) -> ([f64; 2], f64) {
-        let v = (self.portal.world_from_portal.transpose() * w).as_dvec3();
-        // 1 − x² by the other components: rounding does not cancel there
-        let [x2, y2, z2] = [v.x * v.x, v.y * v.y, v.z * v.z];
-        ([v.x, v.y].map(|x| (x / v.z).atan() / PI + 0.5), PI * PI * (y2 + z2) * (x2 + z2) / v.z)
+    fn radiance(&self, w: Vec3) -> Rgb {
+        self.map.le(self.light_from_world * w) * self.scale
     }
 
     /// Radiance that arrives at `p` from the unit direction `w`.
     #[inline]
     pub fn le(&self, p: Vec3, w: Vec3) -> Rgb {
-        if self.portal.is_passed(p, w) { self.radiances[self.cell(self.project(w).0)] } else { Rgb::BLACK }
+        if self.portal.is_passed(p, w) { self.radiance(w) } else { Rgb::BLACK }
     }
 
     /// [`le`](Self::le), and the density of [`sample_li`](Self::sample_li) per steradian.
@@ -169,9 +178,16 @@ impl PortalLight {
         let Some(window) = self.portal.window(p).filter(|_| self.portal.is_passed(p, w)) else {
             return (Rgb::BLACK, 0.0);
         };
-        let (uv, jacobian) = self.project(w);
-        let pdf = (self.density(uv) / self.integral(&window) / jacobian) as f32;
-        (self.radiances[self.cell(uv)], if pdf.is_finite() { pdf } else { 0.0 })
+        let v = (self.portal.world_from_portal.transpose() * w).as_dvec3();
+        let pdf = self.pdf([v.x / v.z, v.y / v.z].map(coordinate), self.integral(&window));
+        (self.radiance(w), pdf.unwrap_or(0.0))
+    }
+
+    /// Density per steradian at a place in a window of this integral, if it is positive and finite.
+    #[inline]
+    fn pdf(&self, st: [f64; 2], integral: f64) -> Option<f32> {
+        let pdf = (self.density(st) / integral / direction(st).1) as f32;
+        (pdf > 0.0 && pdf.is_finite()).then_some(pdf)
     }
 
     /// See [`super::Light::sample_li`].
@@ -179,11 +195,9 @@ impl PortalLight {
     pub(super) fn sample_li(&self, ctx: &LightCtx, u: [f32; 2]) -> Option<LightSample> {
         let window = self.portal.window(ctx.p)?;
         let integral = self.integral(&window);
-        let uv = self.sample_window(&window, integral, u.map(f64::from))?;
-        let (w, jacobian) = direction(uv);
-        let wi = (self.portal.world_from_portal * w).normalize();
-        let pdf = (self.density(uv) / integral / jacobian) as f32;
-        (pdf > 0.0 && pdf.is_finite()).then(|| infinite_sample(wi, self.radiances[self.cell(uv)], pdf))
+        let st = self.sample_window(&window, integral, u.map(f64::from))?;
+        let wi = (self.portal.world_from_portal * direction(st).0).normalize();
+        Some(infinite_sample(wi, self.radiance(wi), self.pdf(st, integral)?))
     }
 
     /// See [`super::Light::sample_le`]: in proportion to what passes, evenly over the portal. It starts outside of the scene, so
@@ -194,25 +208,23 @@ impl PortalLight {
         u_position: [f32; 2],
         u_direction: [f32; 2],
     ) -> Option<EmissionSample> {
-        let s = self.emitted.sample(u_direction)?;
-        let uv = [s.p.x.into(), s.p.y.into()];
-        let (w, jacobian) = direction(uv);
+        let sample = self.emitted.sample(u_direction)?;
+        let (w, jacobian) = direction([sample.p.x.into(), sample.p.y.into()]);
         let Portal { corner, world_from_portal, extent } = self.portal;
         let wi = (world_from_portal * w).normalize();
         let [x, y] = [u_position[0] * extent[0], u_position[1] * extent[1]];
         let p = corner + world_from_portal * Vec3::new(x, y, 0.0);
-        let power = self.radiances[self.cell(uv)] * (w.z * extent[0] * extent[1] * jacobian as f32 / s.pdf);
+        let power = self.radiance(wi) * (w.z * extent[0] * extent[1] * jacobian as f32 / sample.pdf);
         EmissionSample::in_space(p + wi * ((p - centre).length() + radius), -wi, power)
     }
 
-    /// The table at a place, its integral being 1.
+    /// The table at a place, per unit of area.
     #[inline]
-    fn density(&self, uv: [f64; 2]) -> f64 {
+    fn density(&self, st: [f64; 2]) -> f64 {
         let n = self.cells;
-        let [x, y] = uv.map(|x| ((x * n as f64) as usize).min(n - 1));
+        let [x, y] = st.map(|x| self.place(x).0);
         let at = |x: usize, y: usize| self.sums[y * (n + 1) + x];
-        let cell = (at(x + 1, y + 1) - at(x, y + 1)) - (at(x + 1, y) - at(x, y));
-        cell.max(0.0) * (n * n) as f64
+        ((at(x + 1, y + 1) - at(x, y + 1)) - (at(x + 1, y) - at(x, y))) * (n * n) as f64
     }
 
     /// The sum at column `x` and at a height of `y` rows.
@@ -233,40 +245,40 @@ impl PortalLight {
 
     /// Integral of the table from (0, 0).
     #[inline]
-    fn sum(&self, [u, v]: [f64; 2]) -> f64 {
-        let ((column, within), row) = (self.place(u), self.place(v));
+    fn sum(&self, [s, t]: [f64; 2]) -> f64 {
+        let ((column, within), row) = (self.place(s), self.place(t));
         let [left, right] = [0, 1].map(|i| self.at_column(column + i, row));
         left + (right - left) * within
     }
 
     #[inline]
-    fn integral(&self, &[[u0, v0], [u1, v1]]: &Window) -> f64 {
-        (self.sum([u1, v1]) - self.sum([u0, v1])) - (self.sum([u1, v0]) - self.sum([u0, v0]))
+    fn integral(&self, &[[s0, t0], [s1, t1]]: &Window) -> f64 {
+        (self.sum([s1, t1]) - self.sum([s0, t1])) - (self.sum([s1, t0]) - self.sum([s0, t0]))
     }
 
-    /// The place in a window by two numbers, in proportion to the table: u by the integral over all of its v, and v within
+    /// The place in a window by two numbers, in proportion to the table: s by the integral over all of its t, and t within
     /// the column of that.
     #[inline]
-    fn sample_window(&self, &[[u0, v0], [u1, v1]]: &Window, integral: f64, xi: [f64; 2]) -> Option<[f64; 2]> {
+    fn sample_window(&self, &[[s0, t0], [s1, t1]]: &Window, integral: f64, xi: [f64; 2]) -> Option<[f64; 2]> {
         if !(integral > 0.0) {
             return None;
         }
-        // Choose u
-        let rows = [v0, v1].map(|v| self.place(v));
+        // Choose s
+        let rows = [t0, t1].map(|t| self.place(t));
         let strip = |x: usize| self.at_column(x, rows[1]) - self.at_column(x, rows[0]);
-        let (first, within) = self.place(u0);
+        let (first, within) = self.place(s0);
         let begin = strip(first) + (strip(first + 1) - strip(first)) * within;
-        let u = invert(&strip, begin + xi[0] * integral, [first, self.place(u1).0], self.cells).clamp(u0, u1);
+        let s = invert(&strip, begin + xi[0] * integral, [first, self.place(s1).0], self.cells).clamp(s0, s1);
 
-        // Choose v in its column
-        let column = self.place(u).0;
+        // Choose t in its column
+        let column = self.place(s).0;
         let n = self.cells + 1;
         let strip = |y: usize| self.sums[y * n + column + 1] - self.sums[y * n + column];
         let at = |(row, within): (usize, f64)| strip(row) + (strip(row + 1) - strip(row)) * within;
         let [begin, end] = rows.map(at);
         let rows = [rows[0].0, rows[1].0];
-        let v = invert(&strip, begin + xi[1] * (end - begin), rows, self.cells).clamp(v0, v1);
-        Some([u, v])
+        let t = invert(&strip, begin + xi[1] * (end - begin), rows, self.cells).clamp(t0, t1);
+        Some([s, t])
     }
 }
 
@@ -286,73 +298,76 @@ fn invert(f: &impl Fn(usize) -> f64, target: f64, within: [usize; 2], n: usize) 
 /// What the map has in a cell.
 #[derive(Clone, Copy, Debug, Default)]
 struct Cell {
-    /// Mean radiance over its solid angle.
-    radiance: Rgb,
+    /// Root mean square of the luminance over its solid angle.
+    luminance: f32,
     /// Means of J and of z·J.
-    jacobian: f64,
-    projected: f64,
+    jacobian: f32,
+    projected: f32,
 }
 
-/// A colour scaled down to the luminance `most`.
-fn limited(c: Rgb, most: f32) -> Rgb {
-    let luminance = c.luminance();
-    if luminance > most { c * (most / luminance) } else { c }
-}
-
-/// Adds what the map has beyond the luminance `bright`.
-fn add_bright(map: &EnvironmentMap, light_from_portal: Mat3, cells: usize, bright: f32, means: &mut [Cell]) {
-    let portal_from_light = light_from_portal.transpose();
-    map.each_bright_part(bright, |w, le, steradians| {
-        let v = portal_from_light * w;
-        if v.z > 0.0 {
-            let bin = |x: f32| (((x / v.z).atan() / std::f32::consts::PI + 0.5) * cells as f32) as usize;
-            let cell = &mut means[bin(v.y).min(cells - 1) * cells + bin(v.x).min(cells - 1)];
-            let solid_angle = cell.jacobian / (cells * cells) as f64;
-            cell.radiance += (le - limited(le, bright)) * (steradians / solid_angle as f32);
+/// The cells row by row, by lookups in their insides: on the edges of the table, J is not defined.
+fn cells(map: &EnvironmentMap, light_from_portal: Mat3, n: usize) -> Vec<Cell> {
+    let cell = |x: usize, y: usize| {
+        let at = |dx: f64, dy: f64| direction([(x as f64 + dx) / n as f64, (y as f64 + dy) / n as f64]);
+        // Cells next to a corner have a wide range of azimuths
+        let lookups = |a: (Vec3, f64), b: (Vec3, f64)| {
+            let texels = (a.0 - b.0).length() / map.texel_angle();
+            (LOOKUPS_PER_TEXEL * texels).ceil().clamp(LOOKUPS[0], LOOKUPS[1]) as usize
+        };
+        let (across, down) = (lookups(at(0.01, 0.5), at(0.99, 0.5)), lookups(at(0.5, 0.01), at(0.5, 0.99)));
+        let [mut square, mut sum, mut projected] = [0.0; 3];
+        for k in 0..across * down {
+            let midpoint = |i: usize, n: usize| (i as f64 + 0.5) / n as f64;
+            let (w, jacobian) = at(midpoint(k % across, across), midpoint(k / across, down));
+            square += jacobian * f64::from(map.le(light_from_portal * w).luminance()).powi(2);
+            sum += jacobian;
+            projected += jacobian * f64::from(w.z);
         }
-    });
+        let count = (across * down) as f64;
+        let [luminance, jacobian, projected] =
+            [(square / sum).sqrt(), sum / count, projected / count].map(|x| x as f32);
+        Cell { luminance, jacobian, projected }
+    };
+    (0..n).into_par_iter().flat_map_iter(|y| (0..n).map(move |x| cell(x, y))).collect()
 }
 
-/// The cells row by row, by the trapezoidal rule, of radiances limited to the luminance `most`.
-fn means(map: &EnvironmentMap, light_from_portal: Mat3, cells: usize, most: f32) -> Vec<Cell> {
-    let last = cells * LOOKUPS;
-    let weight = |k: usize| if k == 0 || k == LOOKUPS { 0.5 } else { 1.0 } / LOOKUPS as f64;
-    let look = |x: usize, y: usize| {
-        let (w, jacobian) = direction([x, y].map(|k| k as f64 / last as f64));
-        (limited(map.le(light_from_portal * w), most), jacobian, jacobian * f64::from(w.z))
+/// Luminances of the cells smoothed with those of their neighbours; none is 0 unless all are.
+fn smoothed_luminances(cells: &[Cell], n: usize) -> Vec<f32> {
+    let smoothed = |row: [f32; 3]| {
+        let [before, own, after] = row.map(|x| f64::from(x) * f64::from(x));
+        ((1.0 - 2.0 * SMOOTHING) * own + SMOOTHING * (before + after)).sqrt() as f32
     };
-    let row = |y: usize| {
-        let mut row = vec![Cell::default(); cells];
-        for k in 0..=LOOKUPS {
-            let found: Vec<(Rgb, f64, f64)> = (0..=last).map(|x| look(x, y * LOOKUPS + k)).collect();
-            for (x, cell) in row.iter_mut().enumerate() {
-                for (i, &(le, jacobian, projected)) in found[x * LOOKUPS..=(x + 1) * LOOKUPS].iter().enumerate() {
-                    let weight = weight(i) * weight(k);
-                    cell.radiance += le * (weight * jacobian) as f32;
-                    cell.jacobian += weight * jacobian;
-                    cell.projected += weight * projected;
-                }
-            }
-        }
-        row.iter_mut().for_each(|cell| cell.radiance = cell.radiance / cell.jacobian as f32);
-        row
-    };
-    (0..cells).into_par_iter().flat_map_iter(row).collect()
+    let near = |i: usize| [i.saturating_sub(1), i, (i + 1).min(n - 1)];
+    let along_rows: Vec<f32> =
+        (0..n * n).map(|i| smoothed(near(i % n).map(|x| cells[i / n * n + x].luminance))).collect();
+    let mut luminances: Vec<f32> =
+        (0..n * n).map(|i| smoothed(near(i / n).map(|y| along_rows[y * n + i % n]))).collect();
+
+    let (mut flux, mut solid_angle) = (0.0, 0.0);
+    for (luminance, cell) in luminances.iter().zip(cells) {
+        flux += f64::from(*luminance) * f64::from(cell.jacobian);
+        solid_angle += f64::from(cell.jacobian);
+    }
+    let least = (FLOOR * flux / solid_angle) as f32;
+    luminances.iter_mut().for_each(|luminance| *luminance += least);
+    luminances
 }
 
-/// Integrals from the first corner to all corners of `n` × `n` values, divided by that of all.
-fn running_sums(values: impl Iterator<Item = f64>, n: usize) -> Vec<f64> {
+/// Integrals from the first corner to all corners of `n` × `n` values, which become whole numbers of at least 1 with a sum
+/// near [`TOTAL`]; all 0 if they are.
+fn running_sums<I: Iterator<Item = f32>>(values: impl Fn() -> I, n: usize) -> Vec<f64> {
     let stride = n + 1;
     let mut sums = vec![0.0; stride * stride];
+    let whole: f64 = values().map(f64::from).sum();
+    if !(whole > 0.0) {
+        return sums;
+    }
     let mut row = 0.0;
-    for (i, value) in values.enumerate() {
+    for (i, value) in values().enumerate() {
         let (x, y) = (i % n + 1, i / n + 1);
+        let value = (f64::from(value) / whole * TOTAL).round().max(1.0);
         row = if x == 1 { value } else { row + value };
         sums[y * stride + x] = sums[(y - 1) * stride + x] + row;
-    }
-    let whole = sums[stride * stride - 1];
-    if whole > 0.0 {
-        sums.iter_mut().for_each(|s| *s /= whole);
     }
     sums
 }
@@ -361,9 +376,13 @@ fn running_sums(values: impl Iterator<Item = f64>, n: usize) -> Vec<f64> {
 mod tests {
     use super::*;
     use crate::lights::{EnvironmentFilter, EnvironmentMapping};
-    use lumiris_numbers::math::warp::sample_uniform_sphere;
+    use lumiris_numbers::estimators::stats::Welford;
+    use lumiris_numbers::math::Frame;
+    use lumiris_numbers::math::sphere_map::equal_area_sphere_to_square;
+    use lumiris_numbers::math::warp::{sample_cosine_hemisphere, sample_uniform_sphere};
     use lumiris_test_support::random::{Pcg32, RngExt, pcg32};
     use lumiris_test_support::{Moments, assert_chi_squared};
+    use std::f64::consts::PI;
 
     const X: Vec3 = Vec3::new(0.8, 0.6, 0.0);
     const Y: Vec3 = Vec3::new(-0.36, 0.48, 0.8);
@@ -378,8 +397,12 @@ mod tests {
         EnvironmentMap::new(texels, [size; 2], EnvironmentMapping::EqualArea, EnvironmentFilter::Nearest).unwrap()
     }
 
+    fn light_of(sky: EnvironmentMap) -> PortalLight {
+        PortalLight::new(Arc::new(sky), Mat3::from_rotation_x(0.4), 0.5, portal())
+    }
+
     fn light(texel: impl FnMut(usize) -> f32, size: usize) -> PortalLight {
-        PortalLight::new(&sky(texel, size), Mat3::from_rotation_x(0.4), 0.5, portal())
+        light_of(sky(texel, size))
     }
 
     /// A bright texel in an image that is dark elsewhere, and one with all kinds of values.
@@ -466,13 +489,12 @@ mod tests {
             for p in points(stream) {
                 // Cells of the window
                 let window @ [low, high] = light.portal.window(p).unwrap();
-                let place = |uv: [f64; 2]| [0, 1].map(|i| (uv[i] - low[i]) / (high[i] - low[i]) * N as f64);
+                let place = |st: [f64; 2]| [0, 1].map(|i| (st[i] - low[i]) / (high[i] - low[i]) * N as f64);
                 let mut observed = vec![0.0; N * N];
                 for _ in 0..count {
                     let s = light.sample_li(&LightCtx::at(p), stream.random::<[f32; 2]>()).unwrap();
                     let v = (light.portal.world_from_portal.transpose() * s.wi).as_dvec3();
-                    let [x, y] =
-                        place([v.x, v.y].map(|x| (x / v.z).atan() / PI + 0.5)).map(|x| (x as usize).min(N - 1));
+                    let [x, y] = place([v.x / v.z, v.y / v.z].map(coordinate)).map(|x| (x as usize).min(N - 1));
                     observed[y * N + x] += 1.0;
                 }
 
@@ -487,10 +509,10 @@ mod tests {
                 };
                 let (columns, rows, integral) = (edges(0), edges(1), light.integral(&window));
                 let mut expected = vec![0.0; N * N];
-                for (u, v) in columns.windows(2).flat_map(|u| rows.windows(2).map(move |v| (u, v))) {
-                    let uv = [u, v].map(|edges| 0.5 * (edges[0] + edges[1]));
-                    let [x, y] = place(uv).map(|x| (x as usize).min(N - 1));
-                    let probability = light.density(uv) / integral * (u[1] - u[0]) * (v[1] - v[0]);
+                for (s, t) in columns.windows(2).flat_map(|s| rows.windows(2).map(move |t| (s, t))) {
+                    let st = [s, t].map(|edges| 0.5 * (edges[0] + edges[1]));
+                    let [x, y] = place(st).map(|x| (x as usize).min(N - 1));
+                    let probability = light.density(st) / integral * (s[1] - s[0]) * (t[1] - t[0]);
                     expected[y * N + x] += probability * f64::from(count);
                 }
                 assert_chi_squared(&observed, &expected, 1e-6);
@@ -498,19 +520,63 @@ mod tests {
         }
     }
 
-    /// A sun of one texel, which lies across cells.
     #[test]
-    fn no_light_is_lost_or_added_where_the_map_is_resampled() {
+    fn phi_is_the_flux_of_a_sun_of_one_texel() {
         for at in [70, 105, 118, 135, 150] {
-            let light = light(|i| if i == at { 900.0 } else { 0.1 }, 16);
-            let flux = |w: Vec3, le: Rgb, steradians: f32| {
-                let z = portal().world_from_portal.z_axis.dot(Mat3::from_rotation_x(0.4) * w);
-                f64::from(le.luminance() * z.max(0.0) * steradians)
-            };
-            let mut sum = 0.0;
-            sky(|i| if i == at { 900.0 } else { 0.1 }, 16).each_bright_part(0.0, |w, le, s| sum += flux(w, le, s));
-            let expected = sum * 0.5 * 1.5;
-            assert!((f64::from(light.phi()) - expected).abs() < 3e-3 * expected, "{at}: {} {expected}", light.phi());
+            let sky = || sky(|i| if i == at { 900.0 } else { 0.1 }, 16);
+            let (map, turn, z) = (sky(), Mat3::from_rotation_x(0.4), portal().world_from_portal.z_axis);
+            let mut flux = Welford::default();
+            for i in 0..1_000_000_u32 {
+                // By the cosine: a lattice, whose errors are far below those of random points
+                let u = [(f64::from(i) + 0.5) / 1e6, f64::from(i) * 0.618_033_988_749_895 % 1.0].map(|u| u as f32);
+                let w = Frame::from_z(z).to_world(sample_cosine_hemisphere(u));
+                flux.add(PI * f64::from(map.le(turn.transpose() * w).luminance()));
+            }
+            let (expected, phi) = (flux.mean() * 0.5 * 1.5, f64::from(light_of(sky()).phi()));
+            assert!((phi - expected).abs() < 3e-3 * expected, "{at}: {phi} {expected}");
+        }
+    }
+
+    /// Points below the portal and beside it, next to its plane and far from it.
+    fn points_of_all_kinds() -> Vec<Vec3> {
+        let Portal { corner, world_from_portal, .. } = portal();
+        let at = |x: f32, y: f32, h: f32| corner + world_from_portal * Vec3::new(x, y, -h);
+        let places = [[0.7, 0.4], [0.01, 0.3], [2.5, 0.4], [4.0, 5.0], [-0.5, 9.0]];
+        places.into_iter().flat_map(|[x, y]| [10.0, 1.0, 0.05, 1e-3].map(|h| at(x, y, h))).collect()
+    }
+
+    #[test]
+    fn an_even_sky_has_samples_of_similar_weights() {
+        let (light, stream) = (light(|_| 1.0, 4), &mut pcg32([3, 6, 7]));
+        for p in points_of_all_kinds() {
+            let (mut weights, mut largest) = (Welford::default(), 0.0_f64);
+            for _ in 0..20_000 {
+                let s = light.sample_li(&LightCtx::at(p), stream.random::<[f32; 2]>()).unwrap();
+                weights.add(f64::from(1.0 / s.pdf));
+                largest = largest.max(f64::from(1.0 / s.pdf));
+            }
+            assert!(largest < 6.0 * weights.mean(), "{p}: {largest}, mean {}", weights.mean());
+        }
+    }
+
+    /// A sun of one texel beyond an edge of the window, across it and within, in a sky 10⁴ times darker.
+    #[test]
+    fn a_sun_at_the_edge_of_the_window_makes_no_outliers() {
+        const SIZE: usize = 64;
+        let Portal { corner, world_from_portal, .. } = portal();
+        let w = world_from_portal * Vec3::new(0.4, 0.3, 0.866);
+        let place = equal_area_sphere_to_square(Mat3::from_rotation_x(-0.4) * w.normalize());
+        let [x, y] = [place.x, place.y].map(|x| (x * SIZE as f32) as usize);
+        let (light, stream) = (light(|i| if i == y * SIZE + x { 1e4 } else { 1.0 }, SIZE), &mut pcg32([4, 6, 7]));
+        for k in 0..40 {
+            let p = corner + world_from_portal * Vec3::new(0.01 * k as f32 - 0.2, 0.5, 0.0) - w * 3.0;
+            let mut values = Welford::default();
+            for _ in 0..4000 {
+                let s = light.sample_li(&LightCtx::at(p), stream.random::<[f32; 2]>());
+                values.add(s.map_or(0.0, |s| f64::from(s.li.g / s.pdf)));
+            }
+            let variance = values.variance() / values.mean().powi(2);
+            assert!(variance < 2.5, "{k}: {variance}");
         }
     }
 

@@ -6,7 +6,9 @@ use crate::media::{assert_answer, assert_they_agree, choose, estimators, means};
 use lumiris::imaging::oiio::{Part, write_image};
 use lumiris::import::cache::FileCache;
 use lumiris::import::{LoadOptions, load_text};
+use lumiris::lights::{EnvironmentFilter, EnvironmentMap, EnvironmentMapping};
 use lumiris::scene::{AccelKind, RenderJob};
+use lumiris_numbers::math::{Rgb, Vec3};
 use std::f64::consts::PI;
 use std::path::Path;
 
@@ -39,6 +41,9 @@ Shape "trianglemesh" "point3 P" [-1 -1 1  1 -1 1  1 -0.3 1  -1 -0.3 1  -1 0.6 1 
 Material "diffuse" "rgb reflectance" [ 0 0 0 ]
 Shape "trianglemesh" "point3 P" [-1 0.3 1.2  1 0.3 1.2  1 0.9 1.3  -1 0.9 1.3] "integer indices" [0 1 2 0 2 3]
 "#;
+
+const FLOOR: &str =
+    r#"Shape "trianglemesh" "point3 P" [ -9 -9 0  9 -9 0  9 9 0  -9 9 0 ] "integer indices" [ 0 1 2 0 2 3 ]"#;
 
 /// A sky of 4 × 4 texels.
 fn folder() -> tempfile::TempDir {
@@ -81,8 +86,7 @@ fn a_room_has_the_light_that_it_has_without_a_portal() {
         let mut job = job(folder.path(), &text(portal, LOOKS[1]), AccelKind::Embree).unwrap();
         means(&mut job, 1).0
     });
-    // but for rounding in the means of cells
-    assert!((0..3).all(|c| (seen[0][c] - seen[1][c]).abs() < 1e-5 * seen[0][c]), "{seen:?}");
+    assert_eq!(seen[0], seen[1]);
 }
 
 #[test]
@@ -95,17 +99,81 @@ fn an_even_sky_lights_a_floor_by_the_form_factor_of_its_portal() {
         let squared = (x - 0.7).powi(2) + (y - 0.5).powi(2) + 1.0;
         form += 0.81 / (N * N) as f64 / (PI * squared * squared);
     }
-    let floor =
-        "Shape \"trianglemesh\" \"point3 P\" [ -9 -9 0  9 -9 0  9 9 0  -9 9 0 ] \"integer indices\" [ 0 1 2 0 2 3 ]";
     let text = camera(LOOKS[0], 1)
         + &format!("LightSource \"infinite\" \"rgb L\" [ 3 2 1 ] \"float scale\" 2 {WINDOW}\n")
         + "Material \"diffuse\" \"rgb reflectance\" [ 0.5 0.5 0.5 ]\n"
-        + floor;
+        + FLOOR;
     for accel in [AccelKind::Embree, AccelKind::Bvh] {
         let mut job = job(Path::new("."), &text, accel).unwrap();
         for (estimator, settings) in estimators() {
             choose(&mut job, &settings);
             assert_answer(&mut job, 64, [3.0, 2.0, 1.0].map(|l| l * form), 0.05, &format!("{estimator}, {accel:?}"));
+        }
+    }
+}
+
+/// Edge of the sky with a bright horizon (texels).
+const SIZE: usize = 64;
+/// Half the edge of the portal of the tests below (m).
+const HALF: f64 = 1.0;
+
+/// Radiances of a sky of 1 with a band around its horizon.
+fn horizon(contrast: f32) -> Vec<f32> {
+    let distance = |i: usize| ((i as f32 + 0.5) * 2.0 / SIZE as f32 - 1.0).abs();
+    // The horizon is |x| + |y| = 1 of an equal-area map
+    let is_band = |i: usize| (distance(i % SIZE) + distance(i / SIZE) - 1.0).abs() < 0.06;
+    (0..SIZE * SIZE).map(|i| if is_band(i) { contrast } else { 1.0 }).collect()
+}
+
+/// Irradiance over π at the point (x, 0, 0) of a floor, by the sky beyond a hole in an opaque plane at z = `height`.
+fn oracle(sky: &[f32], x: f64, height: f64) -> f64 {
+    const N: usize = 600;
+    let texels = sky.iter().map(|&l| Rgb::splat(l)).collect();
+    let map = EnvironmentMap::new(texels, [SIZE; 2], EnvironmentMapping::EqualArea, EnvironmentFilter::Nearest);
+    let map = map.unwrap();
+    // Points of the hole over the height, denser near the point: sinh t, and their lengths
+    let places = |centre: f64| {
+        let [begin, end] = [-HALF, HALF].map(|edge| ((edge - centre) / height).asinh());
+        let step = (end - begin) / N as f64;
+        (0..N).map(move |i| begin + (i as f64 + 0.5) * step).map(move |t| (t.sinh(), t.cosh() * step))
+    };
+    let mut sum = 0.0;
+    for (dx, width) in places(x) {
+        for (dy, length) in places(0.0) {
+            let le = map.le(Vec3::new(dx as f32, dy as f32, 1.0).normalize()).r;
+            sum += f64::from(le) * width * length / (1.0 + dx * dx + dy * dy).powi(2);
+        }
+    }
+    sum / PI
+}
+
+/// The light of a point of the floor is the sky's through a hole, however near the hole is, however much brighter the horizon is, and
+/// whatever draws the samples. A bias of 4 % is found with a probability above 0.99.
+#[test]
+fn a_bright_horizon_lights_a_floor_as_through_a_hole() {
+    let folder = tempfile::tempdir().unwrap();
+    let names = ["Mis 2", "Mc 2", "Contributing 2", "ris Fgl"];
+    let estimators = || estimators().into_iter().filter(|(name, _)| names.contains(&name.as_str()));
+    assert_eq!(estimators().count(), names.len());
+    for contrast in [1.0, 30.0, 1000.0] {
+        let sky = horizon(contrast);
+        let pixels = sky.iter().flat_map(|&l| [l; 3]).collect();
+        let channels = ["R", "G", "B"].map(str::to_owned).to_vec();
+        write_image(&folder.path().join("horizon.exr"), &[Part::linear(SIZE, SIZE, channels, pixels)]).unwrap();
+        // Beneath the portal, and beside it
+        for (x, height) in [(0.3, 0.05), (0.3, 1.0), (0.3, 10.0), (2.5, 0.05), (2.5, 1.0)] {
+            let text = camera(&format!("{x} 0 {}  {x} 0 0", 0.5 * height), 1)
+                + r#"LightSource "infinite" "string filename" "horizon.exr" "point3 portal""#
+                + &format!("[-1 -1 {height}  -1 1 {height}  1 1 {height}  1 -1 {height}]\n")
+                + "Material \"diffuse\" \"rgb reflectance\" [ 1 1 1 ]\n"
+                + FLOOR;
+            let mut job = job(folder.path(), &text, AccelKind::Embree).unwrap();
+            let answer = oracle(&sky, x, height);
+            for (estimator, settings) in estimators() {
+                choose(&mut job, &settings);
+                let what = format!("{estimator}, contrast {contrast}, at {x}, {height}");
+                assert_answer(&mut job, 8, [answer; 3], 0.04, &what);
+            }
         }
     }
 }

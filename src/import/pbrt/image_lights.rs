@@ -43,7 +43,7 @@ impl EnvironmentDesc {
         let factor = if illuminance > 0.0 { illuminance / map_illuminance(&map) } else { 1.0 };
         let scale = self.scale * factor;
         Ok(match portal {
-            Some(portal) => Light::Portal(Arc::new(PortalLight::new(&map, self.place().1, scale, portal))),
+            Some(portal) => Light::Portal(Arc::new(PortalLight::new(Arc::new(map), self.place().1, scale, portal))),
             None => Light::infinite_image(Arc::new(map), &self.world_from_light, scale),
         })
     }

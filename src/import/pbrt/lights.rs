@@ -216,7 +216,7 @@ fn portal(p: &ParamSet, d: &mut Diagnostics) -> Option<Portal> {
 fn constant_portal(l: Rgb, portal: Portal) -> Light {
     let map = EnvironmentMap::new(vec![l], [1, 1], EnvironmentMapping::EqualArea, EnvironmentFilter::Nearest)
         .expect("one texel is square");
-    Light::Portal(Arc::new(PortalLight::new(&map, Mat3::IDENTITY, 1.0, portal)))
+    Light::Portal(Arc::new(PortalLight::new(Arc::new(map), Mat3::IDENTITY, 1.0, portal)))
 }
 
 /// `filename`, which a light needs.

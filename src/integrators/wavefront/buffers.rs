@@ -125,10 +125,10 @@ impl Buffers {
         }
     }
 
-    /// The segments of the samples that contribute.
-    pub(super) fn make_segments(&mut self, n: usize) {
+    /// The segments of the samples that `is_traced` holds for.
+    pub(super) fn make_segments(&mut self, n: usize, is_traced: impl Fn(&SampleColumns, usize) -> bool) {
         let len = padded(n);
-        let SampleColumns { light, c, o, d, t_max, .. } = &mut self.samples;
+        let SampleColumns { light, o, d, t_max, .. } = &mut self.samples;
         let from = self.surface.ends(len);
         let to = Ends { p: light.p.get(len), p_error: light.p_error.get(len), n: light.n.get(len) };
         let mut rays = Rays { o: o.get_mut(len), d: d.get_mut(len), t_max: &mut t_max[..len] };
@@ -136,8 +136,9 @@ impl Buffers {
 
         let Traced { index, rays, .. } = &mut self.traced;
         index.clear();
-        index.extend((0..n as u32).filter(|&i| !c.rgb(i as usize).is_black()));
+        index.extend((0..n as u32).filter(|&i| is_traced(&self.samples, i as usize)));
         rays.clear();
+        let SampleColumns { o, d, t_max, .. } = &self.samples;
         let ([ox, oy, oz], [dx, dy, dz]) = (o.get(len), d.get(len));
         let columns = [
             (&mut rays.ox, ox),

@@ -62,7 +62,17 @@ pub(super) struct SampleColumns {
     pub(super) t_max: Column,
 }
 
-/// Segments of the samples that contribute.
+impl SampleColumns {
+    /// True if sample `i`, of light or of BSDF sampling, has an unshadowed integrand f·|cos θ|·L that is not zero, whatever its
+    /// weight is.
+    #[inline]
+    pub(super) fn has_integrand(&self, i: usize, by_light: bool) -> bool {
+        let p = if by_light { self.light.pdf[i] } else { self.p_bsdf[i] };
+        (p > 0.0) & !(self.f_cos.rgb(i) * self.light.li.rgb(i)).is_black()
+    }
+}
+
+/// Segments of the samples that are traced.
 #[derive(Debug, Default)]
 pub(super) struct Traced {
     /// Places of their vertices.

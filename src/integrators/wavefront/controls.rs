@@ -2,8 +2,9 @@
 //!
 //! The means of r_j = h_j/p_α over the samples of a vertex, as in [`crate::direct::mixture`], for the groups of lights,
 //! and for the first of two lobes where the BSDF may have two: the other column of the BSDF depends on these. As there, a
-//! sample without a contribution belongs to the group that drew it, and the density of BSDF sampling is 0 for a light
-//! sample that another emitter hides.
+//! sample whose unshadowed integrand is zero belongs to the component that drew it, and the density of BSDF sampling is 0 for
+//! a light sample that another emitter hides. Columns do not depend on the weights of the techniques: a sample without a weight
+//! has the densities of both.
 
 use super::columns::{SampleColumns, Single, Surface, Traced, others};
 use super::emitters::EmitterRays;
@@ -64,7 +65,7 @@ impl Controls {
         singles: &[Single<'_>],
     ) {
         self.find_hidden(job, samples, traced);
-        self.divide([n_light, n_bsdf], samples, 1.0 / n_light);
+        self.divide([n_light, n_bsdf], samples, true);
         for (&i, _) in self.hidden_of.iter().zip(&self.occluded).filter(|(_, occluded)| **occluded) {
             self.parts[i as usize] = 1.0 / n_light;
         }
@@ -79,7 +80,7 @@ impl Controls {
         for single in others(singles) {
             let i = single.index as usize;
             let (p_light, p_bsdf) = (samples.light.pdf[i], samples.p_bsdf[i]);
-            if !self.is_hidden[i] && !samples.c.rgb(i).is_black() && p_bsdf > 0.0 {
+            if !self.is_hidden[i] && samples.has_integrand(i, true) && p_bsdf > 0.0 {
                 let p_lobe = single.bsdf.pdf_first_lobe(single.wo, samples.light.wi.vec3(i), p_bsdf);
                 self.sums[i][lobe] += p_lobe / (n_light * p_light + n_bsdf * p_bsdf);
             }
@@ -94,7 +95,7 @@ impl Controls {
         (samples, emitters): (&SampleColumns, &EmitterRays),
         singles: &[Single<'_>],
     ) {
-        self.divide([n_light, n_bsdf], samples, 0.0);
+        self.divide([n_light, n_bsdf], samples, false);
         let groups = &job.lights.groups;
         let infinite = job.lights.infinite.iter().find_map(|l| groups.group_of(*l));
         for ((sums, part), light) in self.sums.iter_mut().zip(&self.parts).zip(&emitters.lights) {
@@ -107,15 +108,16 @@ impl Controls {
         self.add_lobes([n_light, n_bsdf], samples, singles);
     }
 
-    /// Sets the parts of light sampling in samples that contribute, and those of all others to `alone`.
-    fn divide(&mut self, [n_light, n_bsdf]: [f32; 2], samples: &SampleColumns, alone: f32) {
+    /// Sets the parts of light sampling in samples of one technique whose integrand is not zero; all others are their own
+    /// technique's alone.
+    fn divide(&mut self, [n_light, n_bsdf]: [f32; 2], samples: &SampleColumns, by_light: bool) {
         let n = self.sums.len();
         self.parts.resize(n, 0.0);
-        let ([r, g, b], p_light, p_bsdf) = (samples.c.get(n), &samples.light.pdf[..n], &samples.p_bsdf[..n]);
+        let alone = if by_light { 1.0 / n_light } else { 0.0 };
+        let (p_light, p_bsdf) = (&samples.light.pdf[..n], &samples.p_bsdf[..n]);
         for (i, part) in self.parts.iter_mut().enumerate() {
-            let contributes = (r[i] != 0.0) | (g[i] != 0.0) | (b[i] != 0.0);
             let own = p_light[i] / (n_light * p_light[i] + n_bsdf * p_bsdf[i]);
-            *part = if contributes & (p_light[i] > 0.0) { own } else { alone };
+            *part = if samples.has_integrand(i, by_light) & (p_light[i] > 0.0) { own } else { alone };
         }
     }
 
@@ -126,7 +128,7 @@ impl Controls {
             let i = single.index as usize;
             let is_first = samples.u[0][i] < single.bsdf.first_lobe(single.wo);
             let (p_light, p_bsdf) = (samples.light.pdf[i], samples.p_bsdf[i]);
-            let is_own = samples.c.rgb(i).is_black();
+            let is_own = !samples.has_integrand(i, false);
             self.sums[i][lobe] += if is_own || samples.light.is_delta[i] {
                 if is_first { 1.0 / n_bsdf } else { 0.0 }
             } else {

@@ -378,7 +378,11 @@ impl<'w> Batch<'w> {
     /// that are unoccluded. Returns the time since `start`, when sampling began, until tracing began.
     fn trace(&mut self, job: &RenderJob, out: &mut Output<'_>, (by_light, start): (bool, Instant)) -> Duration {
         let n = self.buffers.paths.len();
-        self.buffers.make_segments(n);
+        // Without a weight, a light sample that an emitter hides has columns of its own all the same
+        let hides = by_light && self.estimate.has_controls && job.world.emitters_hide();
+        self.buffers.make_segments(n, |samples, i| {
+            !samples.c.rgb(i).is_black() || hides && samples.p_bsdf[i] > 0.0 && samples.has_integrand(i, true)
+        });
         let Buffers { samples, traced, radiance, .. } = &mut *self.buffers;
         let proposed = Instant::now();
         job.world.accel.occluded(&traced.rays, Coherence::Packets, &mut traced.occluded);

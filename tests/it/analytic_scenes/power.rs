@@ -68,7 +68,8 @@ pub(super) struct Outcome<'a> {
 
 /// Level of each test of the set.
 pub(super) fn level(scenes: &[Scene]) -> f64 {
-    sidak(SIGNIFICANCE, scenes.len() * configurations().len() * 3)
+    let rows: usize = scenes.iter().map(|scene| configurations(&scene.name).len()).sum();
+    sidak(SIGNIFICANCE, rows * 3)
 }
 
 /// Means of images with seeds from `seed` on.
@@ -267,7 +268,7 @@ pub(super) fn print_table(out: &mut dyn std::io::Write, outcomes: &[Outcome<'_>]
 /// Renders all rows of the scenes.
 pub(super) fn render_rows<'a>(scenes: &'a [Scene], effort: &Effort, level: f64) -> Vec<Outcome<'a>> {
     let known = if std::env::var_os(MEASURE).is_some() { HashMap::new() } else { measured_noise() };
-    let rows = scenes.iter().flat_map(|scene| configurations().into_iter().map(move |c| (scene, c)));
+    let rows = scenes.iter().flat_map(|scene| configurations(&scene.name).into_iter().map(move |c| (scene, c)));
     let rows: Vec<(&Scene, Configuration)> = rows.collect();
     let outcomes = Mutex::new(Vec::new());
     let next = AtomicUsize::new(0);

@@ -27,6 +27,8 @@ pub(super) struct Configuration {
     pub optimal_mis: OptimalForm,
     pub correlated: CorrelatedSettings,
     pub bsdf_fraction: f32,
+    /// Probability of choosing an infinite light; `None` where it follows from the lights.
+    pub infinite_fraction: Option<f32>,
     /// Of `ris`.
     pub proposals: u32,
     pub strata: Strata,
@@ -54,6 +56,7 @@ pub(super) const BASE: Configuration = Configuration {
     optimal_mis: OptimalForm::Progressive,
     correlated: CorrelatedSettings { form: CorrelatedForm::Combined, technique: SamplingTechnique::Bsdf },
     bsdf_fraction: 0.5,
+    infinite_fraction: None,
     proposals: 16,
     strata: Strata::Systematic,
     points: ProposalPoints::Stratified,
@@ -100,9 +103,52 @@ fn cached_configurations() -> Vec<Configuration> {
     ]
 }
 
+/// A scene for the weights of techniques alone: two kinds of light, of which one hides the other, both seen by both techniques.
+const OF_WEIGHTS: &str = "lamp-in-sky";
+/// A scene that has the rows of weights as well: a BSDF of two lobes.
+const OF_LOBES: &str = "phong-normal";
+
 /// All rows of a scene.
-pub(super) fn configurations() -> Vec<Configuration> {
-    [path_configurations(), visibility_cache_configurations(), cached_configurations()].concat()
+pub(super) fn configurations(scene: &str) -> Vec<Configuration> {
+    if scene == OF_WEIGHTS {
+        return weight_configurations();
+    }
+    let mut all = [path_configurations(), visibility_cache_configurations(), cached_configurations()].concat();
+    if scene == OF_LOBES {
+        let names: Vec<String> = all.iter().map(ToString::to_string).collect();
+        all.extend(weight_configurations().into_iter().filter(|c| !names.contains(&c.to_string())));
+    }
+    all
+}
+
+/// Everything that weights of techniques depend on, for every estimator that has it.
+fn weight_configurations() -> Vec<Configuration> {
+    const HEURISTICS: [Heuristic; 3] = [Heuristic::Balance, Heuristic::Power, Heuristic::Maximum];
+    let mis = BASE;
+    let of = |estimator| Configuration { estimator, samples: 4, ..mis };
+    let ocv = of(EstimatorKind::Ocv);
+    let with_form = |form| Configuration { ocv: OcvSettings { form, ..ocv.ocv }, ..ocv };
+    let (crossfit, pixels) = (with_form(Form::Crossfit), with_form(Form::Pixels));
+    let optimal = of(EstimatorKind::OptimalMis);
+    let ris = of(EstimatorKind::Ris);
+    let control = Configuration { target: Target::FglControl, ..ris };
+    let contributing = Configuration { visibility_cache: CacheContents::Right, ..of(EstimatorKind::Contributing) };
+
+    let mut all = Vec::new();
+    for heuristic in HEURISTICS {
+        all.extend([1, 2, 5].map(|samples| Configuration { heuristic, samples, ..pixels }));
+        all.push(Configuration { heuristic, samples: 4, bsdf_fraction: 0.25, ..mis });
+        all.push(Configuration { heuristic, sampler: SamplerKind::Independent, ..pixels });
+        all.extend([ris, control, contributing].map(|c| Configuration { heuristic, proposals: 12, ..c }));
+    }
+    for bsdf_fraction in [0.25, 0.75] {
+        all.extend([crossfit, pixels, optimal].map(|c| Configuration { bsdf_fraction, ..c }));
+    }
+    for fraction in [0.2, 0.9] {
+        let with_fraction = |c| Configuration { infinite_fraction: Some(fraction), ..c };
+        all.extend([mis, ocv, crossfit, pixels, optimal, ris, control].map(with_fraction));
+    }
+    all
 }
 
 /// Everything that asks photons which lights are seen, whatever they say.
@@ -236,6 +282,9 @@ impl fmt::Display for Configuration {
         if self.light_sampler != BASE.light_sampler {
             write!(f, " lights={}", name(self.light_sampler))?;
         }
+        if let Some(fraction) = self.infinite_fraction {
+            write!(f, " infinite-fraction={fraction}")?;
+        }
         match self.visibility_cache {
             CacheContents::Absent => {}
             CacheContents::Empty => write!(f, " hints=empty")?,
@@ -253,7 +302,12 @@ impl Configuration {
     fn write_estimator(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self.estimator {
             EstimatorKind::Auto | EstimatorKind::Mc => {}
-            EstimatorKind::Mis => write!(f, " {}", name(self.heuristic))?,
+            EstimatorKind::Mis => {
+                write!(f, " {}", name(self.heuristic))?;
+                if self.bsdf_fraction != BASE.bsdf_fraction {
+                    write!(f, " bsdf-fraction={}", self.bsdf_fraction)?;
+                }
+            }
             EstimatorKind::Ris => {
                 let (strata, points, target) = (name(self.strata), name(self.points), name(self.target));
                 write!(
@@ -265,17 +319,31 @@ impl Configuration {
             }
             EstimatorKind::Ocv => {
                 write!(f, " {} bsdf-share={}", name(self.ocv.form), self.bsdf_fraction)?;
+                self.write_heuristic(f)?;
                 if let Some(components) = self.ocv.components {
                     write!(f, " components={components}")?;
                 }
             }
-            EstimatorKind::OptimalMis => write!(f, " {}", name(self.optimal_mis))?,
+            EstimatorKind::OptimalMis => {
+                write!(f, " {}", name(self.optimal_mis))?;
+                if self.bsdf_fraction != BASE.bsdf_fraction {
+                    write!(f, " bsdf-fraction={}", self.bsdf_fraction)?;
+                }
+            }
             EstimatorKind::Correlated => {
                 write!(f, " {} {}", name(self.correlated.form), name(self.correlated.technique))?;
             }
-            EstimatorKind::Contributing => write!(f, " rest={}", self.noncontributing_samples)?,
+            EstimatorKind::Contributing => {
+                write!(f, " rest={}", self.noncontributing_samples)?;
+                self.write_heuristic(f)?;
+            }
         }
         Ok(())
+    }
+
+    /// The heuristic, if it is not the base's.
+    fn write_heuristic(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if self.heuristic == BASE.heuristic { Ok(()) } else { write!(f, " {}", name(self.heuristic)) }
     }
 }
 
@@ -292,6 +360,7 @@ pub(super) fn job(path: &Path, c: &Configuration, edge: u32) -> RenderJob {
     settings.optimal_mis = c.optimal_mis;
     settings.correlated = c.correlated;
     settings.bsdf_fraction = Some(c.bsdf_fraction);
+    settings.infinite_fraction = c.infinite_fraction;
     settings.ris.proposals = Proposals::Fixed(c.proposals);
     settings.ris.strata = c.strata;
     settings.ris.points = c.points;
