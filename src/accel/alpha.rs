@@ -20,11 +20,11 @@ impl AlphaTest {
     }
 
     /// True if the ray is stopped, which happens with probability alpha. `world_ray` is the ray in world space, not one
-    /// transformed into an instance.
+    /// transformed into an instance; `crossing` tells the hits of one primitive apart, 0 or 1.
     ///
     /// The decision is a hash of the ray and of the hit, so it is the same however often and in whatever order a tracer
-    /// calls this, and independent between the surfaces along a ray.
-    pub fn stops(&self, hit: &Hit, world_ray: &Ray) -> bool {
+    /// calls this, and independent between the hits along a ray.
+    pub fn stops(&self, (hit, crossing): (&Hit, usize), world_ray: &Ray) -> bool {
         let geometry = &self.geometry.geometries[hit.geometry as usize];
         let Some(texture) = geometry.alpha else { return true };
         let uv = geometry.shape.texture_coordinates(hit.primitive, hit.uv);
@@ -38,6 +38,6 @@ impl AlphaTest {
         }
         let (o, d) = (world_ray.o, world_ray.d);
         let ray_hash = hash_floats(&[o.x, o.y, o.z, d.x, d.y, d.z]);
-        unit_f32(pcg4d([ray_hash, hit.geometry, hit.primitive, hit.instance])[0]) < alpha
+        unit_f32(pcg4d([ray_hash, hit.geometry, hit.primitive, hit.instance])[crossing]) < alpha
     }
 }

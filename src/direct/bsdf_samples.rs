@@ -119,7 +119,7 @@ pub(crate) fn emitter_at(
     pmf: impl FnOnce(&LightCtx, LightId) -> f32,
 ) -> Option<EmitterInDirection> {
     let lights = &job.lights;
-    let light = hit.light?;
+    let light = hit.light.filter(|&light| !lights.lights[light as usize].is_dark_from(ctx.p))?;
     let surface = job.world.scene.geometry.surface_hit(hit.geometry, hit.primitive, Hit::NO_INSTANCE, hit.uv, time);
     let light_hit = LightHit { t: hit.t, p: surface.p, n: surface.n, uv: surface.uv };
     let li = lights.lights[light as usize].l(&light_hit, -wi);

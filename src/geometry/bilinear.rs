@@ -57,6 +57,18 @@ impl BilinearMesh {
     ///
     /// A ray that leaves from [`lumiris_numbers::math::ray::offset_origin`] does not meet the same planar patch again.
     pub fn intersect_patch(&self, i: usize, ray: &Ray) -> Option<LocalHit> {
+        self.intersect_patch_where(i, ray, |_, _| true)
+    }
+
+    /// The first hit of patch `i` in (0, t_max) that `accepts` takes, which gets the hit and the number of its crossing,
+    /// 0 or 1, in ascending order of u.
+    #[inline]
+    pub fn intersect_patch_where(
+        &self,
+        i: usize,
+        ray: &Ray,
+        accepts: impl Fn(&LocalHit, usize) -> bool,
+    ) -> Option<LocalHit> {
         /// Parameters this far outside 0..1 count as on the border, so that adjacent patches do not leak.
         const BORDER: f64 = 1e-10;
         let (o, d) = (ray.o.as_dvec3(), ray.d.as_dvec3());
@@ -73,9 +85,10 @@ impl BilinearMesh {
         // Below this parameter a hit is rounding noise.
         let scale = ray.o.abs().max_element() + corners.iter().fold(0.0_f32, |m, p| m.max(p.abs().max_element()));
         let t_min = f64::from(scale) * 2.0_f64.powi(-44) / d.length();
-        let mut best: Option<(f64, [f64; 2])> = None;
-        for u in roots {
-            if !(-BORDER..=1.0 + BORDER).contains(&u) {
+        let mut best: Option<LocalHit> = None;
+        for (crossing, u) in roots.into_iter().enumerate() {
+            let is_double = crossing == 1 && u == roots[0];
+            if is_double || !(-BORDER..=1.0 + BORDER).contains(&u) {
                 continue;
             }
             let from = p00.lerp(p10, u);
@@ -84,14 +97,14 @@ impl BilinearMesh {
             let length_squared = perpendicular.length_squared();
             let v = from.dot(d.cross(perpendicular)) / length_squared;
             let t = from.dot(along.cross(perpendicular)) / length_squared;
-            let inside = (-BORDER..=1.0 + BORDER).contains(&v) && t > t_min && t < f64::from(ray.t_max);
-            if inside && best.is_none_or(|(t_best, _)| t < t_best) {
-                best = Some((t, [u, v]));
+            let is_met = (-BORDER..=1.0 + BORDER).contains(&v) && t > t_min;
+            let hit = LocalHit { t: t as f32, uv: [u, v].map(|x| x.clamp(0.0, 1.0) as f32) };
+            let end = best.map_or(ray.t_max, |best| best.t);
+            if is_met && hit.t > 0.0 && hit.t < end && accepts(&hit, crossing) {
+                best = Some(hit);
             }
         }
-        let (t, uv) = best?;
-        let t = t as f32;
-        (t > 0.0 && t < ray.t_max).then(|| LocalHit { t, uv: uv.map(|x| x.clamp(0.0, 1.0) as f32) })
+        best
     }
 
     /// The surface of patch `i` at its parameters `uv`, in the space of the group.
@@ -103,7 +116,7 @@ impl BilinearMesh {
         let [p00, p10, p01, p11] = corners.map(Vec3::as_dvec3);
         let [u, v] = uv.map(f64::from);
         let p = round(p00.lerp(p10, u).lerp(p01.lerp(p11, u), v));
-        let p_error = corners.iter().fold(Vec3::ZERO, |m, p| m.max(p.abs())) * gamma(3);
+        let p_error = corners.iter().fold(Vec3::ZERO, |m, p| m.max(p.abs())) * gamma(7);
         let (du, dv) = ((p10 - p00).lerp(p11 - p01, v), (p01 - p00).lerp(p11 - p10, u));
 
         // Geometric normal; at a collapsed edge that of the diagonals.

@@ -23,7 +23,7 @@ pub use mesh::TriangleMesh;
 pub use quadric::{Quadric, QuadricKind};
 pub use set::{Geometry, GeometryId, GeometrySet, Group, GroupId, Instance, NO_INSTANCE, Visibility};
 
-use lumiris_numbers::math::{Bounds3, Vec2, Vec3};
+use lumiris_numbers::math::{Bounds3, Ray, Vec2, Vec3};
 
 /// A shape in the space of its group (world space for the root group).
 #[derive(Clone, Debug)]
@@ -46,6 +46,23 @@ impl Shape {
             Shape::Quadric(quadric) => quadric.bounds(),
             Shape::Bilinear(mesh) => mesh.bounds(),
             Shape::Curves(curves) => curves.bounds(),
+        }
+    }
+
+    /// The first hit of `primitive`, which is no triangle, in (0, t_max) that `accepts` takes: it gets the hit and which
+    /// crossing of the primitive by the ray's line it is, 0 or 1.
+    #[inline]
+    pub fn intersect(
+        &self,
+        primitive: u32,
+        ray: &Ray,
+        accepts: impl Fn(&LocalHit, usize) -> bool,
+    ) -> Option<LocalHit> {
+        match self {
+            Shape::Quadric(quadric) => quadric.intersect_where(ray, accepts),
+            Shape::Bilinear(mesh) => mesh.intersect_patch_where(primitive as usize, ray, accepts),
+            Shape::Curves(curves) => curves.intersect(primitive as usize, ray).filter(|hit| accepts(hit, 0)),
+            Shape::Mesh(_) => None,
         }
     }
 

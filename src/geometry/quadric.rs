@@ -85,18 +85,28 @@ impl Quadric {
     ///
     /// A ray that leaves from [`lumiris_numbers::math::ray::offset_origin`] does not meet the point again that it left.
     pub fn intersect(&self, ray: &Ray) -> Option<LocalHit> {
-        let (t, uv) = self.first(ray, |p| self.kind.parameters(p))?;
-        Some(LocalHit { t, uv })
+        self.intersect_where(ray, |_, _| true)
     }
 
-    /// t of that hit, without its parameters.
-    pub fn distance(&self, ray: &Ray) -> Option<f32> {
-        self.first(ray, |p| self.kind.azimuth(p).map(|_| ())).map(|(t, ())| t)
-    }
-
-    /// The first point of the full quadric in (0, t_max) that is `part` of it, and its t.
+    /// The first hit in (0, t_max) that `accepts` takes, which gets the hit and its crossing: 0 where the ray's line
+    /// meets the full quadric first, 1 where it meets it again.
     #[inline]
-    fn first<T>(&self, ray: &Ray, part: impl Fn(DVec3) -> Option<T>) -> Option<(f32, T)> {
+    pub fn intersect_where(&self, ray: &Ray, accepts: impl Fn(&LocalHit, usize) -> bool) -> Option<LocalHit> {
+        self.first(ray, |p, t, crossing| {
+            let hit = LocalHit { t, uv: self.kind.parameters(p)? };
+            accepts(&hit, crossing).then_some(hit)
+        })
+    }
+
+    /// t of [`Self::intersect`], without its parameters.
+    pub fn distance(&self, ray: &Ray) -> Option<f32> {
+        self.first(ray, |p, t, _| self.kind.azimuth(p).map(|_| t))
+    }
+
+    /// What `take` makes of the first point of the full quadric in (0, t_max) that it takes. It gets the point, its t
+    /// and its crossing.
+    #[inline]
+    fn first<T>(&self, ray: &Ray, take: impl Fn(DVec3, f32, usize) -> Option<T>) -> Option<T> {
         let local_from_group = self.local_from_group.as_daffine3();
         let o = local_from_group.transform_point3(ray.o.as_dvec3());
         let d = local_from_group.transform_vector3(ray.d.as_dvec3());
@@ -105,10 +115,10 @@ impl Quadric {
         // Below this parameter a hit is rounding noise: o is the sum of terms of this size.
         let scale = o.abs().max_element() + local_from_group.translation.abs().max_element() + self.kind.radius();
         let t_min = scale * 2.0_f64.powi(-44) / d.length();
-        roots.into_iter().find_map(|t| {
+        roots.into_iter().enumerate().find_map(|(crossing, t)| {
             let rounded = t as f32;
             let is_met = t > t_min && rounded > 0.0 && rounded < ray.t_max;
-            if is_met { part(o + d * t).map(|part| (rounded, part)) } else { None }
+            if is_met { take(o + d * t, rounded, crossing) } else { None }
         })
     }
 
@@ -117,8 +127,8 @@ impl Quadric {
         let local = self.kind.surface(uv.map(f64::from));
         let group_from_local = self.group_from_local.as_daffine3();
         let p = refined_point(&group_from_local, &self.local_from_group.as_daffine3(), local.p);
-        let extent = group_from_local.matrix3.abs() * local.p.abs();
-        let p_error = (p.abs() + extent.as_vec3()) * gamma(2);
+        let extent = group_from_local.matrix3.abs() * self.kind.extent() + group_from_local.translation.abs();
+        let p_error = (p.abs() + extent.as_vec3()) * gamma(3);
 
         let outward = transform_normal(&self.group_from_local, round(local.n));
         let reversed = self.flip_normal != swaps_handedness(&self.group_from_local);
@@ -153,6 +163,17 @@ impl QuadricKind {
         | QuadricKind::Disk { radius, .. }
         | QuadricKind::Cylinder { radius, .. }) = *self;
         f64::from(radius)
+    }
+
+    /// The largest coordinates of its points.
+    fn extent(&self) -> DVec3 {
+        let z = match *self {
+            QuadricKind::Sphere { z_min, z_max, .. } | QuadricKind::Cylinder { z_min, z_max, .. } => {
+                z_min.abs().max(z_max.abs())
+            }
+            QuadricKind::Disk { height, .. } => height.abs(),
+        };
+        DVec3::new(self.radius(), self.radius(), f64::from(z))
     }
 
     /// Where the line o + t d meets the full quadric, in ascending order.

@@ -180,6 +180,9 @@ impl PathState {
         let Some(light) = lights.light_of(interaction.hit.geometry, interaction.hit.primitive) else {
             return Rgb::BLACK;
         };
+        if self.technique.is_some_and(|technique| lights.lights[light as usize].is_dark_from(technique.ctx.p)) {
+            return Rgb::BLACK;
+        }
         let s = &interaction.surface;
         let hit = LightHit { t: self.depth(interaction), p: s.p, n: s.n, uv: s.uv };
         let mut l = self.beta * lights.lights[light as usize].l(&hit, interaction.wo);

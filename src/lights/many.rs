@@ -334,21 +334,21 @@ impl AreaLight {
         let LightSamples { wi, li, pdf, p: points, p_error, n: normals, is_far, is_delta } = out;
         let (wi, points, p_error) = (wi.get_mut(len), points.get_mut(len), p_error.get_mut(len));
         let mut on_light = many::PointsOnLight { wi, p: points, p_error, pdf: &mut pdf[..len] };
-        let (on_plane, normal) = match &self.shape {
+        let normal = match &self.shape {
             AreaShape::Rectangle(r) => {
                 let rectangle = Rectangle { corner: r.corner, ex: r.ex, ey: r.ey, size: r.size, n: r.n };
                 many::sample_rectangle(level(), &rectangle, r.flatness_error, from, u, &mut on_light);
-                (r.corner, r.n)
+                r.n
             }
             AreaShape::Triangle(t) => {
                 many::sample_triangle(level(), (t.p, t.n, t.area), from, u, &mut on_light);
-                (t.p[0], t.n)
+                t.n
             }
             AreaShape::Quadric(_) | AreaShape::Patch(_) => return false,
         };
         let l: Rgb = self.emission.l;
         for i in 0..n {
-            if !self.emission.two_sided && normal.dot(p.vec3(i) - on_plane) <= 0.0 {
+            if self.is_dark_from(p.vec3(i)) {
                 pdf[i] = 0.0;
             }
             li.set_rgb(i, l);

@@ -280,6 +280,13 @@ impl Light {
         }
     }
 
+    /// True if nothing that it emits can be seen from `p`: it is an area light in whose plane or behind which `p` is. No
+    /// technique finds such a light.
+    #[inline]
+    pub fn is_dark_from(&self, p: Vec3) -> bool {
+        matches!(self, Light::Area(area) if area.is_dark_from(p))
+    }
+
     /// Radiance that leaves the surface of an area light at `hit` in direction `w`; black for all others.
     #[inline]
     pub fn l(&self, hit: &LightHit, w: Vec3) -> Rgb {

@@ -4,12 +4,13 @@ use super::Scene;
 use crate::accel::bvh::Bvh;
 use crate::accel::embree::{EmbreeAccel, EmbreeError};
 use crate::accel::{Accel, Coherence, Hit, RayBatch};
+use crate::geometry::triangle::{RayPrecomputed, TriangleHit, intersect_triangle};
 use crate::geometry::{AlphaSource, Geometry, GeometryId, GeometrySet, Group, Shape, VertexValues, Visibility};
 use crate::lights::LightId;
 use crate::textures::{TextureContext, TextureSet};
 use lumiris_lanes::level;
 use lumiris_lanes::triangles::{self, FirstHits};
-use lumiris_numbers::math::{Vec2, Vec3};
+use lumiris_numbers::math::{Ray, Vec2, Vec3};
 use std::sync::Arc;
 use strum::{EnumString, IntoStaticStr, VariantNames};
 
@@ -45,11 +46,26 @@ pub struct World {
 /// Number of triangles up to which a ray is tested with each of them: faster than a tree for it.
 const MAX_FEW: usize = 32;
 
-/// Triangles with their geometries and primitives.
+/// Distance from the plane of a triangle, relative to coordinates, within which an exact test must decide whether a ray
+/// leaves the triangle or meets it: more than what the parameter in lanes is off, but for slivers.
+const NEAR_PLANE: f32 = 1.0 / (1 << 13) as f32;
+
+/// Triangles with their unit normals, geometries and primitives.
 #[derive(Default)]
 struct FewTriangles {
     corners: Vec<[Vec3; 3]>,
+    normals: Vec<Vec3>,
     places: Vec<(GeometryId, u32)>,
+    /// Their largest coordinate.
+    extent: f32,
+}
+
+/// The first hit among few triangles: its parameter, two weights, and the index of the triangle.
+#[derive(Clone, Copy)]
+struct FewHit {
+    t: f32,
+    uv: [f32; 2],
+    triangle: usize,
 }
 
 impl FewTriangles {
@@ -67,7 +83,35 @@ impl FewTriangles {
             few.corners.extend((0..mesh.triangle_count()).map(|i| mesh.triangle(i)));
             few.places.extend((0..mesh.triangle_count() as u32).map(|i| (id, i)));
         }
+        few.normals = few.corners.iter().map(|[a, b, c]| (b - a).cross(c - a).normalize_or_zero()).collect();
+        few.extent = few.corners.iter().flatten().fold(0.0, |m, p| m.max(p.abs().max_element()));
         Some(few)
+    }
+
+    /// The hit of ray `i` that [`Self::intersect`] has found. In lanes a ray that starts near a triangle may meet it by
+    /// rounding: there all triangles are tested exactly.
+    #[inline]
+    fn hit(&self, scratch: &EmitterScratch, i: usize, ray: impl Fn() -> Ray) -> Option<FewHit> {
+        let [t, b1, b2, triangle] = &scratch.columns;
+        if t[i] == f32::INFINITY {
+            return None;
+        }
+        let (ray, triangle) = (ray(), triangle[i] as usize);
+        let height = self.normals[triangle].dot(ray.o - self.corners[triangle][0]);
+        if height.abs() <= (self.extent + ray.o.abs().max_element()) * NEAR_PLANE {
+            return self.exact_hit(&ray);
+        }
+        Some(FewHit { t: t[i], uv: [b1[i], b2[i]], triangle })
+    }
+
+    #[cold]
+    fn exact_hit(&self, ray: &Ray) -> Option<FewHit> {
+        let ray = RayPrecomputed::new(ray)?;
+        let hits = self.corners.iter().enumerate().filter_map(|(triangle, &corners)| {
+            let TriangleHit { t, b1, b2 } = intersect_triangle(&ray, corners, f32::INFINITY)?;
+            Some(FewHit { t, uv: [b1, b2], triangle })
+        });
+        hits.reduce(|first, hit| if hit.t < first.t { hit } else { first })
     }
 
     /// First hits of rays without end.
@@ -188,30 +232,30 @@ impl World {
     ) {
         let (o, d) = ([&rays.ox[..], &rays.oy, &rays.oz], [&rays.dx[..], &rays.dy, &rays.dz]);
         few.intersect(o, d, scratch);
-        out.extend((0..rays.len()).map(|i| self.few_hit(few, scratch, i).filter(|hit| hit.t < rays.t_max[i])));
+        out.extend((0..rays.len()).map(|i| {
+            let hit = few.hit(scratch, i, || rays.get(i)).filter(|hit| hit.t < rays.t_max[i]);
+            hit.map(|hit| self.few_hit(few, hit))
+        }));
     }
 
     /// [`intersect_emitters`](Self::intersect_emitters) for the rays from `o` in the directions `d` without end, where
-    /// emitters are few: a function of the index of a ray. `None` elsewhere.
+    /// emitters are few: a function of the index of a ray and the ray. `None` elsewhere.
     pub fn intersect_few_emitters<'a>(
         &'a self,
         o: [&[f32]; 3],
         d: [&[f32]; 3],
         scratch: &'a mut EmitterScratch,
-    ) -> Option<impl Fn(usize) -> Option<EmitterHit> + use<'a>> {
+    ) -> Option<impl Fn(usize, &Ray) -> Option<EmitterHit> + use<'a>> {
         let few = self.few_emitters.as_ref()?;
         few.intersect(o, d, scratch);
         let scratch = &*scratch;
-        Some(move |i| self.few_hit(few, scratch, i))
+        Some(move |i, ray: &Ray| few.hit(scratch, i, || *ray).map(|hit| self.few_hit(few, hit)))
     }
 
     #[inline]
-    fn few_hit(&self, few: &FewTriangles, scratch: &EmitterScratch, i: usize) -> Option<EmitterHit> {
-        let [t, b1, b2, triangle] = &scratch.columns;
-        (t[i] < f32::INFINITY).then(|| {
-            let (geometry, primitive) = few.places[triangle[i] as usize];
-            let light = self.scene.lights.light_of(geometry, primitive);
-            EmitterHit { geometry, primitive, uv: [b1[i], b2[i]], t: t[i], light }
-        })
+    fn few_hit(&self, few: &FewTriangles, FewHit { t, uv, triangle }: FewHit) -> EmitterHit {
+        let (geometry, primitive) = few.places[triangle];
+        let light = self.scene.lights.light_of(geometry, primitive);
+        EmitterHit { geometry, primitive, uv, t, light }
     }
 }

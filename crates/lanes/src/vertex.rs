@@ -8,7 +8,7 @@ use super::lane::{F, I, LANES, M, Vec3s, Wide, load, narrowed, or_zero, safe_sqr
 use fearless_simd::{Level, Simd, dispatch, f64x8, prelude::*};
 use lumiris_numbers::estimators::mis::Heuristic;
 use lumiris_numbers::math::gamma;
-use lumiris_numbers::math::ray::SEGMENT_END;
+use lumiris_numbers::math::ray::{COINCIDENCE, SEGMENT_END};
 use std::f32::consts::{FRAC_1_PI, FRAC_PI_4};
 
 /// Three columns of a vector or of a colour.
@@ -326,7 +326,8 @@ impl Ends<'_> {
 #[inline(always)]
 pub(super) fn offset_origins<S: Simd>([p, error, n]: End<S>, w: Vec3s<S>) -> Vec3s<S> {
     let zero = F::splat(p.x.token(), 0.0);
-    let distance = absolute(n).dot(error);
+    let largest = p.x.abs().max(p.y.abs()).max(p.z.abs());
+    let distance = absolute(n).dot(error).max(largest * COINCIDENCE);
     let offset = n.times(w.dot(n).simd_lt(zero).select(-distance, distance));
     Vec3s { x: moved(p.x, offset.x), y: moved(p.y, offset.y), z: moved(p.z, offset.z) }
 }

@@ -9,40 +9,36 @@ use crate::geometry::triangle::{RayPrecomputed, intersect_triangle};
 use crate::geometry::{BilinearMesh, GeometryId, Instance, TriangleMesh, loop_subdivide};
 use lumiris_numbers::math::Ray;
 use lumiris_test_support::random::{RngExt, pcg32};
+use std::cell::RefCell;
 
-/// All hits of a geometry in the space of its group.
-fn all_hits(set: &GeometrySet, id: GeometryId, ray: &Ray, instance: u32, hits: &mut Vec<Hit>) {
-    let mut push = |t: f32, uv, primitive: usize| {
-        hits.push(Hit { t, uv, geometry: id, primitive: primitive as u32, instance });
+/// All hits of a geometry in the space of its group, with the crossings of their primitives.
+fn all_hits(set: &GeometrySet, id: GeometryId, ray: &Ray, instance: u32, hits: &mut Vec<(Hit, usize)>) {
+    let hits = RefCell::new(hits);
+    let push = |t: f32, uv, primitive: usize, crossing: usize| {
+        hits.borrow_mut().push((Hit { t, uv, geometry: id, primitive: primitive as u32, instance }, crossing));
     };
-    match &set.geometries[id as usize].shape {
+    let shape = &set.geometries[id as usize].shape;
+    let push_all = |count: usize| {
+        for i in 0..count {
+            let none = shape.intersect(i as u32, ray, |hit, crossing| {
+                push(hit.t, hit.uv, i, crossing);
+                false
+            });
+            assert_eq!(none, None);
+        }
+    };
+    match shape {
         Shape::Mesh(mesh) => {
             let Some(pre) = RayPrecomputed::new(ray) else { return };
             for i in 0..mesh.triangle_count() {
                 if let Some(hit) = intersect_triangle(&pre, mesh.triangle(i), ray.t_max) {
-                    push(hit.t, [hit.b1, hit.b2], i);
+                    push(hit.t, [hit.b1, hit.b2], i, 0);
                 }
             }
         }
-        Shape::Quadric(quadric) => {
-            if let Some(hit) = quadric.intersect(ray) {
-                push(hit.t, hit.uv, 0);
-            }
-        }
-        Shape::Bilinear(mesh) => {
-            for i in 0..mesh.patch_count() {
-                if let Some(hit) = mesh.intersect_patch(i, ray) {
-                    push(hit.t, hit.uv, i);
-                }
-            }
-        }
-        Shape::Curves(curves) => {
-            for i in 0..curves.piece_count() {
-                if let Some(hit) = curves.intersect(i, ray) {
-                    push(hit.t, hit.uv, i);
-                }
-            }
-        }
+        Shape::Quadric(_) => push_all(1),
+        Shape::Bilinear(mesh) => push_all(mesh.patch_count()),
+        Shape::Curves(curves) => push_all(curves.piece_count()),
     }
 }
 
@@ -59,7 +55,8 @@ fn brute_force(set: &Arc<GeometrySet>, alpha: Option<&AlphaTest>, ray: &Ray) -> 
             all_hits(set, id, &moved, index as u32, &mut hits);
         }
     }
-    hits.retain(|h| h.t < ray.t_max && alpha.is_none_or(|a| a.stops(h, ray)));
+    hits.retain(|(h, crossing)| h.t < ray.t_max && alpha.is_none_or(|a| a.stops((h, *crossing), ray)));
+    let hits: Vec<Hit> = hits.into_iter().map(|(h, _)| h).collect();
     let seen = |h: &Hit, mask: Visibility| set.geometries[h.geometry as usize].visibility.0 & mask.0 != 0;
     let first = hits.iter().filter(|h| seen(h, Visibility::PATH)).min_by(|a, b| {
         let key = |h: &Hit| (h.instance, h.geometry, h.primitive);

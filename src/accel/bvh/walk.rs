@@ -4,7 +4,7 @@ use super::tree::{Block, Child, ChildRef, Node, Other, Tree};
 use super::{Bvh, TESTED};
 use crate::accel::Hit;
 use crate::geometry::triangle::{RayPrecomputed, intersect_triangle};
-use crate::geometry::{Shape, Visibility};
+use crate::geometry::{LocalHit, Visibility};
 use lumiris_numbers::math::{Ray, Vec4, gamma};
 
 /// The query along the ray.
@@ -260,7 +260,8 @@ impl<'a, Q: Query> Walk<'a, Q> {
             lanes &= lanes - 1;
             let Some(hit) = intersect_triangle(ray, block.triangle(lane), self.query.limit()) else { continue };
             let (geometry, primitive) = block.id(lane);
-            if self.offer(Hit { t: hit.t, uv: [hit.b1, hit.b2], geometry, primitive, instance }) {
+            let hit = Hit { t: hit.t, uv: [hit.b1, hit.b2], geometry, primitive, instance };
+            if self.accepts(&hit, 0) && self.query.take(hit) {
                 return true;
             }
         }
@@ -273,13 +274,10 @@ impl<'a, Q: Query> Walk<'a, Q> {
             Other::Exact { geometry, primitive } => {
                 // An equal parameter may still win, so the exact test's open end is moved up by one step.
                 let ray = Ray { t_max: self.query.limit().next_up(), ..ray.ray };
-                let local = match &self.bvh.geometry.geometries[geometry as usize].shape {
-                    Shape::Quadric(quadric) => quadric.intersect(&ray),
-                    Shape::Bilinear(mesh) => mesh.intersect_patch(primitive as usize, &ray),
-                    Shape::Curves(curves) => curves.intersect(primitive as usize, &ray),
-                    Shape::Mesh(_) => None,
-                };
-                local.is_some_and(|l| self.offer(Hit { t: l.t, uv: l.uv, geometry, primitive, instance }))
+                let hit_of = |l: &LocalHit| Hit { t: l.t, uv: l.uv, geometry, primitive, instance };
+                let shape = &self.bvh.geometry.geometries[geometry as usize].shape;
+                let local = shape.intersect(primitive, &ray, |l, crossing| self.accepts(&hit_of(l), crossing));
+                local.is_some_and(|l| self.query.take(hit_of(&l)))
             }
         }
     }
@@ -299,16 +297,11 @@ impl<'a, Q: Query> Walk<'a, Q> {
         RayPrecomputed::new(&ray).is_some_and(|ray| self.tree(&bvh.groups[placed.group as usize], &ray, index))
     }
 
-    /// Passes a hit to the query; true if the result is final.
+    /// True if the query wants the hit and it stops the ray; `crossing` tells the hits of one primitive apart.
     #[inline]
-    fn offer(&mut self, hit: Hit) -> bool {
+    fn accepts(&self, hit: &Hit, crossing: usize) -> bool {
         let flags = self.bvh.flags[hit.geometry as usize];
-        if flags & Q::MASK == 0 || !self.query.wants(&hit) {
-            return false;
-        }
-        if flags & TESTED != 0 && !self.bvh.alpha.as_ref().is_none_or(|test| test.stops(&hit, self.world_ray)) {
-            return false;
-        }
-        self.query.take(hit)
+        let is_stopped = || self.bvh.alpha.as_ref().is_none_or(|test| test.stops((hit, crossing), self.world_ray));
+        flags & Q::MASK != 0 && self.query.wants(hit) && (flags & TESTED == 0 || is_stopped())
     }
 }

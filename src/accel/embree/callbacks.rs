@@ -31,32 +31,29 @@ impl GeometryContext {
         self.alpha.is_some()
     }
 
-    /// True if the hit stops the ray.
-    fn stops(&self, hit: &Hit, world_ray: &Ray) -> bool {
-        self.alpha.as_ref().is_none_or(|alpha| alpha.stops(hit, world_ray))
+    /// True if the hit, of which `crossing` of its primitive it is, stops the ray.
+    fn stops(&self, (hit, crossing): (&Hit, usize), world_ray: &Ray) -> bool {
+        self.alpha.as_ref().is_none_or(|alpha| alpha.stops((hit, crossing), world_ray))
     }
 
-    /// t of the exact hit of a quadric or patch with 0 < t < `t_limit`.
-    fn distance(&self, world_ray: &Ray, primitive: u32, instance: u32, t_limit: f32) -> Option<f32> {
+    /// Whether there is an exact hit of a quadric or patch with `start` < t < `end`.
+    fn occludes(&self, world_ray: &Ray, primitive: u32, instance: u32, [start, end]: [f32; 2]) -> bool {
         match &self.world.set.geometries[self.id as usize].shape {
+            // Segments are never continued behind a hit, so they start before all
             Shape::Quadric(quadric) if !self.has_alpha() => {
-                quadric.distance(&Ray { t_max: t_limit, ..self.world.group_ray(world_ray, instance) })
+                quadric.distance(&Ray { t_max: end, ..self.world.group_ray(world_ray, instance) }).is_some()
             }
-            _ => self.intersect(world_ray, primitive, instance, t_limit).map(|hit| hit.t),
+            _ => self.intersect(world_ray, primitive, instance, [start, end]).is_some(),
         }
     }
 
-    /// The exact hit of a quadric or patch with 0 < t < `t_limit`.
-    fn intersect(&self, world_ray: &Ray, primitive: u32, instance: u32, t_limit: f32) -> Option<LocalHit> {
-        let ray = Ray { t_max: t_limit, ..self.world.group_ray(world_ray, instance) };
-        let hit = match &self.world.set.geometries[self.id as usize].shape {
-            Shape::Quadric(quadric) => quadric.intersect(&ray),
-            Shape::Bilinear(mesh) => mesh.intersect_patch(primitive as usize, &ray),
-            Shape::Curves(curves) => curves.intersect(primitive as usize, &ray),
-            Shape::Mesh(_) => None,
-        }?;
-        let found = Hit { t: hit.t, uv: hit.uv, geometry: self.id, primitive, instance };
-        self.stops(&found, world_ray).then_some(hit)
+    /// The first exact hit of a quadric or patch with `start` < t < `end` that stops the ray.
+    fn intersect(&self, world_ray: &Ray, primitive: u32, instance: u32, [start, end]: [f32; 2]) -> Option<LocalHit> {
+        let ray = Ray { t_max: end, ..self.world.group_ray(world_ray, instance) };
+        self.world.set.geometries[self.id as usize].shape.intersect(primitive, &ray, |hit, crossing| {
+            let found = Hit { t: hit.t, uv: hit.uv, geometry: self.id, primitive, instance };
+            hit.t > start && self.stops((&found, crossing), world_ray)
+        })
     }
 }
 
@@ -130,7 +127,7 @@ pub(super) unsafe extern "C" fn alpha_filter(arguments: *const sys::RTCFilterFun
                 let ray = query.rays.get(id as usize);
                 let instance = geometry.world.instance(reported.instance);
                 stops = match geometry.world.refine_primitive(&ray, geometry.id, instance, &reported) {
-                    Refined::Hit(hit) => geometry.stops(&hit, &ray),
+                    Refined::Hit(hit) => geometry.stops((&hit, 0), &ray),
                     Refined::Behind | Refined::Beyond => false,
                 };
             });
@@ -211,9 +208,7 @@ pub(super) unsafe extern "C" fn intersect(arguments: *const sys::RTCIntersectFun
         let hits = Lanes { words: rays.words.add(RAY_WORDS * n), n };
         let inst_id = query.rtc.instID[0];
         for lane in active(arguments.valid, n) {
-            let intersect = |ray: &Ray, instance, end| {
-                geometry.intersect(ray, arguments.primID, instance, end).map(|hit| (hit.t, hit))
-            };
+            let intersect = |ray: &Ray, instance, range| geometry.intersect(ray, arguments.primID, instance, range);
             let found = lane_hit(geometry, query, (rays, lane), inst_id, intersect);
             let end = found.and_then(|hit| {
                 let (geometry, primitive, instance) = (arguments.geomID, arguments.primID, inst_id);
@@ -243,9 +238,9 @@ pub(super) unsafe extern "C" fn occluded(arguments: *const sys::RTCOccludedFunct
         let rays = Lanes { words: arguments.ray.cast(), n };
         let inst_id = query.rtc.instID[0];
         for lane in active(arguments.valid, n) {
-            let intersect =
-                |ray: &Ray, instance, end| geometry.distance(ray, arguments.primID, instance, end).map(|t| (t, ()));
-            let found = lane_hit(geometry, query, (rays, lane), inst_id, intersect).is_some();
+            let occludes =
+                |ray: &Ray, instance, range| geometry.occludes(ray, arguments.primID, instance, range).then_some(());
+            let found = lane_hit(geometry, query, (rays, lane), inst_id, occludes).is_some();
             *arguments.valid.add(lane) = if found { -1 } else { 0 };
             if found {
                 rays.set(TFAR, lane, f32::NEG_INFINITY);
@@ -255,7 +250,7 @@ pub(super) unsafe extern "C" fn occluded(arguments: *const sys::RTCOccludedFunct
 }
 
 /// What `intersect` finds with the ray of one lane in the instance of `inst_id`, between the ray's limits: it gets the ray,
-/// the instance and the upper limit.
+/// the instance and these limits.
 ///
 /// # Safety
 /// `rays` has n lanes of rays, and `lane` is below n.
@@ -265,7 +260,7 @@ unsafe fn lane_hit<T>(
     query: &mut QueryContext<'_>,
     (rays, lane): (Lanes, usize),
     inst_id: u32,
-    intersect: impl Fn(&Ray, u32, f32) -> Option<(f32, T)>,
+    intersect: impl Fn(&Ray, u32, [f32; 2]) -> Option<T>,
 ) -> Option<T> {
     // SAFETY: by the caller.
     let (id, start, end) = unsafe { (rays.get_u32(ID, lane), rays.get(TNEAR, lane), rays.get(TFAR, lane)) };
@@ -273,7 +268,7 @@ unsafe fn lane_hit<T>(
     query.guard(|query| {
         let ray = query.rays.get(id as usize);
         let instance = geometry.world.instance(inst_id);
-        found = intersect(&ray, instance, end).filter(|(t, _)| *t > start);
+        found = intersect(&ray, instance, [start, end]);
     });
-    found.map(|(_, found)| found)
+    found
 }

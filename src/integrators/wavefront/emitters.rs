@@ -51,15 +51,19 @@ impl EmitterRays {
                 None => samples.p_bsdf[i] = 0.0,
             }
         };
+        let ray = |samples: &SampleColumns, i: usize| {
+            let (o, d) = (samples.o.vec3(i), samples.light.wi.vec3(i));
+            Ray { o, d, t_max: f32::INFINITY, time: paths[i].time }
+        };
         let (o, d) = (samples.o.get(len), samples.light.wi.get(len));
         if let Some(hit) = job.world.intersect_few_emitters(o, d, scratch) {
-            index.iter().for_each(|&i| add(samples, i as usize, hit(i as usize)));
+            for i in index.iter().map(|&i| i as usize) {
+                let hit = hit(i, &ray(samples, i));
+                add(samples, i, hit);
+            }
         } else {
             rays.clear();
-            for i in index.iter().map(|&i| i as usize) {
-                let (o, d) = (samples.o.vec3(i), samples.light.wi.vec3(i));
-                rays.push(&Ray { o, d, t_max: f32::INFINITY, time: paths[i].time });
-            }
+            index.iter().for_each(|&i| rays.push(&ray(samples, i as usize)));
             job.world.intersect_emitters(rays, scratch, emitter_hits);
             index.iter().zip(&*emitter_hits).for_each(|(&i, hit)| add(samples, i as usize, *hit));
         }

@@ -1,6 +1,7 @@
 //! Area lights of a geometry: one per emissive primitive, or one for two triangles that form a rectangle.
 
-use super::{AreaLight, AreaShape, Emission, EmissionMapping, PatchLight, QuadricLight, RectangleLight, TriangleLight};
+use super::{AreaLight, AreaShape, Emission, EmissionMapping, PatchLight, Plane, QuadricLight};
+use super::{RectangleLight, TriangleLight};
 use crate::geometry::{BilinearMesh, Shape, TriangleMesh};
 use lumiris_numbers::math::{Rgb, Vec2, Vec3};
 
@@ -20,7 +21,8 @@ impl AreaLights {
     fn push(&mut self, shape: AreaShape, emission: &Emission, primitives: u32) {
         let primitive = self.light_of_primitive.len() as u32;
         let index = self.lights.len() as u32;
-        self.lights.push(AreaLight { shape, emission: emission.clone(), primitive });
+        let plane = Plane::of(&shape);
+        self.lights.push(AreaLight { shape, plane, emission: emission.clone(), primitive });
         self.light_of_primitive.extend((0..primitives).map(|_| index));
     }
 }
@@ -146,9 +148,7 @@ fn patch(mesh: &BilinearMesh, i: usize, textured: bool) -> AreaShape {
     let light = PatchLight::new(corners, orientation(mesh, i), uvs);
     let uvs_fit = (uvs[1] + uvs[2] - uvs[0] - uvs[3]).abs().max_element() <= 1e-5;
     if uvs_fit || !textured {
-        let n = (corners[1] - corners[0]).cross(corners[2] - corners[0]).normalize_or_zero();
-        let n = if light.flip_normal { -n } else { n };
-        if let Some(rectangle) = rectangle(corners, n, [uvs[0], uvs[1], uvs[2]]) {
+        if let Some(rectangle) = rectangle(corners, light.mean_normal(), [uvs[0], uvs[1], uvs[2]]) {
             return AreaShape::Rectangle(rectangle);
         }
     }

@@ -14,6 +14,7 @@ pub mod build;
 pub mod cover;
 pub mod emission;
 pub mod patch;
+pub mod plane;
 pub mod quadric;
 pub mod rectangle;
 pub mod triangle;
@@ -22,6 +23,7 @@ pub use build::{AreaLights, area_lights_of};
 pub use cover::Cover;
 pub use emission::{Emission, EmissionImage, EmissionMapping};
 pub use patch::PatchLight;
+pub use plane::Plane;
 pub use quadric::QuadricLight;
 pub use rectangle::RectangleLight;
 pub use triangle::TriangleLight;
@@ -48,6 +50,8 @@ pub enum AreaShape {
 pub struct AreaLight {
     /// The surface.
     pub shape: AreaShape,
+    /// Its plane, if it is flat.
+    pub plane: Option<Plane>,
     /// What it emits.
     pub emission: Emission,
     /// First primitive of its geometry that belongs to it.
@@ -99,8 +103,8 @@ fn pdf_by_area(from: Vec3, p: Vec3, n: Vec3, pdf_area: f32) -> f32 {
 }
 
 impl AreaLight {
-    /// Samples a direction to the surface. `None` if the point is behind a flat one-sided light or the geometry is
-    /// degenerate; a sample on the non-emitting side of a curved light has black `li`.
+    /// Samples a direction to the surface. `None` if the point is in the plane of a flat light or behind it, if that is
+    /// one-sided, or the geometry is degenerate; a sample on the non-emitting side of a curved light has black `li`.
     #[inline]
     pub fn sample_li(&self, ctx: &LightCtx, u: [f32; 2]) -> Option<LightSample> {
         if self.is_dark_from(ctx.p) {
@@ -240,16 +244,19 @@ impl AreaLight {
         }
     }
 
-    /// True if the light is one-sided and nothing of its emitting side can be seen from `p`.
+    /// True if nothing of a side that emits can be seen from `p`: from the plane of a flat light, and from behind a
+    /// one-sided light.
     #[inline]
     pub(super) fn is_dark_from(&self, p: Vec3) -> bool {
-        !self.emission.two_sided
-            && match &self.shape {
-                AreaShape::Triangle(triangle) => triangle.n.dot(p - triangle.p[0]) <= 0.0,
-                AreaShape::Rectangle(rectangle) => rectangle.n.dot(p - rectangle.corner) <= 0.0,
-                AreaShape::Quadric(quadric) => quadric.is_behind(p),
-                AreaShape::Patch(_) => false,
+        let two_sided = self.emission.two_sided;
+        match (&self.plane, &self.shape) {
+            (Some(plane), _) => {
+                let height = plane.height(p);
+                height == 0.0 || !two_sided && height < 0.0
             }
+            (None, AreaShape::Quadric(quadric)) => !two_sided && quadric.is_behind(p),
+            (None, AreaShape::Triangle(_) | AreaShape::Rectangle(_) | AreaShape::Patch(_)) => false,
+        }
     }
 
     /// Texture coordinates of the point `p` of the surface.

@@ -65,6 +65,13 @@ impl PatchLight {
         if self.flip_normal { -n } else { n }
     }
 
+    /// The unit normal of the plane of both diagonals, on the emitting side; zero if there is none.
+    pub(super) fn mean_normal(&self) -> Vec3 {
+        let [p00, p10, p01, p11] = self.corners.map(|p| p.as_dvec3());
+        let n = (p11 - p00).cross(p01 - p10).normalize_or_zero().as_vec3();
+        if self.flip_normal { -n } else { n }
+    }
+
     pub(super) fn sample(&self, from: Vec3, u: [f32; 2]) -> Option<ShapeSample> {
         ShapeSample::by_area(from, self.sample_point(u))
     }

@@ -198,8 +198,20 @@ impl QuadricLight {
         pdf_by_area(from, p, scaled_n / jacobian, 1.0 / (self.local_area * jacobian))
     }
 
-    /// True if no point of the side of the normal can be seen from `p`: behind a disk, outside a sphere whose normal
-    /// points inwards, inside one whose normal points outwards.
+    /// A point of the plane of a disk and the largest coordinates of the terms that its points are sums of, and its unit
+    /// normal; `None` for other quadrics.
+    pub(super) fn disk_plane(&self) -> Option<([Vec3; 2], Vec3)> {
+        let QuadricKind::Disk { height, radius, .. } = self.quadric.kind else { return None };
+        let m = self.quadric.group_from_local.as_daffine3();
+        let n = m.matrix3.x_axis.cross(m.matrix3.y_axis).normalize_or_zero().as_vec3();
+        let center = m.transform_point3(Vec3::new(0.0, 0.0, height).as_dvec3());
+        let local = Vec3::new(radius, radius, height.abs()).as_dvec3();
+        let extent = m.matrix3.abs() * local + m.translation.abs();
+        Some(([center.as_vec3(), extent.as_vec3()], if self.quadric.flip_normal { -n } else { n }))
+    }
+
+    /// True if no point of the side of the normal can be seen from `p`: outside a sphere whose normal points inwards,
+    /// inside one whose normal points outwards.
     #[inline]
     pub(super) fn is_behind(&self, p: Vec3) -> bool {
         match (self.quadric.kind, self.sphere) {
@@ -210,11 +222,7 @@ impl QuadricLight {
                 let is_outside = distance > radius * (1.0 + ON_SURFACE);
                 if self.reversed { is_outside } else { is_inside }
             }
-            (QuadricKind::Disk { height, .. }, _) => {
-                let height_above = self.quadric.local_from_group.transform_point3(p).z - height;
-                if self.reversed { height_above >= 0.0 } else { height_above <= 0.0 }
-            }
-            (QuadricKind::Sphere { .. } | QuadricKind::Cylinder { .. }, _) => false,
+            (QuadricKind::Sphere { .. } | QuadricKind::Cylinder { .. } | QuadricKind::Disk { .. }, _) => false,
         }
     }
 

@@ -162,9 +162,13 @@ impl RectangleLight {
         (self.corner + x + y, p_error)
     }
 
-    pub(super) fn bounds(&self) -> Bounds3 {
+    pub(super) fn corners(&self) -> [Vec3; 4] {
         let (w, h) = (self.size.x, self.size.y);
-        Bounds3::from_points([(0.0, 0.0), (w, 0.0), (0.0, h), (w, h)].map(|(s, t)| self.point(s, t).0))
+        [(0.0, 0.0), (w, 0.0), (0.0, h), (w, h)].map(|(s, t)| self.point(s, t).0)
+    }
+
+    pub(super) fn bounds(&self) -> Bounds3 {
+        Bounds3::from_points(self.corners())
     }
 
     pub(super) fn uv(&self, p: Vec3) -> Vec2 {

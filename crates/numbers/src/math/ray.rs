@@ -1,5 +1,6 @@
 //! Rays and robust ray origins.
 
+use super::gamma;
 use glam::Vec3;
 
 /// A ray `o + t·d`, `0 < t < t_max`.
@@ -27,12 +28,17 @@ impl Ray {
 /// what remains is the rounding of `o + t·d` at t = 1.
 pub const SEGMENT_END: f32 = 1.0 - 8.0 * f32::EPSILON;
 
-/// Moves `p` off its surface along the geometric normal `n`, to the side that `w` points to, by at least the
-/// bound `p_error` of its rounding error; so that a ray from there cannot hit the surface that it leaves
-/// [Pharr et al. 2023, §6.8.6]. `n` is unit, `p_error` is per axis and non-negative.
+/// Bound of the distance between surfaces that are meant to be in the same place, relative to the largest coordinate of
+/// a point there: each is rounded on its own, by its placement, and a placement that turns mixes the axes.
+pub const COINCIDENCE: f32 = gamma(8);
+
+/// Moves `p` off its surface along the geometric normal `n`, to the side that `w` points to: by the bound `p_error` of
+/// its rounding error, so that a ray from there cannot hit the surface that it leaves [Pharr et al. 2023, §6.8.6], and
+/// by no less than [`COINCIDENCE`], so that it cannot hit another one in the same place either. `n` is unit, or zero
+/// where there is no surface; `p_error` is per axis and non-negative.
 #[inline]
 pub fn offset_origin(p: Vec3, p_error: Vec3, n: Vec3, w: Vec3) -> Vec3 {
-    let distance = n.abs().dot(p_error);
+    let distance = n.abs().dot(p_error).max(p.abs().max_element() * COINCIDENCE);
     let offset = if w.dot(n) < 0.0 { -n * distance } else { n * distance };
     let moved = p + offset;
     // Round away from the surface, so that the addition cannot fall back onto it.
@@ -80,10 +86,11 @@ mod tests {
             }
         }
         // An error far below the spacing of floats still moves to the next one
-        let tiny = Vec3::splat(1e-20);
-        assert_eq!(offset_origin(p, tiny, Vec3::X, Vec3::X).x, 1.0_f32.next_up());
-        assert_eq!(offset_origin(p, tiny, Vec3::X, -Vec3::X).x, 1.0_f32.next_down());
-        assert_eq!(offset_origin(p, Vec3::ZERO, Vec3::X, Vec3::X), p);
+        assert_eq!(offset_origin(Vec3::X, Vec3::splat(1e-20), Vec3::X, Vec3::X).x, (1.0 + COINCIDENCE).next_up());
+        // Another surface may be in the same place, even in a plane through the origin
+        assert!(offset_origin(p.with_x(0.0), Vec3::ZERO, Vec3::X, Vec3::X).x >= 4.0 * COINCIDENCE);
+        // Without a surface, a point stays where it is
+        assert_eq!(offset_origin(p, e, Vec3::ZERO, Vec3::X), p);
         // On the plane, the side of the normal
         assert!(offset_origin(p, e, Vec3::X, Vec3::Y).x > p.x);
     }
