@@ -2,6 +2,7 @@
 #![allow(clippy::print_stdout, clippy::print_stderr)]
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use lumiris::film::noise::Noise;
 use lumiris::render::Progress;
 
 /// Prints a line to standard error; that nobody reads it is no reason to lose a rendering.
@@ -21,6 +22,17 @@ pub(super) fn print(text: &str) {
 /// A relative standard error as text; it is unknown where no pixel has two samples.
 pub(super) fn percent(noise: f64) -> String {
     if noise.is_finite() { format!("{:.2} %", noise * 100.0) } else { "unknown".to_owned() }
+}
+
+/// The noise of an image as text.
+pub(super) fn noise(noise: &Noise) -> String {
+    let Noise { median, above_twice } = *noise;
+    let share = if above_twice > 0.0 {
+        format!(" ({:.1} % of the blocks above twice that)", 100.0 * above_twice)
+    } else {
+        String::new()
+    };
+    format!("noise {}{share}", percent(median))
 }
 
 /// A progress bar of a rendering: progress, time left, rays per second, noise.
