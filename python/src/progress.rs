@@ -86,7 +86,7 @@ impl PassProgress {
         self.progress.elapsed.as_secs_f64()
     }
 
-    /// Mean relative standard error of the pixels, as last determined; `None` before.
+    /// Median over blocks of 16 × 16 pixels of their relative standard error, as last determined; `None` before.
     #[getter]
     fn noise(&self) -> Option<f64> {
         self.progress.noise

@@ -140,7 +140,7 @@ mod tests {
     #[test]
     fn sums_do_not_drift_at_high_sample_counts() {
         // 0.1 as f32, 10⁷ times: an f32 sum would be off by percents.
-        let sample = PixelSample { radiance: Rgb::splat(0.1), features: None };
+        let sample = PixelSample { radiance: Rgb::splat(0.1), ..PixelSample::default() };
         let mut sums = PixelAccumulator::default();
         (0..10_000_000).for_each(|i| sums.add(i, &sample));
         assert_eq!(sums.sums().mean()[0], f64::from(0.1_f32));
@@ -151,7 +151,7 @@ mod tests {
     fn variance_of_mean_is_that_of_the_samples_over_n() {
         let mut sums = PixelAccumulator::default();
         for (i, v) in [1.0, 2.0, 3.0, 6.0].into_iter().enumerate() {
-            sums.add(i as u32, &PixelSample { radiance: Rgb::splat(v), features: None });
+            sums.add(i as u32, &PixelSample { radiance: Rgb::splat(v), ..PixelSample::default() });
         }
         // Sample variance 14/3, divided by 4.
         assert!((sums.sums().variance_of_mean()[1] - 14.0 / 12.0).abs() < 1e-12);
@@ -161,7 +161,7 @@ mod tests {
     fn a_sample_that_is_not_finite_or_too_bright_is_counted_and_not_added() {
         for value in [f32::NAN, f32::INFINITY, LIMIT, -LIMIT, f32::MAX] {
             let mut sums = PixelAccumulator::default();
-            sums.add(0, &PixelSample { radiance: Rgb::new(value, 1.0, 1.0), features: None });
+            sums.add(0, &PixelSample { radiance: Rgb::new(value, 1.0, 1.0), ..PixelSample::default() });
             let sums = sums.sums();
             assert_eq!((sums.count, sums.invalid, sums.mean(), sums.radiance_squared), (1, 1, [0.0; 3], [0.0; 3]));
         }
@@ -181,7 +181,7 @@ mod tests {
                     object: 2 * i,
                 };
                 let radiance = Rgb::new(a, 1e6 * b * b * b, 1e-4 * c);
-                PixelSample { radiance, features: (i > 3 && b < 0.7).then_some(features) }
+                PixelSample { radiance, features: (i > 3 && b < 0.7).then_some(features), ..PixelSample::default() }
             })
             .collect();
         let part = |range: std::ops::Range<usize>| {

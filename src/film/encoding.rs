@@ -80,6 +80,7 @@ impl Encoder {
     pub fn replica(&mut self, replica: &ReplicaAccumulator) {
         self.count(replica.pixel);
         self.radiance(&replica.sums);
+        replica.squares.iter().for_each(|sum| self.square(sum));
     }
 
     /// Floats, in all their bytes.
@@ -174,7 +175,7 @@ impl<'a> Decoder<'a> {
 
     /// The sums of a replica.
     pub fn replica(&mut self) -> Option<ReplicaAccumulator> {
-        Some(ReplicaAccumulator { pixel: self.count()?, sums: self.radiance()? })
+        Some(ReplicaAccumulator { pixel: self.count()?, sums: self.radiance()?, squares: self.three(Self::square)? })
     }
 
     /// Floats.
@@ -215,7 +216,7 @@ mod tests {
         let mut encoder = Encoder::default();
         let pixels: Vec<PixelAccumulator> = (0..200).map(sums).chain([PixelAccumulator::default()]).collect();
         pixels.iter().for_each(|p| encoder.pixel(p));
-        let replica = ReplicaAccumulator { pixel: 70_000, sums: pixels[9].radiance };
+        let replica = ReplicaAccumulator { pixel: 70_000, sums: pixels[9].radiance, squares: pixels[8].squares };
         encoder.replica(&replica);
         encoder.floats(&[1.0, f32::NAN, -0.0]);
         let extremes = [i128::MIN, i128::MAX, -1, 1, 1 << 120].map(FixedSum::from_bits);

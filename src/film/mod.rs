@@ -3,28 +3,35 @@
 //! Pixel filters work by importance sampling: a sample belongs to one pixel, and its weight is the sign of the
 //! filter ([`filter`]). Samples are added to exact sums ([`exact`], [`accumulator`]), so that the film is the same
 //! however they are ordered and split. [`packed`] keeps those of a tile in few bytes, [`encoding`] stores them in files;
-//! [`replicas`] give the variance of pixel means.
+//! [`variance`] estimates that of pixel means by [`replicas`], and [`noise`] is that of the image.
 
 pub mod accumulator;
 pub mod encoding;
 pub mod exact;
 pub mod filter;
+pub mod noise;
 pub mod packed;
 pub mod replicas;
+pub mod variance;
 
 use accumulator::PixelAccumulator;
-use lumiris_numbers::math::{Rgb, Vec3, luminance};
+use lumiris_numbers::math::{Rgb, Vec3};
+use noise::Noise;
 use packed::PackedSums;
 use rayon::prelude::*;
-use replicas::{Replica, VarianceScale};
+use replicas::Replica;
 use std::ops::Range;
 use std::sync::{Arc, OnceLock};
+use variance::VarianceScale;
 
 /// What one camera sample says of its pixel.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct PixelSample {
     /// Radiance times the filter weight.
     pub radiance: Rgb,
+    /// What a replica's mean has beside it, and its spread has not: the difference of light paths that it shares with its
+    /// pixel ([`replicas`]).
+    pub offset: Rgb,
     /// Features of the first surface; `None` if the ray met nothing.
     pub features: Option<Features>,
 }
@@ -198,9 +205,8 @@ pub struct Summary {
     pub least_samples: Option<u64>,
     /// Samples that count as black; see [`PixelSums::invalid`].
     pub invalid: u64,
-    /// Mean over pixels of the relative standard error of the luminance of the mean: the noise that a progress bar
-    /// shows. Pixels without light do not count.
-    pub relative_noise: f64,
+    /// By the variances of the pixels' means.
+    pub noise: Noise,
     /// True if there are records of an irradiance cache.
     pub has_records: bool,
 }
@@ -357,43 +363,35 @@ impl Film {
             // Once, and not by all threads at the same time
             self.variance_scale();
             let bands = self.bands().map_init(Default::default, |(pixels, variances), rows| {
-                self.read_rows_with_variances(rows, pixels, variances);
-                let width = self.bounds.width().max(1) as usize;
-                let rows = pixels.chunks(width).zip(variances.chunks(width));
-                rows.map(|(pixels, variances)| RowSummary::new(pixels, variances)).collect::<Vec<_>>()
+                self.read_rows_with_variances(rows.clone(), pixels, variances);
+                let noise =
+                    noise::of_blocks(&PixelBounds { y0: rows.start, y1: rows.end, ..self.bounds }, pixels, variances);
+                BandSummary::new(pixels, noise)
             });
-            RowSummary::of_all(&bands.collect::<Vec<_>>().concat())
+            BandSummary::of_all(&bands.collect::<Vec<_>>())
         })
     }
 }
 
-/// Rows that are read together where a film is read from top to bottom.
-pub const BAND: u32 = 16;
+/// Rows that are read together where a film is read from top to bottom: those of a row of blocks.
+pub const BAND: u32 = noise::BLOCK;
 
-/// What a row is like, so that the whole does not depend on how rows are read.
-#[derive(Clone)]
-struct RowSummary {
+/// What the rows of a band are like.
+struct BandSummary {
     samples: [u64; 2],
     least_samples: Option<u64>,
     all_samples: u64,
     pixels: [u64; 2],
     invalid: u64,
-    /// Σ of relative standard errors, and of how many pixels.
-    noise: (f64, u64),
+    /// Of its blocks.
+    noise: Vec<f64>,
     has_records: bool,
 }
 
-impl RowSummary {
-    fn new(pixels: &[PixelSums], variances: &[[f64; 3]]) -> Self {
+impl BandSummary {
+    fn new(pixels: &[PixelSums], noise: Vec<f64>) -> Self {
         let counts = || pixels.iter().map(|p| p.count);
-        let mut noise = (0.0, 0);
-        for (pixel, variance) in pixels.iter().zip(variances) {
-            let mean = luminance(pixel.mean());
-            if mean > 0.0 && pixel.count > 1 {
-                noise = (noise.0 + luminance(*variance).sqrt() / mean, noise.1 + 1);
-            }
-        }
-        RowSummary {
+        BandSummary {
             samples: [counts().min().unwrap_or(0), counts().max().unwrap_or(0)],
             least_samples: counts().filter(|n| *n > 0).min(),
             all_samples: counts().sum(),
@@ -404,19 +402,18 @@ impl RowSummary {
         }
     }
 
-    fn of_all(rows: &[RowSummary]) -> Summary {
-        let noise = rows.iter().fold((0.0, 0), |sum, row| (sum.0 + row.noise.0, sum.1 + row.noise.1));
+    fn of_all(bands: &[BandSummary]) -> Summary {
         Summary {
             samples: [
-                rows.iter().map(|row| row.samples[0]).min().unwrap_or(0),
-                rows.iter().map(|row| row.samples[1]).max().unwrap_or(0),
+                bands.iter().map(|band| band.samples[0]).min().unwrap_or(0),
+                bands.iter().map(|band| band.samples[1]).max().unwrap_or(0),
             ],
-            least_samples: rows.iter().filter_map(|row| row.least_samples).min(),
-            all_samples: rows.iter().map(|row| row.all_samples).sum(),
-            pixels: [0, 1].map(|i| rows.iter().map(|row| row.pixels[i]).sum()),
-            invalid: rows.iter().map(|row| row.invalid).sum(),
-            relative_noise: if noise.1 == 0 { f64::INFINITY } else { noise.0 / noise.1 as f64 },
-            has_records: rows.iter().any(|row| row.has_records),
+            least_samples: bands.iter().filter_map(|band| band.least_samples).min(),
+            all_samples: bands.iter().map(|band| band.all_samples).sum(),
+            pixels: [0, 1].map(|i| bands.iter().map(|band| band.pixels[i]).sum()),
+            invalid: bands.iter().map(|band| band.invalid).sum(),
+            noise: Noise::of_image(bands.iter().flat_map(|band| band.noise.iter().copied()).collect()),
+            has_records: bands.iter().any(|band| band.has_records),
         }
     }
 }

@@ -381,7 +381,10 @@ mod tests {
                     object: 1000 * i,
                 };
                 let radiance = Rgb::new(value, value * c, d);
-                sums.add(i, &PixelSample { radiance, features: (c < 0.7).then_some(features) });
+                sums.add(
+                    i,
+                    &PixelSample { radiance, features: (c < 0.7).then_some(features), ..PixelSample::default() },
+                );
             }
             sums.records = s.random::<u32>() >> 30;
             sums

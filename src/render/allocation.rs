@@ -418,7 +418,7 @@ fn pilot_tile(
     let mut seen = seen.into_iter();
     trace_pixels(run, worker, settings, (tile, &chosen), (0..spp, seed), |i, sample| {
         let radiance = sample.radiance - seen.next().unwrap_or_default();
-        sums[i as usize].add(0, &PixelSample { radiance, features: None });
+        sums[i as usize].add(0, &PixelSample { radiance, ..PixelSample::default() });
     });
     let cost_of = cost(&worker.tracer.take_stats(), chosen.len() * spp as usize);
     let sight = see(run, worker, seeing, tile, (sight_spp, seed));

@@ -6,7 +6,7 @@
 
 use super::control_variates::ROWS;
 use super::cryptomatte::Cryptomatte;
-use super::tiles::replica_edge;
+use super::tiles::replica_choice;
 use super::{RenderSettings, thread_pool};
 use crate::direct::Estimator;
 use crate::film::BAND;
@@ -22,7 +22,7 @@ const FEATURES: f64 = 17.0;
 /// Binary digits that twice as many samples add to both.
 const DIGITS: [f64; 2] = [9.0, 9.0];
 /// Bytes of the replicas of a pixel, of which there are few: exact sums, and numbers.
-const REPLICAS: f64 = 2.0;
+const REPLICAS: f64 = 4.0;
 /// Bytes of a tile besides its sums, by pixel.
 const TILE: f64 = 2.0;
 /// Bytes of a Cryptomatte where a pixel shows two ids.
@@ -108,7 +108,7 @@ fn of_sums(job: &RenderJob, render: &RenderSettings) -> f64 {
     if render.with_features {
         bytes += grown(FEATURES, DIGITS[1]);
     }
-    if replica_edge(job, render).is_some() {
+    if replica_choice(job, render).is_some() {
         bytes += REPLICAS;
     }
     bytes += light_layers::count(job) as f64 * grown(IMAGE, DIGITS[0]);

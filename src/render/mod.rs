@@ -108,7 +108,7 @@ pub struct Progress {
     pub elapsed: Duration,
     /// Passes over the whole image that are done.
     pub passes: u32,
-    /// Mean relative standard error of the pixels after the last pass for which it was determined, if there was one.
+    /// Median noise of the blocks ([`crate::film::noise`]) after the last pass for which it was determined, if there was one.
     pub noise: Option<f64>,
 }
 

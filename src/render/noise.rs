@@ -1,8 +1,7 @@
 //! `--noise`: as many camera samples as a standard error needs, block by block.
 //!
-//! The noise of a block of 16 × 16 pixels is σ/(m + 0.01): m is its mean luminance, and σ² the mean over its pixels of the
-//! variance of their luminance. A *pilot* estimates both: each pixel is rendered twice with n samples, by two seeds of their
-//! own, and half the squared difference of the two is the variance of n samples, whatever the sampler gains over
+//! The noise of a block is defined in [`crate::film::noise`]. A *pilot* estimates its mean and its variance: each pixel is
+//! rendered twice with n samples, by two seeds of their own, and half the squared difference of the two is the variance of n samples, whatever the sampler gains over
 //! independent ones. It falls at least as fast as 1/n, which says how many samples the block needs. The schedule: n = 2,
 //! doubled for blocks that need more than [`REACH`] times the pilot's samples, until none does or the limit is reached.
 //!
@@ -19,8 +18,8 @@ use super::pilot_samples::{LOOK_COST, LeftToLightPaths, cost, pilot_images};
 use super::worker::Worker;
 use super::{RenderSettings, Run, position};
 use crate::direct::Estimator;
+use crate::film::noise::{BLOCK, of_block};
 use crate::film::{FeatureSet, PixelBounds};
-use crate::imaging::metrics::difference::DEFAULT_EPSILON;
 use crate::integrators::{PathTracer, Tracer};
 use crate::scene::{PixelSamples, RenderJob};
 use crate::settings::{IntegratorSettings, Settings};
@@ -29,8 +28,6 @@ use lumiris_numbers::math::luminance;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// Edge of a block (pixels).
-pub const BLOCK: u32 = 16;
 /// Samples of a pixel and seed of the pilot in the beginning.
 const FIRST: u32 = 2;
 /// Samples that a block may need for each sample of the pilot.
@@ -141,8 +138,7 @@ fn numbers_for(Sums { all, seen, costs }: &Sums, width: usize, n: u32, threshold
     let (at_edges, sight) = (edges.iter().filter(|is_edge| **is_edge).count(), of_sight.iter().sum::<f64>());
     let count = pixels.max(1) as f64;
     let [mean, whole, rest] = [mean, whole, rest].map(|sum| sum / count);
-    let wanted = f64::from(threshold) * (mean.abs() + DEFAULT_EPSILON);
-    let samples = |variance: f64| (variance / (wanted * wanted)).ceil();
+    let samples = |variance: f64| (of_block(mean, variance) / f64::from(threshold)).powi(2).ceil();
     let alone = (samples(whole), vec![1; pixels]);
     if sight == 0.0 {
         return alone;

@@ -258,8 +258,8 @@ mod tests {
     fn film() -> Film {
         let bounds = PixelBounds { x0: 4, x1: 7, y0: 9, y1: 11 };
         let mut pixels = vec![PixelAccumulator::default(); 6];
-        pixels[0].add(0, &PixelSample { radiance: Rgb::new(1.0, 2.0, 4.0), features: None });
-        pixels[4].add(0, &PixelSample { radiance: Rgb::new(0.5, 0.25, 8.0), features: None });
+        pixels[0].add(0, &PixelSample { radiance: Rgb::new(1.0, 2.0, 4.0), ..PixelSample::default() });
+        pixels[4].add(0, &PixelSample { radiance: Rgb::new(0.5, 0.25, 8.0), ..PixelSample::default() });
         Film::of_pixels([20, 20], bounds, &pixels)
     }
 

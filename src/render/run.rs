@@ -3,12 +3,12 @@
 use super::camera_samples::{self, CameraSampler};
 use super::control_variates;
 use super::parts::{Checkpoints, PartError, StoredTile};
-use super::tiles::{SHARE_TILE, Tile, Tiles, batches, bounds_of_tiles, empty_layers, film, position, replica_edge};
+use super::tiles::{SHARE_TILE, Tile, Tiles, batches, bounds_of_tiles, empty_layers, film, position, replica_choice};
 use super::worker::{AnyWorker, Workers};
 use super::{BATCH_PATHS, Continuation, Progress, RenderError, RenderSettings, Rendering, TileObserver};
 use crate::direct::Estimator;
 use crate::film::packed::PackedSums;
-use crate::film::replicas::{ReplicaAccumulator, replicas};
+use crate::film::replicas::ReplicaChoice;
 use crate::film::{FeatureSet, Film, FilmTile, PixelBounds};
 use crate::imaging::tiles::TileStore;
 use crate::integrators::path::CameraSample;
@@ -144,7 +144,7 @@ impl<'a> Run<'a> {
                 }
                 let now = Instant::now();
                 if now >= observed && first < end {
-                    noise = Some(self.film(&tiles).summary().relative_noise);
+                    noise = Some(self.film(&tiles).summary().noise.median);
                     observed = Instant::now() + NOISE_INTERVAL.max(now.elapsed() * NOISE_REST);
                 }
             }
@@ -191,13 +191,13 @@ impl<'a> Run<'a> {
 
     /// The tiles, with what is stored of them.
     fn tiles(&self, stored: Option<Vec<StoredTile>>) -> Result<Vec<Tile>, PartError> {
-        let replica_edge = replica_edge(self.job, self.settings);
+        let replicas = replica_choice(self.job, self.settings);
         let bounds = self.job.world.scene.film.bounds;
         let tiles = match stored {
-            Some(stored) => stored.into_iter().map(|s| s.restore(|b| self.tile(b, replica_edge))).collect(),
+            Some(stored) => stored.into_iter().map(|s| s.restore(|b| self.tile(b, replicas))).collect(),
             None => {
                 let bounds = bounds_of_tiles(&bounds, self.tile_size, self.settings.share);
-                Ok(bounds.into_iter().map(|b| self.tile(b, replica_edge)).collect::<Vec<_>>())
+                Ok(bounds.into_iter().map(|b| self.tile(b, replicas)).collect::<Vec<_>>())
             }
         }?;
         let done = |t: &Tile| t.bounds.area() as u64 * u64::from(t.done - self.begin());
@@ -246,9 +246,9 @@ impl<'a> Run<'a> {
     }
 
     /// A tile without samples.
-    fn tile(&self, bounds: PixelBounds, replica_edge: Option<u32>) -> Tile {
+    fn tile(&self, bounds: PixelBounds, replicas: Option<ReplicaChoice>) -> Tile {
         let all = &self.job.world.scene.film.bounds;
-        let replicas = replica_edge.map_or(Vec::new(), |edge| replicas(all, &bounds, edge));
+        let replicas = replicas.map_or(Vec::new(), |choice| choice.of_tile(all, &bounds));
         let integrator = &self.job.settings().integrator;
         let fits = Estimator::at_vertex(integrator, 0).fits(self.job, bounds.area() + replicas.len());
         let layers = empty_layers(light_layers::count(self.job), bounds.area());
@@ -358,16 +358,16 @@ impl<'a> Run<'a> {
         }
         let solve = start.elapsed();
         worker.read(tile);
-        for (pixels, samples) in self.batches(&bounds, &samples) {
+        let of_pixel = |index: usize| position(&bounds, index as u32);
+        for (pixels, samples) in self.batches(bounds.area(), of_pixel, &samples) {
             self.camera_samples(&bounds, pixels.clone(), &samples, &mut worker.scratch, &mut worker.samples);
-            let of_pixel = |index: usize| position(&bounds, index as u32);
             let of_pixels = pixels.clone().map(of_pixel).map(|pixel| (pixel, self.samples_of(pixel, &samples)));
             worker.trace((self.job, &self.camera), &mut tile.fits, (of_pixels, seed));
             let pixels = pixels.map(|index| (index, self.samples_of(of_pixel(index), &samples)));
             worker.add(&self.job.world.scene.film, pixels);
         }
         worker.write(tile);
-        self.render_replicas(worker, tile, samples);
+        self.render_replicas(worker, tile, &samples);
         tile.fits.pack(&mut worker.packing);
         let mut stats = worker.take_stats();
         if begins_block {
@@ -380,36 +380,41 @@ impl<'a> Run<'a> {
         stats
     }
 
-    /// Batches of the samples of a tile in a pass: parts of its pixels, or where these share paths, parts of the pass.
-    fn batches(&self, tile: &PixelBounds, pass: &Range<u32>) -> Vec<(Range<usize>, Range<u32>)> {
-        let of = |index: usize, pass: &Range<u32>| self.samples_of(position(tile, index as u32), pass).len();
+    /// Batches of the samples of some pixels in a pass: parts of the pixels, or where these share paths, parts of the pass.
+    fn batches(
+        &self,
+        pixels: usize,
+        pixel: impl Fn(usize) -> [u32; 2],
+        pass: &Range<u32>,
+    ) -> Vec<(Range<usize>, Range<u32>)> {
+        let of = |index: usize, pass: &Range<u32>| self.samples_of(pixel(index), pass).len();
         if self.shares_paths {
-            let paths = |i: u32| (0..tile.area()).map(|index| of(index, &(i..i + 1))).sum();
-            return batches(pass.clone(), paths).into_iter().map(|part| (0..tile.area(), part)).collect();
+            let paths = |i: u32| (0..pixels).map(|index| of(index, &(i..i + 1))).sum();
+            return batches(pass.clone(), paths).into_iter().map(|part| (0..pixels, part)).collect();
         }
-        let parts = batches(0..tile.area() as u32, |index| of(index as usize, pass));
+        let parts = batches(0..pixels as u32, |index| of(index as usize, pass));
         parts.into_iter().map(|part| (part.start as usize..part.end as usize, pass.clone())).collect()
     }
 
     /// Adds the samples of a pass to the replicas of a tile.
-    fn render_replicas(&self, worker: &mut AnyWorker<'_>, tile: &mut Tile, pass: Range<u32>) {
+    fn render_replicas(&self, worker: &mut AnyWorker<'_>, tile: &mut Tile, pass: &Range<u32>) {
         let seed = pcg4d([self.job.settings().sampling.seed, REPLICA_SEED, 0, 0])[0];
-        let samples_of = |r: &ReplicaAccumulator| self.samples_of(position(&tile.bounds, r.pixel), &pass);
-        let mut fits = tile.bounds.area() as u32..;
-        let longest = tile.replicas.iter().map(|r| samples_of(r).len()).max().unwrap_or(0);
-        for replicas in tile.replicas.chunks_mut((BATCH_PATHS / longest.max(1)).max(1)) {
+        let pixels: Vec<[u32; 2]> = tile.replicas.iter().map(|r| position(&tile.bounds, r.pixel)).collect();
+        if pixels.is_empty() {
+            return;
+        }
+        let fit = |replica: usize| (tile.bounds.area() + replica) as u32;
+        for (replicas, pass) in self.batches(pixels.len(), |i| pixels[i], pass) {
+            let samples_of = |i: usize| self.samples_of(pixels[i], &pass);
             worker.samples.clear();
-            let pixels = replicas.iter().zip(&mut fits);
-            let pixels = pixels.map(|(r, fit)| (fit, position(&tile.bounds, r.pixel), samples_of(r)));
-            self.camera.samples(pixels, seed, &mut worker.scratch, &mut worker.samples);
+            let of_fits = replicas.clone().map(|i| (fit(i), pixels[i], samples_of(i)));
+            self.camera.samples(of_fits, seed, &mut worker.scratch, &mut worker.samples);
             worker.samples.iter_mut().for_each(|sample| sample.is_replica = true);
-            let of_pixels = replicas.iter().map(|r| (position(&tile.bounds, r.pixel), samples_of(r)));
+            let of_pixels = replicas.clone().map(|i| (pixels[i], samples_of(i)));
             worker.trace((self.job, &self.camera), &mut tile.fits, (of_pixels, seed));
             let mut results = worker.results.iter();
-            for replica in replicas {
-                for result in results.by_ref().take(samples_of(replica).len()) {
-                    replica.sums.add(result.radiance);
-                }
+            for i in replicas {
+                results.by_ref().take(samples_of(i).len()).for_each(|result| tile.replicas[i].add(result));
             }
         }
     }

@@ -4,9 +4,9 @@ use super::{BATCH_PATHS, RenderSettings};
 use crate::direct::{Estimator, Fits};
 use crate::film::accumulator::PixelAccumulator;
 use crate::film::packed::PackedSums;
-use crate::film::replicas::ReplicaAccumulator;
+use crate::film::replicas::{ReplicaAccumulator, ReplicaChoice};
 use crate::film::{Film, FilmTile, PixelBounds};
-use crate::integrators::reuse;
+use crate::integrators::{light_paths, reuse};
 use crate::scene::RenderJob;
 use crate::settings::IntegratorKind;
 use std::ops::Range;
@@ -92,16 +92,18 @@ pub(super) fn bounds_of_tiles(image: &PixelBounds, size: u32, share: Option<Tile
     }
 }
 
-/// The edge of the blocks of pixels that are estimated twice; `None` if none are: that is not requested, or does not tell
-/// anything. Samples that share photon maps vary together. Where pixels share paths, blocks are half a cell.
-pub(super) fn replica_edge(job: &RenderJob, render: &RenderSettings) -> Option<u32> {
+/// The pixels that are estimated twice; `None` if none are: that is not requested, or does not tell anything. Samples that share
+/// photon maps vary together. Where pixels share paths, whole cells are estimated twice, in which they share as many.
+pub(super) fn replica_choice(job: &RenderJob, render: &RenderSettings) -> Option<ReplicaChoice> {
     let settings = job.settings();
     let shares_noise =
         settings.integrator.kind == IntegratorKind::PhotonMap && settings.integrator.photons.progressive.is_some();
     let is_over_pixels = Estimator::at_vertex(&settings.integrator, 0).is_over_pixels();
-    let is_useful = !settings.sampling.sampler.has_independent_samples() || is_over_pixels;
-    let edge = if reuse::edge(job) > 1 { reuse::CELL / 2 } else { 1 };
-    (render.with_replicas && is_useful && !shares_noise).then_some(edge)
+    // Pixels with more samples than there are sets of light paths use some of these more than once
+    let shares_light = job.pixel_samples.is_some() && light_paths::per_sample(job) > 0.0;
+    let is_useful = !settings.sampling.sampler.has_independent_samples() || is_over_pixels || shares_light;
+    let edge = if reuse::edge(job) > 1 { reuse::CELL } else { 1 };
+    (render.with_replicas && is_useful && !shares_noise).then_some(ReplicaChoice { edge, seed: settings.sampling.seed })
 }
 
 /// The film of tiles, which shares their sums; `layers` are the names of those by lights.

@@ -59,7 +59,9 @@ impl AnyWorker<'_> {
         looks.replace((job, camera), (samples, seed), pixels, (results, tracer.light_layers()));
         let film = &job.world.scene.film;
         if film.balance.is_some() {
-            self.results.iter_mut().for_each(|result| result.radiance = film.balanced(result.radiance));
+            for result in &mut self.results {
+                (result.radiance, result.offset) = (film.balanced(result.radiance), film.balanced(result.offset));
+            }
         }
     }
 
@@ -82,7 +84,7 @@ impl AnyWorker<'_> {
                 // Its own layers are `count` numbers
                 for (sums, &radiance) in layers.iter_mut().zip(&of_layers[k * count..]) {
                     let radiance = film.balanced(radiance);
-                    sums[pixel].add(i, &PixelSample { radiance, features: None });
+                    sums[pixel].add(i, &PixelSample { radiance, ..PixelSample::default() });
                 }
             }
         }

@@ -1,12 +1,14 @@
 //! The variances that an image states, against those that many seeds show.
 
 use lumiris::film::Film;
-use lumiris::import::{LoadOptions, load};
+use lumiris::import::cache::FileCache;
+use lumiris::import::{LoadOptions, load, load_text};
+use lumiris::render::plan::{Preparation, prepare};
 use lumiris::render::{RenderSettings, render};
 use lumiris::scene::{AccelKind, RenderJob};
-use lumiris::settings::IntegratorKind;
+use lumiris::settings::{Allocation, ControlVariates, EstimatorKind, IntegratorKind, RouletteKind, Settings};
 use lumiris_numbers::samplers::SamplerKind;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 use strum::IntoEnumIterator;
 
@@ -23,20 +25,70 @@ const QUIET: [Case; 2] = [
     Case { scene: "scenes/analytic/half-environment.pbrt", size: [12, 12], kind: IntegratorKind::Direct },
 ];
 
-/// Those of the table, with textures, glass and indirect light.
-const LOUD: [Case; 3] = [
-    Case { scene: "scenes/demo/gallery.pbrt", size: [48, 27], kind: IntegratorKind::Direct },
-    Case { scene: "scenes/demo/gallery.pbrt", size: [48, 27], kind: IntegratorKind::Path },
-    Case { scene: "scenes/keller-wald/rooms.pbrt", size: [32, 32], kind: IntegratorKind::Path },
+/// A way to render.
+struct Mode {
+    name: &'static str,
+    change: fn(&mut Settings),
+}
+
+/// Those in which a variance is more or less than s²/N.
+const MODES: [Mode; 8] = [
+    Mode { name: "mis", change: |_| () },
+    Mode { name: "sobol", change: |s| s.sampling.sampler = SamplerKind::Sobol },
+    Mode { name: "shared paths", change: |s| s.integrator.path_reuse = Some(4) },
+    Mode { name: "adaptive, looks", change: |s| s.sampling.allocation = Allocation::Adaptive },
+    Mode { name: "ocv over pixels", change: over_pixels },
+    Mode { name: "roulette and splitting", change: |s| s.integrator.roulette = RouletteKind::Efficiency },
+    Mode { name: "light paths", change: |s| s.integrator.light_paths = Some(1.0) },
+    Mode { name: "adaptive, shared, light paths", change: all_together },
 ];
 
+fn over_pixels(s: &mut Settings) {
+    s.integrator.estimator = EstimatorKind::Ocv;
+    (s.integrator.samples, s.integrator.bsdf_fraction) = (Some(2), Some(0.5));
+    s.integrator.ocv.control_variates = ControlVariates::Always;
+}
+
+fn all_together(s: &mut Settings) {
+    s.sampling.allocation = Allocation::Adaptive;
+    (s.integrator.path_reuse, s.integrator.light_paths) = (Some(4), Some(1.0));
+}
+
+/// Paths by `mis`, which share nothing and are as many in each pixel, and then what the mode changes.
+fn set(job: &mut RenderJob, mode: &Mode) {
+    job.change(|s| {
+        s.integrator.estimator = EstimatorKind::Mis;
+        (s.integrator.path_reuse, s.integrator.light_paths) = (Some(1), Some(0.0));
+        s.sampling.allocation = Allocation::Uniform;
+        (mode.change)(s);
+    });
+}
+
+/// Scenes of the table.
+const SCENES: [&str; 8] = [
+    "analytic/half-environment",
+    "demo/gallery",
+    "demo/window",
+    "demo/fog",
+    "demo/light-groups",
+    "keller-wald/rooms",
+    "keller-wald/slit",
+    "talbot/spheres",
+];
+
+/// More of them: files, divided by colons.
+const MORE_SCENES: &str = "VARIANCE_SCENES";
+
 fn job(case: &Case, sampler: SamplerKind) -> RenderJob {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(case.scene);
-    let options = LoadOptions { resolution: Some(case.size), ..LoadOptions::default() };
-    let mut loaded = load(&path, &options).map_err(|d| d.to_string()).unwrap();
-    loaded.settings.integrator.kind = case.kind;
-    loaded.settings.sampling.sampler = sampler;
-    loaded.job(AccelKind::Embree, None).unwrap()
+    let mut job = job_of(Path::new(env!("CARGO_MANIFEST_DIR")).join(case.scene), case.size);
+    set(&mut job, &MODES[0]);
+    job.change(|s| (s.integrator.kind, s.sampling.sampler) = (case.kind, sampler));
+    job
+}
+
+fn job_of(path: PathBuf, size: [u32; 2]) -> RenderJob {
+    let options = LoadOptions { resolution: Some(size), ..LoadOptions::default() };
+    load(&path, &options).map_err(|d| d.to_string()).unwrap().job(AccelKind::Embree, None).unwrap()
 }
 
 fn film(job: &RenderJob, settings: RenderSettings) -> Film {
@@ -50,7 +102,8 @@ fn mean(values: &[f64]) -> (f64, f64) {
     (mean, (values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / (n - 1.0) / n).sqrt())
 }
 
-/// What `seeds` images show; ratios are to the variance between seeds, all summed over pixels and channels.
+/// What images of many seeds show; ratios are to the variance between seeds, summed over channels and over the pixels of the image
+/// or of a block of 8 × 8.
 struct Study {
     /// The variance stated.
     stated: f64,
@@ -58,50 +111,55 @@ struct Study {
     error: f64,
     /// The variance that independent samples would have.
     independent: f64,
-    /// The median over pixels of the variance stated to that between seeds.
-    median: f64,
-    /// Mean of z² of the difference of two images, per pixel and channel: 1 if every pixel states its own variance.
-    chi_squared: f64,
+    /// The variance stated, in the median block, and least and most in a block.
+    blocks: [f64; 3],
 }
 
 fn study(job: &mut RenderJob, spp: u32, seeds: u32) -> Study {
-    let settings = RenderSettings { spp, with_replicas: true, ..RenderSettings::default() };
     let (mut means, mut stated, mut independent) = (Vec::new(), Vec::new(), Vec::new());
     for seed in 0..seeds {
-        job.change(|s| s.sampling.seed = seed);
-        let film = film(job, settings);
-        let flat = |values: Vec<[f64; 3]>| values.into_flattened();
-        means.push(flat(film.pixels().iter().map(|p| p.mean()).collect()));
-        stated.push(flat(film.variances()));
+        job.change(|s| (s.sampling.seed, s.sampling.spp) = (seed, spp));
+        job.pixel_samples = None;
+        if job.settings().sampling.allocation == Allocation::Adaptive {
+            prepare(job, &Preparation::on(None)).unwrap();
+        }
+        let spp = job.pixel_samples.as_ref().map_or(spp, |samples| samples.spp);
+        let film = film(job, RenderSettings { spp, with_replicas: true, ..RenderSettings::default() });
+        means.push(film.pixels().iter().map(|p| p.mean()).collect::<Vec<_>>());
+        stated.push(film.variances().iter().map(|v| v.iter().sum()).collect::<Vec<f64>>());
         independent.push(film.pixels().iter().flat_map(|p| p.variance_of_mean()).sum::<f64>());
     }
 
-    // The variance between seeds is the mean over seeds of squared deviations, scaled by n/(n − 1).
-    let n = f64::from(seeds);
-    let column_mean = |rows: &[Vec<f64>]| -> Vec<f64> {
-        (0..rows[0].len()).map(|i| rows.iter().map(|r| r[i]).sum::<f64>() / n).collect()
+    // The variance between seeds is the mean over seeds of squared deviations, scaled by n/(n − 1)
+    let (n, pixels) = (f64::from(seeds), means[0].len());
+    let centre = |i: usize, c: usize| means.iter().map(|m| m[i][c]).sum::<f64>() / n;
+    let centres: Vec<[f64; 3]> = (0..pixels).map(|i| [0, 1, 2].map(|c| centre(i, c))).collect();
+    let square = |a: [f64; 3], b: [f64; 3]| a.iter().zip(b).map(|(a, b)| (a - b).powi(2)).sum::<f64>();
+    let deviations = |m: &Vec<[f64; 3]>| {
+        m.iter().zip(&centres).map(|(m, centre)| square(*m, *centre) * n / (n - 1.0)).collect::<Vec<f64>>()
     };
-    let centre = column_mean(&means);
-    let deviations: Vec<Vec<f64>> =
-        means.iter().map(|m| m.iter().zip(&centre).map(|(x, c)| (x - c).powi(2) * n / (n - 1.0)).collect()).collect();
+    let deviations: Vec<Vec<f64>> = means.iter().map(deviations).collect();
     let totals = |rows: &[Vec<f64>]| rows.iter().map(|r| r.iter().sum()).collect::<Vec<f64>>();
     let (truth, truth_error) = mean(&totals(&deviations));
     let (total, total_error) = mean(&totals(&stated));
 
-    let each = column_mean(&stated).into_iter().zip(column_mean(&deviations));
-    let mut ratios: Vec<f64> = each.filter(|(_, v)| *v > 0.0).map(|(stated, v)| stated / v).collect();
+    let width = job.world.scene.film.bounds.width() as usize;
+    let blocks = width.div_ceil(8) * (pixels / width).div_ceil(8);
+    let of_blocks = |rows: &[Vec<f64>]| {
+        let mut sums = vec![0.0; blocks];
+        for (i, value) in rows.iter().flat_map(|row| row.iter().enumerate()) {
+            sums[i / width / 8 * width.div_ceil(8) + i % width / 8] += value;
+        }
+        sums
+    };
+    let ratios = of_blocks(&stated).into_iter().zip(of_blocks(&deviations)).filter(|(_, truth)| *truth > 0.0);
+    let mut ratios: Vec<f64> = ratios.map(|(stated, truth)| stated / truth).collect();
     ratios.sort_by(f64::total_cmp);
-    let pairs = (0..seeds as usize - 1).flat_map(|s| (0..centre.len()).map(move |i| (s, i)));
-    let z_squared = pairs.filter_map(|(s, i)| {
-        let variance = stated[s][i] + stated[s + 1][i];
-        (variance > 0.0).then(|| (means[s][i] - means[s + 1][i]).powi(2) / variance)
-    });
     Study {
         stated: total / truth,
         error: total / truth * (total_error / total).hypot(truth_error / truth),
         independent: mean(&independent).0 / truth,
-        median: ratios[ratios.len() / 2],
-        chi_squared: mean(&z_squared.collect::<Vec<f64>>()).0,
+        blocks: [ratios[ratios.len() / 2], ratios[0], ratios[ratios.len() - 1]],
     }
 }
 
@@ -110,7 +168,7 @@ fn variances_are_those_between_seeds_for_every_sampler_and_number_of_samples() {
     for case in &QUIET {
         for sampler in SamplerKind::iter() {
             let mut job = job(case, sampler);
-            for spp in [2, 3, 8, 16] {
+            for spp in [2, 3, 16] {
                 let s = study(&mut job, spp, 32);
                 let what =
                     format!("{}, {}, {spp} samples: {} ± {}", case.scene, <&str>::from(sampler), s.stated, s.error);
@@ -125,16 +183,53 @@ fn variances_are_those_between_seeds_for_every_sampler_and_number_of_samples() {
     }
 }
 
+/// A room whose lamp is seen, with a ball of metal, 32 × 32 pixels.
+const ROOM: &str = r#"
+LookAt 0 0 4  0 0 0  0 1 0
+Camera "perspective" "float fov" 42
+Film "rgb" "integer xresolution" 32 "integer yresolution" 32
+Integrator "path" "integer maxdepth" 4
+Sampler "zsobol"
+WorldBegin
+AttributeBegin AreaLightSource "diffuse" "rgb L" [ 9 8 7 ]
+Shape "bilinearmesh" "point3 P" [ -0.4 0.99 0.3  0.3 0.99 0.4  -0.3 0.99 -0.4  0.4 0.99 -0.3 ] AttributeEnd
+Material "diffuse" "rgb reflectance" [ 0.6 0.6 0.5 ]
+Shape "bilinearmesh" "point3 P" [ -1 -1 1  1 -1 1  -1 -1 -1  1 -1 -1 ]
+Shape "bilinearmesh" "point3 P" [ -1 1 1  1 1 1  -1 1 -1  1 1 -1 ]
+Shape "bilinearmesh" "point3 P" [ -1 -1 -1  1 -1 -1  -1 1 -1  1 1 -1 ]
+Material "conductor" "float roughness" 0.05
+AttributeBegin Translate 0.4 -0.6 0.2 Shape "sphere" "float radius" 0.4 AttributeEnd
+"#;
+
+/// With 24 seeds the lamp's edge, some 40 pixels, has standard errors of √(2/24/40) = 5 % of both variances.
+#[test]
+fn variances_are_those_between_seeds_in_every_mode() {
+    let loaded = load_text(ROOM, "room", Path::new("."), &LoadOptions::default(), &FileCache::default());
+    let loaded = loaded.map_err(|d| d.to_string()).unwrap();
+    let mut job = loaded.job(AccelKind::Embree, None).unwrap();
+    let base = *job.settings();
+    for mode in &MODES {
+        job.change(|s| *s = base);
+        set(&mut job, mode);
+        let s = study(&mut job, 8, 24);
+        let what = format!("{}: {} ± {}, blocks {:?}", mode.name, s.stated, s.error, s.blocks);
+        assert!(s.error < 0.09 && (s.stated - 1.0).abs() < 0.3, "{what}");
+        let [median, least, most] = s.blocks;
+        assert!((0.75..1.33).contains(&median) && least > 0.2 && most < 5.0, "{what}");
+    }
+}
+
 #[test]
 fn light_paths_have_their_part_of_the_variance() {
     let mut job = crate::light_paths::caustics(1.0);
+    job.change(|s| s.sampling.allocation = Allocation::Uniform);
     let s = study(&mut job, 16, 48);
     assert!(s.error < 0.08 && (s.stated - 1.0).abs() < 0.25, "{} ± {}", s.stated, s.error);
 }
 
 #[test]
 fn replicas_change_no_image_and_do_not_depend_on_tiles_and_threads() {
-    let job = job(&LOUD[1], SamplerKind::SobolBlueNoise);
+    let job = job_of(Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/demo/gallery.pbrt"), [48, 27]);
     let plain = film(&job, RenderSettings { spp: 5, ..RenderSettings::default() });
     assert!(plain.replicas().is_empty());
     let mut variances: Vec<Vec<[f64; 3]>> = Vec::new();
@@ -159,27 +254,22 @@ fn replicas_change_no_image_and_do_not_depend_on_tiles_and_threads() {
 #[ignore = "prints the table of docs/measurements/variance"]
 #[allow(clippy::print_stdout)]
 fn table() {
-    println!(
-        "| scene | sampler | spp | as if independent | stated | ± | median pixel | χ²/n |\n|---|---|---|---|---|---|---|---|"
-    );
-    let (quiet, loud) = (QUIET.iter().map(|c| (c, 48)), LOUD.iter().map(|c| (c, 24)));
-    for (case, seeds) in quiet.chain(loud) {
-        for sampler in SamplerKind::iter() {
-            let mut job = job(case, sampler);
-            for spp in [4, 12, 64] {
-                let s = study(&mut job, spp, seeds);
-                let scene = case.scene.trim_start_matches("scenes/").trim_end_matches(".pbrt");
-                println!(
-                    "| {scene}, {} | {} | {spp} | {:.2} | {:.2} | {:.2} | {:.2} | {:.2} |",
-                    <&str>::from(case.kind),
-                    <&str>::from(sampler),
-                    s.independent,
-                    s.stated,
-                    s.error,
-                    s.median,
-                    s.chi_squared
-                );
-            }
+    println!("| scene | mode | s²/N | stated | ± | median block | least | most |\n|---|---|---|---|---|---|---|---|");
+    let own = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes");
+    let more = std::env::var(MORE_SCENES).unwrap_or_default();
+    let more = more.split(':').filter(|path| !path.is_empty()).map(PathBuf::from);
+    for path in SCENES.map(|name| own.join(name).with_extension("pbrt")).into_iter().chain(more) {
+        let mut job = job_of(path.clone(), [96, 64]);
+        let base = *job.settings();
+        for mode in &MODES {
+            job.change(|s| *s = base);
+            set(&mut job, mode);
+            let Study { stated, error, independent, blocks: [median, least, most] } = study(&mut job, 16, 16);
+            let folder = path.parent().and_then(Path::file_name).unwrap_or_default().display();
+            let (file, name) = (path.file_stem().unwrap_or_default().display(), mode.name);
+            println!(
+                "| {folder}/{file} | {name} | {independent:.2} | {stated:.2} | {error:.2} | {median:.2} | {least:.2} | {most:.2} |"
+            );
         }
     }
 }

@@ -112,20 +112,22 @@ impl LightImage {
             let turn = turn & TURN;
             let begin = row.partition_point(|entry| (entry.x, entry.turn) < (x, turn));
             let own = row[begin..].iter().take_while(|entry| (entry.x, entry.turn) == (x, turn));
-            let factor = if is_replica { of_replica(turn) } else { 1.0 };
-            out.radiance += own.map(|entry| entry.value).sum::<Rgb>() * factor;
+            let light = own.map(|entry| entry.value).sum::<Rgb>();
+            out.radiance += light;
+            if is_replica {
+                out.offset = light * sign(turn) * SQRT_2;
+            }
         }
     }
 }
 
-/// The factor of a turn in a replica, whose difference from its pixel tells the variance. There is one set of light paths for
-/// both, so the difference is made, by a sign s of each turn: Σ e (1 + √2 s)/n and Σ e/n differ by √2 Σ s e/n, of which half the
-/// square is the variance of the latter in the mean, if as many turns have either sign. So two that follow each other have
-/// different ones, at random which. Pixels with samples in few of the turns have random signs, and state too much.
-fn of_replica(turn: u32) -> f32 {
-    let turn = turn & TURN;
+/// The sign s of a turn in a replica, whose difference from its pixel tells the variance. There is one set of light paths for
+/// both, so the difference is made: Σ e (1 + √2 s)/n and Σ e/n differ by √2 Σ s e/n, of which half the square is the variance of
+/// the latter in the mean, if as many turns have either sign. So two that follow each other have different ones, at random
+/// which. Pixels with samples in few of the turns have random signs, and state too much.
+fn sign(turn: u32) -> f32 {
     let [of_pair, ..] = pcg4d([turn >> 1, SEED, 1, 0]);
-    1.0 + if (of_pair ^ turn) & 1 == 1 { SQRT_2 } else { -SQRT_2 }
+    if (of_pair ^ turn) & 1 == 1 { 1.0 } else { -1.0 }
 }
 
 /// The bits of a turn beside those which count the samples of a pixel in it, see [`crate::scene::PixelSamples::turn`].

@@ -17,7 +17,7 @@ use std::path::{Path, PathBuf};
 /// What files begin with.
 const MAGIC: &[u8; 8] = b"LUMIFILM";
 /// Version of the format.
-const VERSION: u32 = 2;
+const VERSION: u32 = 3;
 /// Letters of chunks.
 const HEADER: u8 = b'H';
 const TILES: u8 = b'T';
@@ -263,7 +263,7 @@ mod tests {
             spp: 32,
             share,
             is_finished: true,
-            replica_edge: None,
+            replicas: None,
             controls: 0,
             light_layers: Vec::new(),
             fingerprint: 0,

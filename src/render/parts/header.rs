@@ -2,9 +2,10 @@
 
 use crate::direct::Estimator;
 use crate::film::PixelBounds;
+use crate::film::replicas::ReplicaChoice;
 use crate::integrators::light_layers;
 use crate::render::RenderSettings;
-use crate::render::tiles::{TileShare, replica_edge};
+use crate::render::tiles::{TileShare, replica_choice};
 use crate::scene::RenderJob;
 use std::ops::Range;
 use std::str::FromStr;
@@ -27,8 +28,8 @@ pub struct FilmHeader {
     pub share: Option<TileShare>,
     /// True if there are all these samples of all these pixels.
     pub is_finished: bool,
-    /// Edge of the blocks of pixels that are estimated twice, if there are any.
-    pub replica_edge: Option<u32>,
+    /// Pixels that are estimated twice, if there are any.
+    pub replicas: Option<ReplicaChoice>,
     /// Number of control variates that are summed.
     pub controls: u32,
     /// Names of the layers by lights.
@@ -61,7 +62,7 @@ impl FilmHeader {
             spp,
             share: render.share,
             is_finished: false,
-            replica_edge: replica_edge(job, render),
+            replicas: replica_choice(job, render),
             controls: if estimator.is_over_pixels() { job.controls() as u32 } else { 0 },
             light_layers: light_layers::names(job).to_vec(),
             fingerprint,
@@ -86,7 +87,7 @@ impl FilmHeader {
         if self.spp != other.spp {
             lines.push(format!("samples per pixel: {}, not {}", other.spp, self.spp));
         }
-        if (self.replica_edge, self.controls) != (other.replica_edge, other.controls) {
+        if (self.replicas.is_some(), self.controls) != (other.replicas.is_some(), other.controls) {
             lines.push("one of them holds the sums for a variance layer, the other does not".to_owned());
         }
         if self.light_layers != other.light_layers {
@@ -128,7 +129,7 @@ impl FilmHeader {
             ("spp", self.spp.to_string()),
             ("share", share),
             ("finished", self.is_finished.to_string()),
-            ("replicas", self.replica_edge.unwrap_or(0).to_string()),
+            ("replicas", self.replicas.map_or_else(|| "none".to_owned(), |r| format!("{} {}", r.edge, r.seed))),
             ("controls", self.controls.to_string()),
             ("light_layers", self.light_layers.join(",")),
             ("fingerprint", format!("{:016x}", self.fingerprint)),
@@ -154,6 +155,13 @@ impl FilmHeader {
                 Some(Some(TileShare { index, count }).filter(|share| index < share.count)?)
             }
         };
+        let replicas = match own("replicas")? {
+            "none" => None,
+            text => {
+                let [edge, seed] = numbers(text)?;
+                Some(Some(ReplicaChoice { edge, seed }).filter(|choice| choice.edge > 0)?)
+            }
+        };
         let is_inside = x0 < x1 && x1 <= w && y0 < y1 && y1 <= h && w.max(h) <= 1 << 16;
         let named = |prefix: &str| {
             let of_kind = entries.iter().filter_map(|(key, value)| Some((key.strip_prefix(prefix)?, value)));
@@ -166,7 +174,7 @@ impl FilmHeader {
             spp: own("spp")?.parse().ok()?,
             share,
             is_finished: own("finished")?.parse().ok()?,
-            replica_edge: Some(own("replicas")?.parse().ok()?).filter(|&edge| edge > 0),
+            replicas,
             controls: own("controls")?.parse().ok().filter(|n| *n <= 1 << 16)?,
             light_layers: own("light_layers")?.split(',').filter(|name| !name.is_empty()).map(str::to_owned).collect(),
             fingerprint: u64::from_str_radix(own("fingerprint")?, 16).ok()?,
@@ -221,7 +229,7 @@ mod tests {
             spp: 32,
             share: Some(TileShare { index: 2, count: 5 }),
             is_finished: true,
-            replica_edge: None,
+            replicas: Some(ReplicaChoice { edge: 16, seed: u32::MAX }),
             controls: 7,
             light_layers: vec!["key".to_owned(), "other".to_owned()],
             fingerprint: 0xfedc_ba98_7654_3210,

@@ -12,7 +12,6 @@ use crate::direct::Fits;
 use crate::film::accumulator::PixelAccumulator;
 use crate::film::exact::FixedSum;
 use crate::film::packed::PackedSums;
-use crate::film::replicas::replicas;
 use crate::film::{Film, PixelBounds};
 use crate::render::control_variates;
 use crate::render::output::{Aov, default_aovs};
@@ -217,7 +216,7 @@ impl Whole {
     fn empty(header: &FilmHeader) -> Self {
         let image = header.bounds;
         let tile = |bounds: PixelBounds| {
-            let replicas = header.replica_edge.map_or(Vec::new(), |edge| replicas(&image, &bounds, edge));
+            let replicas = header.replicas.map_or(Vec::new(), |choice| choice.of_tile(&image, &bounds));
             let fits = match header.controls as usize {
                 0 => Fits::default(),
                 controls => Fits::of_pixels(controls, bounds.area() + replicas.len()),
@@ -286,7 +285,7 @@ fn add_to(
         let Some(at) = index(replica.pixel) else { continue };
         let at = tile.replicas.binary_search_by_key(&(at as u32), |r| r.pixel);
         let at = at.map_err(|_| "it has a second estimate of a pixel that should have none")?;
-        tile.replicas[at].sums.merge(&replica.sums);
+        tile.replicas[at].merge(replica);
         if row > 0 {
             tile.fits.merge_sums((merged.len() + at) as u32, controls(stored.bounds.area() + i));
         }

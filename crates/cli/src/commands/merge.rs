@@ -125,9 +125,9 @@ fn report(args: &MergeArgs, merged: &Merged, paths: &[PathBuf]) {
     }
     if !args.quiet {
         let names: Vec<String> = paths.iter().map(|path| path.display().to_string()).collect();
-        let noise = progress::percent(summary.relative_noise);
+        let noise = progress::noise(&summary.noise);
         let parts = if args.parts.len() == 1 { "1 part".to_owned() } else { format!("{} parts", args.parts.len()) };
-        progress::say(&format!("{} from {parts}, noise {noise}", names.join(", ")));
+        progress::say(&format!("{} from {parts}, {noise}", names.join(", ")));
     }
 }
 

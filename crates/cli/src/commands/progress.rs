@@ -3,6 +3,7 @@
 
 use anyhow::Context;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use lumiris::film::noise::Noise;
 use lumiris::render::Progress;
 use std::collections::BTreeSet;
 use std::io::{self, Write};
@@ -38,6 +39,17 @@ pub(super) fn printed(result: io::Result<()>) -> anyhow::Result<()> {
 /// A relative standard error as text; it is unknown where no pixel has two samples.
 pub(super) fn percent(noise: f64) -> String {
     if noise.is_finite() { format!("{:.2} %", noise * 100.0) } else { "unknown".to_owned() }
+}
+
+/// The noise of an image as text.
+pub(super) fn noise(noise: &Noise) -> String {
+    let Noise { median, above_twice } = *noise;
+    let share = if above_twice > 0.0 {
+        format!(" ({:.1} % of the blocks above twice that)", 100.0 * above_twice)
+    } else {
+        String::new()
+    };
+    format!("noise {}{share}", percent(median))
 }
 
 /// A progress bar of a rendering: progress, time left, rays per second, noise.

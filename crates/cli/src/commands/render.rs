@@ -158,7 +158,7 @@ pub(super) fn render_one(args: &RenderArgs, session: &Session) -> anyhow::Result
     Ok(Rendered {
         stats,
         seconds: (preparation + rendering.elapsed).as_secs_f64(),
-        noise: rendering.film.summary().relative_noise,
+        noise: rendering.film.summary().noise.median,
         complete: rendering.complete,
         misplaced: written.misplaced,
     })
@@ -324,7 +324,8 @@ fn stats(args: &RenderArgs, job: &RenderJob, rendering: &Rendering, setup: Setup
         "threads": rendering.threads,
         "complete": rendering.complete,
         "invalid_samples": rendering.film.summary().invalid,
-        "relative_noise": rendering.film.summary().relative_noise,
+        "relative_noise": rendering.film.summary().noise.median,
+        "blocks_above_twice_the_noise": rendering.film.summary().noise.above_twice,
         "seconds": {
             "load": setup.load, "build": setup.build, "prepare": setup.prepare, "render": seconds(rendering.elapsed),
         },
@@ -410,9 +411,9 @@ fn report(args: &RenderArgs, rendering: &Rendering, (preparation, outputs): (Dur
         format!(" ({:.1} s of it for pilots)", preparation.as_secs_f64())
     };
     progress::say(&format!(
-        "{names} after {:.1} s{pilots}, {samples}{partial}, noise {}",
+        "{names} after {:.1} s{pilots}, {samples}{partial}, {}",
         (preparation + rendering.elapsed).as_secs_f64(),
-        progress::percent(summary.relative_noise)
+        progress::noise(&summary.noise)
     ));
     if let Some(c) = &rendering.cache {
         progress::say(&format!(

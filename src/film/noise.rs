@@ -1,0 +1,89 @@
+//! The noise of an image, by blocks of pixels: `--noise` asks for it, and it is what is printed of a finished image.
+//!
+//! The noise of a block of [`BLOCK`] × [`BLOCK`] pixels is σ/(|m| + 0.01): m is the mean luminance of its pixels, and σ² the mean
+//! variance of theirs.
+
+use super::{PixelBounds, PixelSums};
+use crate::imaging::metrics::difference::DEFAULT_EPSILON;
+use lumiris_numbers::math::luminance;
+
+/// Edge of a block (pixels).
+pub const BLOCK: u32 = 16;
+
+/// The noise of a block by the mean luminance of its pixels and the mean variance of theirs.
+pub fn of_block(mean: f64, variance: f64) -> f64 {
+    variance.sqrt() / (mean.abs() + DEFAULT_EPSILON)
+}
+
+/// The noise of an image.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Noise {
+    /// Median of the noise of its blocks; infinite where none is known. Blocks without light do not count.
+    pub median: f64,
+    /// Share of the blocks that have more than twice the median.
+    pub above_twice: f64,
+}
+
+impl Noise {
+    /// From the noise of all blocks.
+    pub(super) fn of_image(mut blocks: Vec<f64>) -> Self {
+        blocks.sort_unstable_by(f64::total_cmp);
+        let (below, middle) = (blocks.len().saturating_sub(1) / 2, blocks.len() / 2);
+        let Some(&upper) = blocks.get(middle) else { return Noise { median: f64::INFINITY, above_twice: 0.0 } };
+        let median = 0.5 * (blocks[below] + upper);
+        let above = blocks.len() - blocks.partition_point(|noise| *noise <= 2.0 * median);
+        Noise { median, above_twice: above as f64 / blocks.len() as f64 }
+    }
+}
+
+/// The noise of the blocks of some rows, [`BLOCK`] at most, by the variances of their pixels' means; of those that have light, and
+/// pixels with two samples. Channels are taken to vary together, as they do with the light that a path finds.
+pub(super) fn of_blocks(rows: &PixelBounds, pixels: &[PixelSums], variances: &[[f64; 3]]) -> Vec<f64> {
+    let width = rows.width() as usize;
+    let of_columns = |first: usize| {
+        let columns = first..width.min(first + BLOCK as usize);
+        let indices = (0..rows.height() as usize).flat_map(|y| columns.clone().map(move |x| y * width + x));
+        let (mut count, mut mean, mut variance) = (0.0, 0.0, 0.0);
+        for i in indices.filter(|i| pixels[*i].count > 1) {
+            count += 1.0;
+            mean += luminance(pixels[i].mean());
+            variance += luminance(variances[i].map(f64::sqrt)).powi(2);
+        }
+        (mean != 0.0 || variance > 0.0).then(|| of_block(mean / count, variance / count))
+    };
+    (0..width).step_by(BLOCK as usize).filter_map(of_columns).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A row of two blocks and a half with a mean of 1, where the first is black.
+    fn noise(variance_of: impl Fn(usize) -> f64) -> Vec<f64> {
+        let rows = PixelBounds { x0: 5, x1: 45, y0: 3, y1: 4 };
+        let pixel = |x: usize| {
+            let value = if x < 16 { 0.0 } else { 1.0 };
+            PixelSums { count: 4, radiance: [4.0 * value; 3], ..PixelSums::default() }
+        };
+        let pixels: Vec<PixelSums> = (0..40).map(pixel).collect();
+        let variances: Vec<[f64; 3]> = (0..40).map(|x| [variance_of(x); 3]).collect();
+        of_blocks(&rows, &pixels, &variances)
+    }
+
+    #[test]
+    fn the_noise_of_a_block_is_its_standard_error_by_its_mean() {
+        // One pixel of 16, and half of 8
+        let found = noise(|x| if x == 20 { 0.16 } else { f64::from(u8::from(x > 35)) });
+        let expected = [0.1 / 1.01, (0.5_f64).sqrt() / 1.01];
+        assert_eq!(found.len(), 2, "a black block is none");
+        assert!(found.iter().zip(expected).all(|(a, b)| (a / b - 1.0).abs() < 1e-12), "{found:?}");
+    }
+
+    #[test]
+    fn one_block_of_any_noise_does_not_change_the_median() {
+        let noise = Noise::of_image(vec![0.1, 9.29, 0.2, 0.3, 0.15]);
+        assert_eq!(noise, Noise { median: 0.2, above_twice: 0.2 });
+        assert_eq!(Noise::of_image(vec![0.1, 0.3]), Noise { median: 0.2, above_twice: 0.0 });
+        assert_eq!(Noise::of_image(Vec::new()).median, f64::INFINITY);
+    }
+}

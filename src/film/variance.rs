@@ -1,0 +1,286 @@
+//! The variance of pixel means, in every mode, from pixels that are estimated twice.
+//!
+//! The mean of N independent samples has the variance s²/N, where s² is the variance of the samples. Points of a net
+//! are distributed more evenly, and their mean varies less; control variates leave less of it; and samples that share light
+//! paths vary together. How much that is cannot be determined from one set of samples. [`super::replicas`] are a second one. Of
+//! two such means A and B, (A − B)²/2 is an unbiased estimate of their variance, and pixels are assigned the variances
+//!
+//! V = f s²/N, with f = Σ (A − B)²/2 / Σ (s_A²/N + s_B²/N)/2 over the replicas that are like them.
+//!
+//! A sample far brighter than the others is in both sums of f alike, whichever of both sets has it: it draws f of a few replicas
+//! towards 1, and nothing else to itself.
+//!
+//! f depends on what is seen: stratification gains much at edges and in smooth light, and little for light of many bounces. So
+//! replicas are divided by where they are in the image and by the level of s²/N, which is its logarithm, averaged over 3 × 3
+//! pixels to be less noisy: time and again in the middle of the dimension in which they extend furthest, while enough of them
+//! are on both sides.
+
+use super::{Film, PixelSums};
+use rayon::prelude::*;
+use std::ops::Range;
+
+/// Number of replicas that are divided no further is less than twice that; f then has a relative standard error of about
+/// √(2/16) = 35 % if means are normal.
+const MIN_MEMBERS: usize = 16;
+/// Powers of two of s²/N that count as much as the width of the image.
+const LEVELS: f64 = 3.0;
+/// Part of the replicas beyond either end of their extent: a few that lie apart do not stretch it.
+const BEYOND: usize = 10;
+
+/// Where a pixel is, and its level.
+type Place = [f64; 3];
+
+/// The variances estimated at a replica.
+#[derive(Clone, Copy)]
+struct ReplicaVariance {
+    place: Place,
+    /// (s_A² + s_B²)/2N.
+    independent: f64,
+    /// (A − B)²/2.
+    measured: f64,
+}
+
+/// What the variances of independent samples are multiplied by: f of a set of replicas, or of its two parts.
+#[derive(Clone, Debug)]
+pub(super) enum VarianceScale {
+    One(f64),
+    /// Places with less than `at` in a dimension belong to the first.
+    Two {
+        dimension: usize,
+        at: f64,
+        parts: Box<[VarianceScale; 2]>,
+    },
+}
+
+impl VarianceScale {
+    fn of(replicas: Vec<ReplicaVariance>) -> Self {
+        if let Some((dimension, at)) = middle(&replicas) {
+            let (below, above): (Vec<_>, Vec<_>) = replicas.iter().copied().partition(|r| r.place[dimension] < at);
+            if below.len().min(above.len()) >= MIN_MEMBERS / 2 {
+                let parts = Box::new([below, above].map(VarianceScale::of));
+                return VarianceScale::Two { dimension, at, parts };
+            }
+        }
+        let sum = |value: fn(&ReplicaVariance) -> f64| replicas.iter().map(value).sum::<f64>();
+        let independent = sum(|r| r.independent);
+        VarianceScale::One(if independent > 0.0 { sum(|r| r.measured) / independent } else { 1.0 })
+    }
+
+    fn factor(&self, place: &Place) -> f64 {
+        match self {
+            VarianceScale::One(factor) => *factor,
+            VarianceScale::Two { dimension, at, parts } => parts[usize::from(place[*dimension] >= *at)].factor(place),
+        }
+    }
+}
+
+/// The logarithm to the base of 2 but for 0.09 and a constant, which is the same on every machine. What is too little to tell it from
+/// nothing is alike.
+fn level(variance: f64) -> f64 {
+    // Exponent and mantissa, one after the other
+    variance.max(1e-30).to_bits() as f64 / (1_u64 << 52) as f64
+}
+
+/// The dimension in which replicas extend furthest, and the middle of that; `None` if they are not to be divided.
+fn middle(replicas: &[ReplicaVariance]) -> Option<(usize, f64)> {
+    if replicas.len() < 2 * MIN_MEMBERS {
+        return None;
+    }
+    let extent = |dimension: usize| {
+        let mut values: Vec<f64> = replicas.iter().map(|r| r.place[dimension]).collect();
+        let last = values.len() - 1;
+        [last / BEYOND, last - last / BEYOND].map(|k| *values.select_nth_unstable_by(k, f64::total_cmp).1)
+    };
+    let extents = [0, 1, 2].map(extent);
+    let length = |dimension: &usize| extents[*dimension][1] - extents[*dimension][0];
+    let longest = (0..3).max_by(|a, b| length(a).total_cmp(&length(b))).filter(|d| length(d) > 0.0)?;
+    Some((longest, 0.5 * (extents[longest][0] + extents[longest][1])))
+}
+
+impl Film {
+    /// Reads some rows as [`Film::read_rows`], and the estimated variance of each pixel's mean per channel. Without
+    /// replicas it is that of independent samples.
+    pub fn read_rows_with_variances(
+        &self,
+        rows: Range<u32>,
+        pixels: &mut Vec<PixelSums>,
+        variances: &mut Vec<[f64; 3]>,
+    ) {
+        variances.clear();
+        let scale = self.variance_scale();
+        if let VarianceScale::One(factor) = scale {
+            self.read_rows(rows, pixels);
+            variances.extend(pixels.iter().map(|pixel| pixel.variance_of_mean().map(|v| v * factor)));
+            return;
+        }
+        let surroundings = self.read_surroundings(&rows, pixels);
+        pixels.drain(..surroundings.before);
+        pixels.truncate(rows.len() * surroundings.width);
+        for (i, pixel) in pixels.iter().enumerate() {
+            let factor = scale.factor(&surroundings.place(surroundings.before + i));
+            variances.push(pixel.variance_of_mean().map(|v| v * factor));
+        }
+    }
+
+    /// Estimated variance of each pixel's mean per channel: 24 bytes each, which is much for large images.
+    pub fn variances(&self) -> Vec<[f64; 3]> {
+        let mut variances = Vec::new();
+        self.read_rows_with_variances(self.bounds.y0..self.bounds.y1, &mut Vec::new(), &mut variances);
+        variances
+    }
+
+    pub(super) fn variance_scale(&self) -> &VarianceScale {
+        if let Some(scale) = self.variance_scale.get() {
+            return scale;
+        }
+        // Not while others wait for it: a thread that works on this may take up work that asks for it as well
+        let bands = self.bands().map_init(Vec::new, |pixels, rows| self.measured_twice(rows, pixels));
+        let replicas = if self.replicas.is_empty() { Vec::new() } else { bands.collect::<Vec<_>>().concat() };
+        let scale = VarianceScale::of(replicas);
+        self.variance_scale.get_or_init(|| scale)
+    }
+
+    /// The variances estimated at the replicas of some rows.
+    fn measured_twice(&self, rows: Range<u32>, pixels: &mut Vec<PixelSums>) -> Vec<ReplicaVariance> {
+        let first = self.index(self.bounds.x0, rows.start);
+        let end = first + rows.len() * self.bounds.width() as usize;
+        let index = |at: usize| self.replicas.partition_point(|r| (r.pixel as usize) < at);
+        let replicas = &self.replicas[index(first)..index(end)];
+        let surroundings = self.read_surroundings(&rows, pixels);
+        let measured = replicas.iter().filter_map(|replica| {
+            let i = surroundings.before + replica.pixel as usize - first;
+            let (pixel, place) = (&pixels[i], surroundings.place(i));
+            let independent = 0.5 * (surroundings.values[i] + replica.independent);
+            let variance = ReplicaVariance { place, independent, measured: replica.half_square(pixel) };
+            (pixel.count == replica.count && pixel.count > 1).then_some(variance)
+        });
+        measured.collect()
+    }
+
+    /// Reads some rows and those above and below, as far as the image has any.
+    fn read_surroundings(&self, rows: &Range<u32>, pixels: &mut Vec<PixelSums>) -> Surroundings {
+        let around = rows.start.saturating_sub(1).max(self.bounds.y0)..(rows.end + 1).min(self.bounds.y1);
+        let width = self.bounds.width() as usize;
+        let before = (rows.start - around.start) as usize * width;
+        let (top, size) = (around.start - self.bounds.y0, self.bounds.width().max(self.bounds.height()));
+        self.read_rows(around, pixels);
+        let values = pixels.iter().map(|p| p.variance_of_mean().iter().sum()).collect();
+        Surroundings { width, before, top: top.into(), unit: LEVELS / f64::from(size.max(1)), values }
+    }
+}
+
+/// s²/N of the pixels of some rows, and of one row above and below, as far as the image has them.
+struct Surroundings {
+    width: usize,
+    /// Number of pixels of the row above.
+    before: usize,
+    /// The first row, from the top of the image.
+    top: f64,
+    /// Levels that a pixel counts as.
+    unit: f64,
+    values: Vec<f64>,
+}
+
+impl Surroundings {
+    fn place(&self, i: usize) -> Place {
+        let (x, y) = ((i % self.width) as f64, self.top + (i / self.width) as f64);
+        [level(self.mean(i)), x * self.unit, y * self.unit]
+    }
+
+    /// Mean over the 3 × 3 pixels around a pixel, clipped to the image.
+    fn mean(&self, i: usize) -> f64 {
+        let around = |i: usize, len: usize| i.saturating_sub(1)..(i + 2).min(len);
+        let (columns, rows) =
+            (around(i % self.width, self.width), around(i / self.width, self.values.len() / self.width));
+        let count = columns.len() * rows.len();
+        let sum: f64 = rows.map(|y| self.values[y * self.width..][columns.clone()].iter().sum::<f64>()).sum();
+        sum / count as f64
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::film::accumulator::PixelAccumulator;
+    use crate::film::packed::PackedSums;
+    use crate::film::replicas::Replica;
+    use crate::film::{FilmTile, PixelBounds, PixelSample};
+    use lumiris_numbers::math::Rgb;
+    use lumiris_numbers::math::hash::pcg4d;
+    use std::sync::Arc;
+
+    /// A film of 64 × 64 pixels and as many replicas, means of two samples each. Means are 1 ± σ, and s²/N is
+    /// `independent`; both are given for the column of a pixel.
+    fn film(sigma: impl Fn(u32) -> f64, independent: impl Fn(u32) -> f64) -> Film {
+        let bounds = PixelBounds { x0: 0, x1: 64, y0: 0, y1: 64 };
+        let mut replicas = Vec::new();
+        let mut pixel = |i: u32| {
+            let bits = pcg4d([i, 3, 1, 4]);
+            let mean = |bit: u32| 1.0 + if bit & 1 == 0 { sigma(i % 64) } else { -sigma(i % 64) };
+            let (a, b) = (mean(bits[0]), mean(bits[1]));
+            let independent = independent(i % 64);
+            replicas.push(Replica { pixel: i, count: 2, radiance: [2.0 * b; 3], independent: 3.0 * independent });
+            // s²/N is a quarter of the squared difference of two samples
+            let half = independent.sqrt();
+            let mut sums = PixelAccumulator::default();
+            for (index, value) in [(0, a - half), (1, a + half)] {
+                sums.add(index, &PixelSample { radiance: Rgb::splat(value as f32), ..PixelSample::default() });
+            }
+            sums
+        };
+        let pixels: Vec<PixelAccumulator> = (0..4096).map(&mut pixel).collect();
+        let tile = FilmTile { bounds, sums: Arc::new(PackedSums::of(&pixels)) };
+        Film::new([64, 64], bounds, vec![tile], replicas)
+    }
+
+    #[test]
+    fn variances_are_those_that_replicas_show() {
+        let film = film(|_| 0.1, |_| 0.05);
+        let mean = film.variances().iter().map(|v| v[1]).sum::<f64>() / 4096.0;
+        // (A − B)²/2 is 0 or 2σ²: its mean over 4096 replicas has the standard error σ²/64.
+        assert!((mean / 0.01 - 1.0).abs() < 4.0 / 64.0, "{mean}");
+        let film = Film::new(film.resolution, film.bounds, film.tiles, Vec::new());
+        assert!(film.variances().iter().all(|v| (v[1] - 0.05).abs() < 1e-6), "as if independent");
+    }
+
+    #[test]
+    fn rows_that_are_read_apart_have_the_variances_of_the_whole() {
+        let film = film(|x| 0.01 * f64::from(x % 7), |x| 0.02 * f64::from(x % 5));
+        let (all, mut some) = (film.variances(), Vec::new());
+        for rows in [0..1, 1..17, 17..63, 63..64] {
+            let mut variances = Vec::new();
+            film.read_rows_with_variances(rows, &mut Vec::new(), &mut variances);
+            some.extend(variances);
+        }
+        assert!(some == all);
+    }
+
+    #[test]
+    fn parts_of_an_image_that_gain_unlike_are_told_apart() {
+        // s²/N is `left` and 1; the variances are 1 and 1/64. All of them are f32 numbers.
+        for left in [4.0, 1.0] {
+            let film = film(|x| if x < 32 { 1.0 } else { 0.125 }, |x| if x < 32 { left } else { 1.0 });
+            let variances = film.variances();
+            for (columns, expected) in [(0..28, 1.0), (36..64, 1.0 / 64.0)] {
+                let inside = |i: &usize| columns.contains(&(i % 64));
+                let values: Vec<f64> = (0..4096).filter(inside).map(|i| variances[i][0]).collect();
+                let mean = values.iter().sum::<f64>() / values.len() as f64;
+                // Some 1800 replicas: a standard error of 1/42
+                assert!((mean / expected - 1.0).abs() < 4.0 / 42.0, "{mean}, not {expected}, by {left}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_bright_sample_of_a_replica_changes_the_variance_of_no_other_pixel() {
+        let quiet = film(|_| 0.1, |_| 0.01);
+        let sum = |film: &Film| film.variances().iter().map(|v| v[1]).sum::<f64>();
+        let expected = sum(&quiet);
+        // A sample of 2000 beside one of 1: the mean is 1000 more, and so is √(s²/N)
+        let mut replicas = quiet.replicas.clone();
+        replicas[1234].radiance = [2.0 * 1000.0; 3];
+        replicas[1234].independent = 3.0 * 1e6;
+        let film = Film::new(quiet.resolution, quiet.bounds, quiet.tiles, replicas);
+        assert!((sum(&film) / expected - 1.0).abs() < 0.02, "{} {expected}", sum(&film));
+    }
+}
