@@ -11,6 +11,7 @@ mod control_variates;
 mod crosscheck;
 mod dispersion;
 mod evaluated;
+mod far_away;
 mod few_samples;
 mod gltf;
 mod hair;

@@ -5,7 +5,7 @@ use super::animation::changes;
 use super::choice::{Names, chosen, name_of, shown};
 use super::materials::{Look, Materials};
 use super::meshes::{Primitive, placed, primitive};
-use super::nodes::{Node, instances, nodes};
+use super::nodes::{Node, instances, middle, nodes};
 use super::pose::Pose;
 use super::textures::EmissionSource;
 use super::view::{camera, cameras, chosen_camera};
@@ -24,7 +24,8 @@ use crate::scene::{Choices, Scene, Surface};
 use crate::textures::TextureSet;
 use glam::Vec3A;
 use lumiris_formats::gltf::{Document, GltfError, Place};
-use lumiris_numbers::math::{Affine3A, Bounds3, Rgb, Vec3};
+use lumiris_numbers::math::origin::{near_origin, rebased};
+use lumiris_numbers::math::{Affine3A, Bounds3, DAffine3, DVec3, Rgb, Vec3};
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -42,6 +43,8 @@ pub(super) struct Assembly<'a> {
     media: MediumSet,
     /// What is inside of materials.
     interiors: HashMap<MaterialId, MediumId>,
+    /// The point of the world that is the origin of the world which is rendered.
+    origin: DVec3,
 }
 
 impl<'a> Assembly<'a> {
@@ -58,6 +61,7 @@ impl<'a> Assembly<'a> {
             lights: Vec::new(),
             media: MediumSet::default(),
             interiors: HashMap::new(),
+            origin: DVec3::ZERO,
         })
     }
 
@@ -81,6 +85,11 @@ impl<'a> Assembly<'a> {
         let nodes = nodes(self.document, &scene, &changes.unwrap_or_default())?;
         let (placed, camera_names) = cameras(self.document, &nodes);
         choices.cameras = shown(&camera_names);
+        let found = chosen_camera(self.options, (&placed, &camera_names), messages);
+        self.origin = near_origin(match &found {
+            Some((node, _)) => node.world_from_node.translation,
+            None => middle(self.document, &nodes)?,
+        });
         if let Err(error) = self.add_meshes(&nodes, files, messages) {
             messages.error(&error);
         }
@@ -89,10 +98,9 @@ impl<'a> Assembly<'a> {
         if self.set.geometries.is_empty() {
             messages.warning(&self.document.root().key("meshes"), "the scene has no meshes to render");
         }
-        let found = chosen_camera(self.options, (&placed, &camera_names), messages);
         let index = found.as_ref().and_then(|(node, _)| placed.iter().position(|(other, _)| other.index == node.index));
         choices.camera = index.filter(|&i| i > 0);
-        let (camera, film) = camera(self.options, found, &bounds);
+        let (camera, film) = camera(self.options, found, (&bounds, self.origin));
         if let Some(path) = &self.options.environment {
             self.lights.extend(environment(path, files, messages));
         } else if self.lights.is_empty() && self.emitters.is_empty() {
@@ -117,6 +125,7 @@ impl<'a> Assembly<'a> {
             surfaces: self.surfaces,
             media: self.media,
             choices,
+            origin: self.origin,
         }))
     }
 
@@ -167,13 +176,15 @@ impl<'a> Assembly<'a> {
             }
         }
         for (place, users) in meshes.iter().zip(users) {
-            let mut poses: Vec<(Pose, Vec<Affine3A>)> = Vec::new();
+            let mut poses: Vec<(Pose, Vec<DAffine3>)> = Vec::new();
             for node in users {
-                let pose = Pose::of(self.document, place, node, nodes)?;
-                let world_from_node = if pose.is_skinned() { Affine3A::IDENTITY } else { node.world_from_node };
+                let pose = Pose::of(self.document, place, node, (nodes, self.origin))?;
+                // Joints lead to the world that is rendered
+                let skinned = DAffine3::from_translation(self.origin);
+                let world_from_node = if pose.is_skinned() { skinned } else { node.world_from_node };
                 let placements = instances(self.document, &node.place)?.into_iter().map(|m| world_from_node * m);
                 // What has no inverse is flat, and has no normals
-                let placements = placements.filter(|m| m.is_finite() && m.matrix3.determinant() != 0.0);
+                let placements = placements.filter(|m| m.as_affine3a().is_finite() && m.matrix3.determinant() != 0.0);
                 match poses.iter_mut().find(|(p, _)| *p == pose) {
                     Some((_, all)) => all.extend(placements),
                     None => poses.push((pose, placements.collect())),
@@ -191,14 +202,18 @@ impl<'a> Assembly<'a> {
         &mut self,
         place: &Place<'a>,
         pose: &Pose,
-        placements: &[Affine3A],
+        placements: &[DAffine3],
         files: &FileCache,
         messages: &mut Messages<'_>,
     ) -> Result<(), GltfError> {
         let name = place.key("name").text().unwrap_or("mesh").to_owned();
         let mut group = Vec::new();
+        let (mut origin, to) = (None, self.origin);
+        let rendered =
+            |m: &DAffine3, origin: Option<DVec3>| rebased(m, to, origin.unwrap_or(DVec3::ZERO)).as_affine3a();
         for place in place.key("primitives").items() {
-            let Some(Primitive { mesh, material }) = primitive(self.document, &place, pose, messages)? else {
+            let Some(Primitive { mesh, material }) = primitive(self.document, &place, (pose, &mut origin), messages)?
+            else {
                 continue;
             };
             let looks = &self.materials.looks;
@@ -208,7 +223,8 @@ impl<'a> Assembly<'a> {
                 continue;
             }
             for m in placements {
-                let id = self.add_geometry(placed(&mesh, m).map_err(|e| place.error(e))?, &look, &name);
+                let id =
+                    self.add_geometry(placed(&mesh, &rendered(m, origin)).map_err(|e| place.error(e))?, &look, &name);
                 self.set.root.geometries.push(id);
                 self.add_emission(id, &look, files, messages);
             }
@@ -216,7 +232,7 @@ impl<'a> Assembly<'a> {
         if !group.is_empty() {
             let id = self.set.groups.len() as u32;
             self.set.groups.push(Group { geometries: group });
-            let instance = |m: &Affine3A| Instance { group: id, world_from_group: vec![*m] };
+            let instance = |m: &DAffine3| Instance { group: id, world_from_group: vec![rendered(m, origin)] };
             self.set.instances.extend(placements.iter().map(instance));
         }
         Ok(())
@@ -259,7 +275,7 @@ impl<'a> Assembly<'a> {
         let color = Rgb::from_array(light.key("color").numbers().unwrap_or([1.0; 3])).map(|c| c.max(0.0));
         let per_candela = self.options.light_units.unwrap_or_default().per_candela();
         let intensity = color * (light.key("intensity").number().unwrap_or(1.0).max(0.0) * per_candela);
-        let m = &node.world_from_node;
+        let m = &rebased(&node.world_from_node, self.origin, DVec3::ZERO).as_affine3a();
         if !m.is_finite() {
             return;
         }

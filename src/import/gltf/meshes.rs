@@ -4,20 +4,22 @@ use super::Messages;
 use super::pose::{Pose, Vertices};
 use crate::geometry::TriangleMesh;
 use lumiris_formats::gltf::{Document, GltfError, Place};
-use lumiris_numbers::math::{Affine3A, Vec2, Vec3};
+use lumiris_numbers::math::origin::near_origin;
+use lumiris_numbers::math::{Affine3A, DVec3, Vec2, Vec3};
 
-/// A primitive in the space of its mesh.
+/// A primitive in the space of its mesh, relative to an origin.
 pub(super) struct Primitive {
     pub mesh: TriangleMesh,
     /// Index of the material.
     pub material: Option<usize>,
 }
 
-/// Triangles of a primitive, bent by a pose; `None` for points and lines.
+/// Triangles of a primitive, bent by a pose; `None` for points and lines. The first primitive of a mesh determines the origin of
+/// all of them, which is near to its vertices.
 pub(super) fn primitive(
     document: &Document,
     place: &Place<'_>,
-    pose: &Pose,
+    (pose, origin): (&Pose, &mut Option<DVec3>),
     messages: &mut Messages<'_>,
 ) -> Result<Option<Primitive>, GltfError> {
     let mode = place.key("mode").index().unwrap_or(4);
@@ -37,9 +39,14 @@ pub(super) fn primitive(
         tangents: vectors(document, &attributes.key("TANGENT"), count)?,
     };
     pose.bend(document, place, &mut vertices, messages)?;
-    let Vertices { positions, normals, tangents } = vertices;
+    let Vertices { mut positions, normals, tangents } = vertices;
     if let Some(i) = positions.iter().position(|p| !p.is_finite()) {
         return Err(attributes.key("POSITION").error(format!("vertex {i} is not finite")));
+    }
+    let middle = positions.get(count / 2).map_or(DVec3::ZERO, |p| p.as_dvec3());
+    let origin = *origin.get_or_insert_with(|| near_origin(middle));
+    if origin != DVec3::ZERO {
+        positions.iter_mut().for_each(|p| *p = (p.as_dvec3() - origin).as_vec3());
     }
     let indices = match place.key("indices").index() {
         Some(index) => document.accessor(index)?.values.iter().map(|&v| v as u32).collect(),

@@ -3,17 +3,18 @@
 
 use super::Messages;
 use super::nodes::Node;
-use glam::Mat4;
+use glam::{DMat4, Mat4};
 use lumiris_formats::gltf::{Document, GltfError, Place};
+use lumiris_numbers::math::origin::rebased;
 use lumiris_numbers::math::transform::transform_normal;
-use lumiris_numbers::math::{Affine3A, Vec3};
+use lumiris_numbers::math::{Affine3A, DAffine3, DVec3, Vec3};
 
 /// How a mesh is bent.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Pose {
     /// Weights of the morph targets.
     weights: Vec<f32>,
-    /// World from mesh by each joint.
+    /// World that is rendered from mesh, by each joint.
     joints: Option<Vec<Affine3A>>,
 }
 
@@ -29,12 +30,12 @@ fn weights(place: &Place<'_>) -> Option<Vec<f32>> {
 }
 
 impl Pose {
-    /// The pose of a mesh at a node.
+    /// The pose of a mesh at a node; `origin` is the one of the world that is rendered.
     pub(super) fn of(
         document: &Document,
         mesh: &Place<'_>,
         node: &Node<'_>,
-        nodes: &[Node<'_>],
+        (nodes, origin): (&[Node<'_>], DVec3),
     ) -> Result<Self, GltfError> {
         let of_node = || weights(&node.place.key("weights"));
         let weights =
@@ -51,16 +52,16 @@ impl Pose {
                 return Err(place.error("the joint is not in the scene"));
             };
             let inverse = match inverses.get(i) {
-                Some(m) => Affine3A::from_mat4(Mat4::from_cols_array(m)),
-                None if inverses.is_empty() => Affine3A::IDENTITY,
+                Some(m) => DAffine3::from_mat4(DMat4::from_cols_array(&m.map(f64::from))),
+                None if inverses.is_empty() => DAffine3::IDENTITY,
                 None => return Err(skin.key("inverseBindMatrices").error("has not one matrix per joint")),
             };
-            joints.push(joint.world_from_node * inverse);
+            joints.push(rebased(&(joint.world_from_node * inverse), origin, DVec3::ZERO).as_affine3a());
         }
         Ok(Pose { weights, joints: Some(joints) })
     }
 
-    /// True if vertices become points of the world, whatever the transformation of their node.
+    /// True if vertices become points of the world that is rendered, whatever the transformation of their node.
     pub(super) fn is_skinned(&self) -> bool {
         self.joints.is_some()
     }

@@ -2,8 +2,9 @@
 
 use super::descriptions::{InstanceDesc, ObjectDesc};
 use crate::geometry::{GroupId, Instance};
-use lumiris_numbers::math::Affine3A;
+use lumiris_numbers::math::origin::rebased;
 use lumiris_numbers::math::transform::compose_placements;
+use lumiris_numbers::math::{Affine3A, DAffine3, DVec3};
 
 /// Most placements of groups in a scene.
 pub(super) const MAX_INSTANCES: u64 = 100_000_000;
@@ -12,10 +13,17 @@ pub(super) const MAX_INSTANCES: u64 = 100_000_000;
 pub(super) struct Objects<'a> {
     /// Objects; each holds only those before it.
     pub objects: &'a [ObjectDesc],
-    /// By object, what moves within: groups with their placements.
-    pub moving: &'a [Vec<(GroupId, Vec<Affine3A>)>],
+    /// By object, what moves within, or is far from its origin: groups with their placements.
+    pub moving: &'a [Vec<(GroupId, Vec<DAffine3>)>],
     /// Opening and closing of the shutter as fractions of the motion.
     pub shutter: [f32; 2],
+    /// The point of the world that is the origin of the space which is rendered.
+    pub origin: DVec3,
+}
+
+/// Placements in the space that is rendered, of a group whose space has its origin at a point of its own.
+pub(super) fn rendered(placements: &[DAffine3], origin: DVec3, of_group: DVec3) -> Vec<Affine3A> {
+    placements.iter().map(|m| rebased(m, origin, of_group).as_affine3a()).collect()
 }
 
 impl Objects<'_> {
@@ -35,12 +43,15 @@ impl Objects<'_> {
             // Not by recursion: nothing limits how deep objects nest
             let mut open = vec![(instance.object, instance.ctm.samples(self.shutter))];
             while let Some((object, placement)) = open.pop() {
-                for (group, within) in &self.moving[object] {
-                    placed.push(Instance { group: *group, world_from_group: compose_placements(&placement, within) });
-                }
+                let instance = |group: GroupId, placement: &[DAffine3]| Instance {
+                    group,
+                    world_from_group: rendered(placement, self.origin, DVec3::ZERO),
+                };
+                let moving = self.moving[object].iter();
+                placed.extend(moving.map(|(group, within)| instance(*group, &compose_placements(&placement, within))));
                 let within = |i: &InstanceDesc| compose_placements(&placement, &i.ctm.samples(self.shutter));
                 open.extend(self.objects[object].instances.iter().map(|i| (i.object, within(i))));
-                placed.push(Instance { group: object as GroupId, world_from_group: placement });
+                placed.push(instance(object as GroupId, &placement));
             }
         }
         Ok(placed)

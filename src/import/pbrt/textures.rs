@@ -14,7 +14,8 @@ use lumiris_formats::diagnostic::Diagnostics;
 use lumiris_formats::pbrt::directive::Name;
 use lumiris_formats::pbrt::params::{Input, ParamSet, ParamType, SpectrumValue};
 use lumiris_formats::source::Span;
-use lumiris_numbers::math::{Affine3A, Rgb, Vec2, Vec3};
+use lumiris_numbers::math::origin::rebased;
+use lumiris_numbers::math::{DAffine3, DVec3, Rgb, Vec2, Vec3};
 
 impl Builder<'_> {
     /// `Texture "name" "float|spectrum" "class"`, of which textures are made at the end of the text.
@@ -167,7 +168,7 @@ impl Builder<'_> {
 
     fn direction(&self, p: &ParamSet, d: &mut Diagnostics) -> Vec3 {
         let dir = p.triple("dir", ParamType::Vector3, d).map_or(Vec3::Y, Vec3::from_array);
-        affine(&self.state.ctm.start).transform_vector3(dir).normalize_or(Vec3::Y)
+        affine(&self.state.ctm.start).transform_vector3(dir.as_dvec3()).as_vec3().normalize_or(Vec3::Y)
     }
 
     fn checker_mapping(&self, p: &ParamSet, d: &mut Diagnostics) -> CheckerboardMapping {
@@ -181,8 +182,8 @@ impl Builder<'_> {
         }
     }
 
-    fn texture_from_world(&self) -> Affine3A {
-        affine(&self.state.ctm.start.inverse())
+    fn texture_from_world(&self) -> DAffine3 {
+        rebased(&affine(&self.state.ctm.start.inverse()), DVec3::ZERO, self.origin)
     }
 
     fn mapping(&self, p: &ParamSet, d: &mut Diagnostics) -> Mapping2d {

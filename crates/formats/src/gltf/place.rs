@@ -75,7 +75,12 @@ impl<'a> Place<'a> {
 
     /// A finite number.
     pub fn number(&self) -> Option<f32> {
-        self.value.and_then(Value::as_f64).map(|v| v as f32).filter(|v| v.is_finite())
+        self.double().map(|v| v as f32)
+    }
+
+    /// As [`Self::number`] with the precision of f64, in the range of f32.
+    pub fn double(&self) -> Option<f64> {
+        self.value.and_then(Value::as_f64).filter(|v| (*v as f32).is_finite())
     }
 
     /// An integer that is not negative, which may be written with a fraction of 0.
@@ -113,13 +118,18 @@ impl<'a> Place<'a> {
 
     /// An array of numbers, as many as asked for.
     pub fn numbers<const N: usize>(&self) -> Option<[f32; N]> {
+        self.doubles().map(|numbers| numbers.map(|v| v as f32))
+    }
+
+    /// As [`Self::numbers`] with the precision of f64, in the range of f32.
+    pub fn doubles<const N: usize>(&self) -> Option<[f64; N]> {
         let items = self.items();
         if items.len() != N {
             return None;
         }
         let mut numbers = [0.0; N];
         for (number, item) in numbers.iter_mut().zip(&items) {
-            *number = item.number()?;
+            *number = item.double()?;
         }
         Some(numbers)
     }
