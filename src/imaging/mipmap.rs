@@ -11,7 +11,7 @@ use super::level::{Level, NearestByte, Texels, exact_bytes};
 use super::oiio::FilePyramid;
 use super::tiles::TileStore;
 use super::{ColorEncoding, Image};
-use lumiris_numbers::math::{Rgb, Vec2};
+use lumiris_numbers::math::{DVec2, Rgb, Vec2};
 use std::io;
 use std::sync::Arc;
 
@@ -268,6 +268,12 @@ impl MipMap {
         let Level { width, height, .. } = self.levels[level];
         let limit = |v: f32| (v.floor() as i64).clamp(-(1 << 40), 1 << 40);
         self.texel(level, limit(st.x * width as f32), limit(st.y * height as f32))
+    }
+
+    /// `st` without whole periods of an image that repeats, where they would leave few bits of an f32 for the rest.
+    pub fn within_periods(&self, st: DVec2) -> Vec2 {
+        let is_far = st.abs().max_element() > 64.0;
+        if is_far && self.wrap == Wrap::Repeat { (st - st.floor()).as_vec2() } else { st.as_vec2() }
     }
 
     /// Linear colour about `st`, filtered over `width` per axis, in units of the image. A width of 0 reads level 0.

@@ -168,7 +168,7 @@ impl Glow {
 mod tests {
     use super::*;
     use crate::media::{Field, Samples, Scalars, UniformGrid};
-    use lumiris_numbers::math::{Affine3A, Rgb};
+    use lumiris_numbers::math::{DAffine3, DVec3, Rgb};
     use lumiris_test_support::Moments;
     use lumiris_test_support::random::{RngExt, pcg32};
 
@@ -183,9 +183,8 @@ mod tests {
             le_scale: None,
             temperature: None,
         };
-        let place = Affine3A::from_rotation_y(0.4) * Affine3A::from_scale(Vec3::new(1.0, 2.0, 0.5));
-        let bounds = Bounds3 { min: Vec3::ZERO, max: Vec3::ONE };
-        Arc::new(Heterogeneous::new(Field::Uniform(grid), bounds, &place, 0.0))
+        let place = DAffine3::from_rotation_y(0.4) * DAffine3::from_scale(DVec3::new(1.0, 2.0, 0.5));
+        Arc::new(Heterogeneous::new(Field::Uniform(grid), [DVec3::ZERO, DVec3::ONE], &place, 0.0))
     }
 
     #[test]

@@ -233,7 +233,7 @@ mod tests {
     use crate::lights::{Emission, EnvironmentFilter, EnvironmentMap, EnvironmentMapping, Light};
     use crate::lights::{LightSamplerKind, LightSetBuilder};
     use crate::media::{Field, Heterogeneous, Medium, MediumSet, RgbGrid, Samples};
-    use lumiris_numbers::math::{Affine3A, Bounds3};
+    use lumiris_numbers::math::{Affine3A, Bounds3, DAffine3};
     use lumiris_test_support::random::{RngExt, pcg32};
     use lumiris_test_support::{Moments, assert_chi_squared};
     use std::sync::Arc;
@@ -431,7 +431,8 @@ mod tests {
             scale: 1.0,
             le: Some(Samples::new([1; 3], vec![Rgb::WHITE]).unwrap()),
         };
-        let fire = Heterogeneous::new(Field::Rgb(grid), bounds(), &Affine3A::IDENTITY, 0.0);
+        let corners = [bounds().min, bounds().max].map(|corner| corner.as_dvec3());
+        let fire = Heterogeneous::new(Field::Rgb(grid), corners, &DAffine3::IDENTITY, 0.0);
         let media = MediumSet { media: vec![Medium::Heterogeneous(Arc::new(fire))], ..Default::default() };
         let mut builder = builder();
         builder.add_media(&media);

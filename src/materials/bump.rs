@@ -21,8 +21,9 @@ pub fn shading_frame(entry: &MaterialEntry, textures: &TextureSet, hit: &Surface
 
 /// The tangent-space normal 2c − 1 of the map, in the frame of the hit.
 fn normal_mapped(map: NormalMap, textures: &TextureSet, hit: &SurfaceHit, ctx: &TextureContext) -> Frame {
-    let (st, _) = map.image.mapping.map(ctx);
-    let c = textures.images[map.image.image as usize].bilinear(0, Vec2::new(st.x, 1.0 - st.y));
+    let image = &textures.images[map.image.image as usize];
+    let st = image.within_periods(map.image.mapping.map(ctx).0);
+    let c = image.bilinear(0, Vec2::new(st.x, 1.0 - st.y));
     let local = Vec3::from_array((c * 2.0).to_array()) - Vec3::ONE;
     let frame = Frame::from_xz(hit.dpdus, hit.ns);
     let is_mirrored = map.is_along_v && frame.y.dot(hit.dpdvs) < 0.0;
@@ -39,8 +40,9 @@ fn displaced(displacement: FloatTextureId, textures: &TextureSet, hit: &SurfaceH
     let dpdvs = if hit.ns == hit.n { hit.dpdv } else { hit.ns.cross(hit.dpdus) };
     let step = |width: f32| if width > 0.0 { 0.5 * width } else { DEFAULT_STEP };
     let (du, dv) = (step(ctx.uv_width.x), step(ctx.uv_width.y));
-    let at =
-        |duv: Vec2, dp: Vec3| textures.float(displacement, &TextureContext { uv: ctx.uv + duv, p: ctx.p + dp, ..*ctx });
+    let at = |duv: Vec2, dp: Vec3| {
+        textures.float(displacement, &TextureContext { uv: ctx.uv + duv, p: ctx.p + dp.as_dvec3(), ..*ctx })
+    };
     let d = textures.float(displacement, ctx);
     let d_u = (at(Vec2::new(du, 0.0), hit.dpdus * du) - d) / du;
     let d_v = (at(Vec2::new(0.0, dv), dpdvs * dv) - d) / dv;

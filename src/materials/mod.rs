@@ -301,7 +301,7 @@ impl MaterialSet {
                 return Some(id);
             };
             let amount = textures.float(amount, ctx);
-            let (p, ids) = (ctx.p, [f32::from_bits(a), f32::from_bits(b)]);
+            let (p, ids) = (ctx.p.as_vec3(), [f32::from_bits(a), f32::from_bits(b)]);
             let hash = hash_floats(&[p.x, p.y, p.z, wo.x, wo.y, wo.z, ids[0], ids[1]]);
             id = if amount <= 0.0 || (amount < 1.0 && amount < unit_f32(hash)) { a } else { b };
         }

@@ -27,7 +27,15 @@ fn hit(n: Vec3) -> SurfaceHit {
 
 fn context(hit: &SurfaceHit) -> TextureContext {
     let (uv1, color) = (hit.vertex.uv1, hit.vertex.color);
-    TextureContext { uv: hit.uv, uv_width: Vec2::ZERO, uv1, color, face: hit.vertex.face, p: hit.p, n: hit.n }
+    TextureContext {
+        uv: hit.uv,
+        uv_width: Vec2::ZERO,
+        uv1,
+        color,
+        face: hit.vertex.face,
+        p: hit.p.as_dvec3(),
+        n: hit.n,
+    }
 }
 
 struct Bench {

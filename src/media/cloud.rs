@@ -2,7 +2,7 @@
 //! thinner with height.
 
 use lumiris_numbers::math::noise::{gradient, noise};
-use lumiris_numbers::math::{Rgb, Vec3};
+use lumiris_numbers::math::{DVec3, Rgb};
 
 /// A cloud in its own space, where y is the height: dense below 0, and empty above 1.
 #[derive(Clone, Copy, Debug)]
@@ -24,13 +24,13 @@ const OCTAVE: f32 = 1.99;
 
 impl Cloud {
     /// Density at a point, 0..=1.
-    pub fn density_at(&self, p: Vec3) -> f32 {
+    pub fn density_at(&self, p: DVec3) -> f32 {
         // Displace the place
-        let mut place = p * self.frequency;
+        let mut place = p * f64::from(self.frequency);
         if self.wispiness > 0.0 {
             let (mut amplitude, mut frequency) = (0.05 * self.wispiness, 10.0);
             for _ in 0..2 {
-                place += gradient(place * frequency) * amplitude;
+                place += (gradient(place * f64::from(frequency)) * amplitude).as_dvec3();
                 amplitude *= 0.5;
                 frequency *= OCTAVE;
             }
@@ -39,11 +39,12 @@ impl Cloud {
         // Add up noise
         let (mut sum, mut amplitude, mut frequency) = (0.0, 0.5, 1.0);
         for _ in 0..5 {
-            sum += amplitude * noise(place * frequency);
+            sum += amplitude * noise(place * f64::from(frequency));
             amplitude *= 0.5;
             frequency *= OCTAVE;
         }
-        let wisps = ((1.0 - p.y) * 4.5 * self.density * sum).clamp(0.0, 1.0);
-        (wisps + 2.0 * (0.5 - p.y).max(0.0)).clamp(0.0, 1.0)
+        let height = p.y as f32;
+        let wisps = ((1.0 - height) * 4.5 * self.density * sum).clamp(0.0, 1.0);
+        (wisps + 2.0 * (0.5 - height).max(0.0)).clamp(0.0, 1.0)
     }
 }

@@ -16,7 +16,7 @@
 use super::majorants::{MajorantGrid, Pieces};
 use super::track::{End, Flight, Glimpse, Numbers, Segment};
 use super::{Cloud, Coefficients, RgbGrid, Scalars, UniformGrid};
-use lumiris_numbers::math::{Affine3A, Bounds3, Rgb, Vec3};
+use lumiris_numbers::math::{Affine3A, Bounds3, DAffine3, DVec3, Rgb, Vec3};
 
 /// What varies.
 #[derive(Clone, Debug)]
@@ -33,7 +33,8 @@ pub enum Field {
 #[derive(Clone, Debug)]
 pub struct Heterogeneous {
     field: Field,
-    bounds: Bounds3,
+    /// The least and the greatest corner, in the space of the medium.
+    corners: [DVec3; 2],
     /// The box as the unit cube.
     unit_from_world: Affine3A,
     world_from_unit: Affine3A,
@@ -55,11 +56,11 @@ const CLOUD_MARGIN: [f32; 2] = [1.25, 0.05];
 const FAINT: [f32; 2] = [0.1, 0.25];
 
 impl Heterogeneous {
-    /// A field in a box of its own space, placed by an invertible map.
-    pub fn new(field: Field, bounds: Bounds3, world_from_medium: &Affine3A, g: f32) -> Self {
-        let size = bounds.diagonal();
-        let unit_from_medium = Affine3A::from_scale(size.recip()) * Affine3A::from_translation(-bounds.min);
-        let unit_from_world = unit_from_medium * world_from_medium.inverse();
+    /// A field in a box of its own space, from its least to its greatest corner, placed by an invertible map.
+    pub fn new(field: Field, corners: [DVec3; 2], world_from_medium: &DAffine3, g: f32) -> Self {
+        let [min, max] = corners;
+        let world_from_unit = *world_from_medium * DAffine3::from_translation(min) * DAffine3::from_scale(max - min);
+        let [unit_from_world, world_from_unit] = [world_from_unit.inverse(), world_from_unit].map(|m| m.as_affine3a());
         let cells = |resolution: [usize; 3]| resolution.map(|n| n.div_ceil(SAMPLES_PER_CELL).clamp(1, MAX_CELLS));
         let majorants = match &field {
             Field::Uniform(grid) => {
@@ -67,10 +68,9 @@ impl Heterogeneous {
                 MajorantGrid::new(cells(grid.density.resolution()), |low, high| sigma_t * grid.density.bound(low, high))
             }
             Field::Rgb(grid) => MajorantGrid::new(cells(grid.resolution()), |low, high| grid.bound(low, high)),
-            Field::Cloud(cloud) => cloud_majorants(cloud, &bounds),
+            Field::Cloud(cloud) => cloud_majorants(cloud, &corners),
         };
-        let world_from_unit = unit_from_world.inverse();
-        Heterogeneous { field, bounds, unit_from_world, world_from_unit, majorants, g }
+        Heterogeneous { field, corners, unit_from_world, world_from_unit, majorants, g }
     }
 
     /// What kind of field it is, for people.
@@ -150,7 +150,7 @@ impl Heterogeneous {
             Field::Uniform(grid) => grid.at(p),
             Field::Rgb(grid) => grid.at(p),
             Field::Cloud(cloud) => {
-                let density = cloud.density_at(self.bounds.min + self.bounds.diagonal() * p);
+                let density = cloud.density_at(point_in(&self.corners, p));
                 Coefficients { sigma_a: cloud.sigma_a * density, sigma_s: cloud.sigma_s * density, le: Rgb::BLACK }
             }
         }
@@ -314,13 +314,18 @@ impl Glimpses<'_> {
     }
 }
 
+/// A point of the unit cube in the box between two corners.
+fn point_in(&[min, max]: &[DVec3; 2], p: Vec3) -> DVec3 {
+    min + (max - min) * p.as_dvec3()
+}
+
 /// Estimated bounds: the greatest density at some points of each cell and of those around it, and a margin.
-fn cloud_majorants(cloud: &Cloud, bounds: &Bounds3) -> MajorantGrid {
+fn cloud_majorants(cloud: &Cloud, corners: &[DVec3; 2]) -> MajorantGrid {
     let greatest = MajorantGrid::new([CLOUD_CELLS; 3], |low, high| {
         (0..CLOUD_POINTS.pow(3)).fold(0.0_f32, |greatest, i| {
             let place = [1, CLOUD_POINTS, CLOUD_POINTS.pow(2)].map(|n| (i / n % CLOUD_POINTS) as f32 + 0.5);
             let p = low + (high - low) * Vec3::from(place) / CLOUD_POINTS as f32;
-            greatest.max(cloud.density_at(bounds.min + bounds.diagonal() * p))
+            greatest.max(cloud.density_at(point_in(corners, p)))
         })
     });
     let sigma_t = (cloud.sigma_a + cloud.sigma_s).max_component();

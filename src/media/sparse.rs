@@ -2,7 +2,7 @@
 //! in order, nodes of 32³ and of 16³ entries, and leaves of 8³ voxels. An entry is a child, or a value that all of its voxels
 //! have. Between indices, values are interpolated linearly; memory is that of the leaves, and of few nodes.
 
-use lumiris_numbers::math::{Affine3A, Bounds3, DAffine3, DVec3, Vec3};
+use lumiris_numbers::math::{Affine3A, DAffine3, DVec3, Vec3};
 use std::collections::{BTreeMap, HashMap};
 use std::sync::Arc;
 
@@ -266,11 +266,9 @@ pub struct SparseSamples {
 }
 
 impl SparseSamples {
-    /// A tree whose indices a map places in the space of a box; `None` if the map has no inverse.
-    pub fn new(grid: Arc<SparseGrid>, space_from_index: &DAffine3, bounds: &Bounds3) -> Option<Self> {
-        let vector = |v: Vec3| DVec3::from_array(v.to_array().map(f64::from));
-        let space_from_unit =
-            DAffine3::from_translation(vector(bounds.min)) * DAffine3::from_scale(vector(bounds.diagonal()));
+    /// A tree whose indices a map places in the space of a box, by two corners; `None` if the map has no inverse.
+    pub fn new(grid: Arc<SparseGrid>, space_from_index: &DAffine3, &[min, max]: &[DVec3; 2]) -> Option<Self> {
+        let space_from_unit = DAffine3::from_translation(min) * DAffine3::from_scale(max - min);
         let mut index_from_unit = space_from_index.inverse() * space_from_unit;
         let origin = index_from_unit.translation.floor().to_array().map(|i| i as i32);
         index_from_unit.translation -= DVec3::from_array(origin.map(f64::from));
@@ -388,16 +386,15 @@ mod tests {
             * DAffine3::from_axis_angle(DVec3::new(1.0, 2.0, 3.0).normalize(), 0.7)
             * DAffine3::from_scale(DVec3::new(0.1, -0.2, 0.3));
         let corners = [[-15.0, -14.0, -2.0], [50.0, 20.0, 25.0]].map(|p| space_from_index.transform_point3(p.into()));
-        let [a, b] = corners.map(|p| Vec3::from_array(p.to_array().map(|x| x as f32)));
-        let bounds = Bounds3 { min: a.min(b), max: a.max(b) };
-        let samples = SparseSamples::new(Arc::clone(&tree), &space_from_index, &bounds).unwrap();
+        let [a, b] = corners;
+        let [min, max] = [a.min(b), a.max(b)];
+        let samples = SparseSamples::new(Arc::clone(&tree), &space_from_index, &[min, max]).unwrap();
         let index_from_space = space_from_index.inverse();
         let mut random = || Vec3::from(std::array::from_fn::<f32, 3, _>(|_| stream.random::<f32>()));
         for _ in 0..20_000 {
             // At a point
             let p = random();
-            let space = bounds.min + bounds.diagonal() * p;
-            let place = index_from_space.transform_point3(DVec3::from_array(space.to_array().map(f64::from)));
+            let place = index_from_space.transform_point3(min + (max - min) * p.as_dvec3());
             let base = place.floor();
             let expected: f64 = (0..8)
                 .map(|i| {
@@ -430,6 +427,6 @@ mod tests {
             assert_eq!(tree.greatest(low, high), greatest(low, high), "{low:?} {high:?}");
         }
         assert_eq!(tree.greatest([i32::MIN; 3], [i32::MAX; 3]), 2.0);
-        assert!(SparseSamples::new(tree, &DAffine3::from_scale(DVec3::new(1.0, 0.0, 1.0)), &bounds).is_none());
+        assert!(SparseSamples::new(tree, &DAffine3::from_scale(DVec3::new(1.0, 0.0, 1.0)), &[min, max]).is_none());
     }
 }

@@ -68,8 +68,8 @@ pub struct Tally {
 pub struct Disagreement {
     /// Family of the ray.
     pub family: Family,
-    /// Origin.
-    pub o: [f32; 3],
+    /// Origin, in the world of the scene's file.
+    pub o: [f64; 3],
     /// Direction.
     pub d: [f32; 3],
     /// End of the interval; null if infinite.
@@ -300,7 +300,7 @@ impl Checker<'_> {
         if self.examples.len() < MAX_EXAMPLES {
             self.examples.push(Disagreement {
                 family: self.family,
-                o: ray.o.to_array(),
+                o: (ray.o.as_dvec3() + self.scene.origin).to_array(),
                 d: ray.d.to_array(),
                 t_max: ray.t_max,
                 t_a: a.map(|h| h.t),

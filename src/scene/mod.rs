@@ -23,7 +23,7 @@ use crate::lights::LightSet;
 use crate::materials::{MaterialId, MaterialSet};
 use crate::media::{MediumSet, Sides};
 use crate::textures::TextureSet;
-use lumiris_numbers::math::{Mat3, Rgb, Vec3};
+use lumiris_numbers::math::{DVec3, Mat3, Rgb, Vec3};
 use std::sync::Arc;
 
 /// What is rendered.
@@ -47,6 +47,9 @@ pub struct Scene {
     pub media: MediumSet,
     /// What the file has in place of this scene and its camera.
     pub choices: Choices,
+    /// The point of the file's world that is the origin of the world which is rendered. It is near to the camera, so that f32
+    /// has bits for what that sees: see [`lumiris_numbers::math::origin`].
+    pub origin: DVec3,
 }
 
 /// Names of what a file lets people choose from, by their indices. A pbrt file has no choice.

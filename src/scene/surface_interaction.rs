@@ -39,7 +39,8 @@ impl SurfaceInteraction {
         };
         let uv_width = Vec2::new(extent(surface.dpdu), extent(surface.dpdv));
         let VertexValues { uv1, color, face } = surface.vertex;
-        let context = TextureContext { uv: surface.uv, uv_width, uv1, color, face, p: surface.p, n: surface.n };
+        let context =
+            TextureContext { uv: surface.uv, uv_width, uv1, color, face, p: surface.p.as_dvec3(), n: surface.n };
         SurfaceInteraction { hit: *hit, surface, wo: -ray.d.normalize(), width, distance, context }
     }
 

@@ -148,7 +148,7 @@ pub struct EmitterHit {
 impl AlphaSource for TextureSet {
     fn alpha(&self, texture: u32, uv: Vec2, vertex: &VertexValues, p: Vec3) -> f32 {
         let VertexValues { uv1, color, face } = *vertex;
-        self.float(texture, &TextureContext { uv, uv_width: Vec2::ZERO, uv1, color, face, p, n: Vec3::Z })
+        self.float(texture, &TextureContext { uv, uv_width: Vec2::ZERO, uv1, color, face, p: p.as_dvec3(), n: Vec3::Z })
     }
 }
 

@@ -2,7 +2,7 @@
 
 use super::TextureContext;
 use glam::Mat2;
-use lumiris_numbers::math::{Affine3A, Vec2, Vec3, warp};
+use lumiris_numbers::math::{DAffine3, DVec2, Vec2, Vec3, warp};
 use std::f32::consts::{FRAC_1_PI, PI, TAU};
 
 /// Map of a surface point to the plane of a texture.
@@ -27,12 +27,12 @@ pub enum Mapping2d {
     /// (θ/π, φ/2π) of the direction from the origin of texture space.
     Spherical {
         /// World to texture space.
-        texture_from_world: Affine3A,
+        texture_from_world: DAffine3,
     },
     /// ((π + atan2(y, x))/2π, z) in texture space.
     Cylindrical {
         /// World to texture space.
-        texture_from_world: Affine3A,
+        texture_from_world: DAffine3,
     },
     /// (vs·p, vt·p) + delta in texture space.
     Planar {
@@ -43,7 +43,7 @@ pub enum Mapping2d {
         /// Offset per axis.
         delta: Vec2,
         /// World to texture space.
-        texture_from_world: Affine3A,
+        texture_from_world: DAffine3,
     },
 }
 
@@ -55,27 +55,30 @@ impl Default for Mapping2d {
 
 impl Mapping2d {
     /// Texture coordinates (s, t), t upwards, and the filter's width in them. The width is known for [`Mapping2d::Uv`]
-    /// only; the other mappings look up points.
-    pub fn map(&self, ctx: &TextureContext) -> (Vec2, Vec2) {
+    /// only; the other mappings look up points. Those that go by places may have large coordinates.
+    pub fn map(&self, ctx: &TextureContext) -> (DVec2, Vec2) {
         match self {
-            Mapping2d::Uv { scale, delta } => (*scale * ctx.uv + *delta, scale.abs() * ctx.uv_width),
-            Mapping2d::Affine { second: true, matrix, offset } => (*matrix * ctx.uv1 + *offset, Vec2::ZERO),
+            Mapping2d::Uv { scale, delta } => ((*scale * ctx.uv + *delta).as_dvec2(), scale.abs() * ctx.uv_width),
+            Mapping2d::Affine { second: true, matrix, offset } => {
+                ((*matrix * ctx.uv1 + *offset).as_dvec2(), Vec2::ZERO)
+            }
             Mapping2d::Affine { second: false, matrix, offset } => {
                 let width = Mat2::from_cols(matrix.x_axis.abs(), matrix.y_axis.abs()) * ctx.uv_width;
-                (*matrix * ctx.uv + *offset, width)
+                ((*matrix * ctx.uv + *offset).as_dvec2(), width)
             }
             Mapping2d::Spherical { texture_from_world } => {
-                let w = texture_from_world.transform_point3(ctx.p).normalize_or(Vec3::Z);
+                let w = texture_from_world.transform_point3(ctx.p).as_vec3().normalize_or(Vec3::Z);
                 let st = Vec2::new(w.z.clamp(-1.0, 1.0).acos() * FRAC_1_PI, warp::azimuth(w) / TAU);
-                (st, Vec2::ZERO)
+                (st.as_dvec2(), Vec2::ZERO)
             }
             Mapping2d::Cylindrical { texture_from_world } => {
                 let p = texture_from_world.transform_point3(ctx.p);
-                (Vec2::new((PI + p.y.atan2(p.x)) / TAU, p.z), Vec2::ZERO)
+                let turn = (PI + (p.y as f32).atan2(p.x as f32)) / TAU;
+                (DVec2::new(f64::from(turn), p.z), Vec2::ZERO)
             }
             Mapping2d::Planar { vs, vt, delta, texture_from_world } => {
                 let p = texture_from_world.transform_point3(ctx.p);
-                (*delta + Vec2::new(p.dot(*vs), p.dot(*vt)), Vec2::ZERO)
+                (delta.as_dvec2() + DVec2::new(p.dot(vs.as_dvec3()), p.dot(vt.as_dvec3())), Vec2::ZERO)
             }
         }
     }
@@ -89,7 +92,7 @@ pub enum CheckerboardMapping {
     /// Unit cubes of texture space.
     Cubes {
         /// World to texture space.
-        texture_from_world: Affine3A,
+        texture_from_world: DAffine3,
     },
 }
 
@@ -97,7 +100,7 @@ impl CheckerboardMapping {
     /// True in the cells of even parity, which hold the cell from the origin to (1, 1, 1).
     pub fn is_even(&self, ctx: &TextureContext) -> bool {
         // The remainder first: a sum of large floats would lose its parity.
-        let odd = |x: f32| x.floor().rem_euclid(2.0) == 1.0;
+        let odd = |x: f64| x.floor().rem_euclid(2.0) == 1.0;
         match self {
             CheckerboardMapping::Squares(mapping) => {
                 let (st, _) = mapping.map(ctx);
@@ -114,30 +117,39 @@ impl CheckerboardMapping {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use lumiris_numbers::math::DVec3;
 
     fn at(p: Vec3, uv: Vec2) -> TextureContext {
-        TextureContext { uv, uv_width: Vec2::new(0.1, 0.2), uv1: Vec2::ZERO, color: [1.0; 4], face: 0, p, n: Vec3::Z }
+        TextureContext {
+            uv,
+            uv_width: Vec2::new(0.1, 0.2),
+            uv1: Vec2::ZERO,
+            color: [1.0; 4],
+            face: 0,
+            p: p.as_dvec3(),
+            n: Vec3::Z,
+        }
     }
 
     #[test]
     fn mappings_have_their_formulas() {
-        let shift = Affine3A::from_translation(Vec3::new(-1.0, 0.0, 0.0));
+        let shift = DAffine3::from_translation(DVec3::new(-1.0, 0.0, 0.0));
         let uv = Mapping2d::Uv { scale: Vec2::new(2.0, -3.0), delta: Vec2::new(0.5, 0.25) };
         let (st, width) = uv.map(&at(Vec3::ZERO, Vec2::new(0.25, 0.5)));
-        assert!((st - Vec2::new(1.0, -1.25)).length() < 1e-6 && (width - Vec2::new(0.2, 0.6)).length() < 1e-6);
+        assert!((st - DVec2::new(1.0, -1.25)).length() < 1e-6 && (width - Vec2::new(0.2, 0.6)).length() < 1e-6);
 
         let spherical = Mapping2d::Spherical { texture_from_world: shift };
         let (st, _) = spherical.map(&at(Vec3::new(1.0, -5.0, 0.0), Vec2::ZERO));
-        assert!((st - Vec2::new(0.5, 0.75)).length() < 1e-6, "{st}");
+        assert!((st - DVec2::new(0.5, 0.75)).length() < 1e-6, "{st}");
         assert!(spherical.map(&at(Vec3::X, Vec2::ZERO)).0.is_finite());
 
         let cylindrical = Mapping2d::Cylindrical { texture_from_world: shift };
         let (st, _) = cylindrical.map(&at(Vec3::new(1.0, 2.0, 3.5), Vec2::ZERO));
-        assert!((st - Vec2::new(0.75, 3.5)).length() < 1e-6, "{st}");
+        assert!((st - DVec2::new(0.75, 3.5)).length() < 1e-6, "{st}");
 
         let planar = Mapping2d::Planar { vs: Vec3::Y, vt: Vec3::Z * 2.0, delta: Vec2::ONE, texture_from_world: shift };
         let (st, _) = planar.map(&at(Vec3::new(1.0, 2.0, 3.0), Vec2::ZERO));
-        assert!((st - Vec2::new(3.0, 7.0)).length() < 1e-6, "{st}");
+        assert!((st - DVec2::new(3.0, 7.0)).length() < 1e-6, "{st}");
     }
 
     #[test]
@@ -145,7 +157,7 @@ mod tests {
         let squares = CheckerboardMapping::Squares(Mapping2d::default());
         let even = |x: f32, y: f32| squares.is_even(&at(Vec3::ZERO, Vec2::new(x, y)));
         assert!(even(0.5, 0.5) && !even(1.5, 0.5) && even(1.5, 1.5) && !even(-0.5, 0.5) && even(-0.5, -0.5));
-        let cubes = CheckerboardMapping::Cubes { texture_from_world: Affine3A::from_scale(Vec3::splat(2.0)) };
+        let cubes = CheckerboardMapping::Cubes { texture_from_world: DAffine3::from_scale(DVec3::splat(2.0)) };
         let even = |x, y, z| cubes.is_even(&at(Vec3::new(x, y, z), Vec2::ZERO));
         assert!(even(0.2, 0.2, 0.2) && !even(0.2, 0.2, 0.7) && even(0.2, 0.7, 0.7) && !even(-0.2, 0.2, 0.2));
         assert!(!even(0.7, 0.7, 0.7));

@@ -14,7 +14,7 @@ pub use udim::{Udim, UdimId};
 
 use crate::imaging::tiles::TileStore;
 use crate::imaging::{FaceMap, MipMap};
-use lumiris_numbers::math::{Rgb, Vec2, Vec3};
+use lumiris_numbers::math::{DVec3, Rgb, Vec2, Vec3};
 use std::sync::Arc;
 
 /// Index into [`TextureSet::floats`].
@@ -40,8 +40,8 @@ pub struct TextureContext {
     pub color: [f32; 4],
     /// Number of the face of the mesh.
     pub face: u32,
-    /// World-space point.
-    pub p: Vec3,
+    /// World-space point. Maps to textures are f64 as well: textures may have their origin far from the scene.
+    pub p: DVec3,
     /// World-space geometric normal.
     pub n: Vec3,
 }
@@ -49,7 +49,7 @@ pub struct TextureContext {
 impl TextureContext {
     /// A lookup that takes all of an image in.
     pub fn whole() -> Self {
-        let (uv, p, n) = (Vec2::splat(0.5), Vec3::ZERO, Vec3::Z);
+        let (uv, p, n) = (Vec2::splat(0.5), DVec3::ZERO, Vec3::Z);
         TextureContext { uv, uv_width: Vec2::splat(1e3), uv1: uv, color: [1.0; 4], face: 0, p, n }
     }
 }
@@ -427,12 +427,14 @@ impl TextureSet {
 
     /// Value of an image at a point; black where there is no tile.
     pub fn image_value(&self, texture: &ImageTexture, ctx: &TextureContext) -> Rgb {
-        let (mut st, width) = texture.mapping.map(ctx);
-        let mut image = texture.image;
-        if let Some(udim) = texture.udim {
-            let Some(tile) = self.udims[udim as usize].tile(st) else { return Rgb::BLACK };
-            (image, st) = tile;
-        }
+        let (st, width) = texture.mapping.map(ctx);
+        let (image, st) = match texture.udim {
+            Some(udim) => match self.udims[udim as usize].tile(st) {
+                Some(tile) => tile,
+                None => return Rgb::BLACK,
+            },
+            None => (texture.image, self.images[texture.image as usize].within_periods(st)),
+        };
         // Images have t downwards.
         self.images[image as usize].lookup(Vec2::new(st.x, 1.0 - st.y), width)
     }

@@ -3,7 +3,8 @@
 
 use super::{Mapping2d, TextureContext};
 use lumiris_numbers::math::noise::noise;
-use lumiris_numbers::math::{Affine3A, Rgb, Vec2, Vec3};
+use lumiris_numbers::math::{DAffine3, DVec3, Rgb, Vec2};
+use std::f64::consts::TAU;
 
 /// From one octave to the next: not quite 2, so that the lattices have no points in common.
 const LACUNARITY: f32 = 1.99;
@@ -36,7 +37,7 @@ pub struct NoiseTexture {
     /// Kind.
     pub kind: NoiseKind,
     /// World to texture space.
-    pub texture_from_world: Affine3A,
+    pub texture_from_world: DAffine3,
 }
 
 /// Marble: bands across y that noise displaces.
@@ -49,7 +50,7 @@ pub struct Marble {
     /// Factor of the noise.
     pub variation: f32,
     /// World to texture space.
-    pub texture_from_world: Affine3A,
+    pub texture_from_world: DAffine3,
 }
 
 /// Disks of random places in half of the unit cells.
@@ -69,10 +70,10 @@ pub struct Bilerp<T> {
 }
 
 impl Octaves {
-    fn sum(&self, p: Vec3, of: impl Fn(f32) -> f32) -> (f32, f32) {
+    fn sum(&self, p: DVec3, of: impl Fn(f32) -> f32) -> (f32, f32) {
         let (mut sum, mut frequency, mut amplitude) = (0.0, 1.0, 1.0);
         for _ in 0..self.count {
-            sum += amplitude * of(noise(p * frequency));
+            sum += amplitude * of(noise(p * f64::from(frequency)));
             frequency *= LACUNARITY;
             amplitude *= self.roughness;
         }
@@ -80,12 +81,12 @@ impl Octaves {
     }
 
     /// Fractional Brownian motion at a point.
-    pub fn fbm(&self, p: Vec3) -> f32 {
+    pub fn fbm(&self, p: DVec3) -> f32 {
         self.sum(p, |noise| noise).0
     }
 
     /// Turbulence at a point; what an octave more would add on average is part of it, as in pbrt.
-    pub fn turbulence(&self, p: Vec3) -> f32 {
+    pub fn turbulence(&self, p: DVec3) -> f32 {
         let (sum, next) = self.sum(p, f32::abs);
         sum + next * MEAN_OF_NOISE
     }
@@ -124,8 +125,9 @@ const MARBLE_BRIGHTNESS: f32 = 1.5;
 impl Marble {
     /// The colour at a point.
     pub fn color(&self, ctx: &TextureContext) -> Rgb {
-        let p = self.texture_from_world.transform_point3(ctx.p) * self.scale;
-        let band = p.y + self.variation * self.octaves.fbm(p);
+        let p = self.texture_from_world.transform_point3(ctx.p) * f64::from(self.scale);
+        // Without whole periods of the sine, f32 resolves the phase
+        let band = ((p.y + f64::from(self.variation * self.octaves.fbm(p))) % TAU) as f32;
         // Six cubic Bézier curves, each over four points in succession
         let segments = (MARBLE.len() - 3) as f32;
         let t = (0.5 + 0.5 * band.sin()) * segments;
@@ -146,19 +148,19 @@ impl Dots {
     pub fn is_inside(&self, ctx: &TextureContext) -> bool {
         let (st, _) = self.mapping.map(ctx);
         let cell = (st + 0.5).floor();
-        let noise_at = |dx: f32, dy: f32| noise(Vec3::new(cell.x + dx, cell.y + dy, 0.5));
+        let noise_at = |dx: f64, dy: f64| noise(DVec3::new(cell.x + dx, cell.y + dy, 0.5));
         if noise_at(0.5, 0.5) <= 0.0 {
             return false;
         }
         let shift = Vec2::new(noise_at(1.5, 2.8), noise_at(4.5, 9.8)) * (0.5 - DOT_RADIUS);
-        (st - cell - shift).length_squared() < DOT_RADIUS * DOT_RADIUS
+        ((st - cell).as_vec2() - shift).length_squared() < DOT_RADIUS * DOT_RADIUS
     }
 }
 
 impl<T: Copy + std::ops::Add<Output = T> + std::ops::Mul<f32, Output = T>> Bilerp<T> {
     /// The value at a point.
     pub fn value(&self, ctx: &TextureContext) -> T {
-        let (Vec2 { x, y }, _) = self.mapping.map(ctx);
+        let Vec2 { x, y } = self.mapping.map(ctx).0.as_vec2();
         let [a, b, c, d] = self.corners;
         (a * (1.0 - x) + b * x) * (1.0 - y) + (c * (1.0 - x) + d * x) * y
     }
@@ -167,10 +169,19 @@ impl<T: Copy + std::ops::Add<Output = T> + std::ops::Mul<f32, Output = T>> Biler
 #[cfg(test)]
 mod tests {
     use super::*;
+    use lumiris_numbers::math::Vec3;
 
     fn at(p: Vec3) -> TextureContext {
         let uv = p.truncate();
-        TextureContext { uv, uv_width: Vec2::ZERO, uv1: Vec2::ZERO, color: [1.0; 4], face: 0, p, n: Vec3::Z }
+        TextureContext {
+            uv,
+            uv_width: Vec2::ZERO,
+            uv1: Vec2::ZERO,
+            color: [1.0; 4],
+            face: 0,
+            p: p.as_dvec3(),
+            n: Vec3::Z,
+        }
     }
 
     fn points() -> impl Iterator<Item = Vec3> {
@@ -182,11 +193,15 @@ mod tests {
         let octaves = |count| Octaves { count, roughness: 0.5 };
         let mut mean = 0.0;
         for p in points() {
+            let p = p.as_dvec3();
             assert_eq!(octaves(1).fbm(p), noise(p));
             assert_eq!(octaves(0).fbm(p), 0.0);
             let (few, many) = (octaves(4).fbm(p), octaves(9).fbm(p));
             assert!((few - many).abs() < 0.13, "the rest is at most 1/16 + 1/32 + …: {few} {many}");
-            assert!((octaves(2).turbulence(p) - noise(p).abs() - 0.5 * noise(p * 1.99).abs() - 0.05).abs() < 1e-6);
+            assert!(
+                (octaves(2).turbulence(p) - noise(p).abs() - 0.5 * noise(p * f64::from(LACUNARITY)).abs() - 0.05).abs()
+                    < 1e-6
+            );
             mean += octaves(1).turbulence(p) - 0.1;
         }
         // The mean that stands for octaves which are left out
@@ -196,7 +211,7 @@ mod tests {
     #[test]
     fn marble_has_the_colours_of_its_spline() {
         let octaves = Octaves { count: 8, roughness: 0.5 };
-        let marble = |variation| Marble { octaves, scale: 1.0, variation, texture_from_world: Affine3A::IDENTITY };
+        let marble = |variation| Marble { octaves, scale: 1.0, variation, texture_from_world: DAffine3::IDENTITY };
         // Where the sine is −1 and 1, and in its middle, which is the first point of the fourth curve
         let of = |y: f32| marble(0.0).color(&at(Vec3::Y * y)).to_array();
         let half = std::f32::consts::FRAC_PI_2;

@@ -8,7 +8,7 @@ fn at(u: f32, v: f32) -> TextureContext {
         uv1: Vec2::ZERO,
         color: [0.5; 4],
         face: 0,
-        p: Vec3::ZERO,
+        p: DVec3::ZERO,
         n: Vec3::new(0.6, 0.0, 0.8),
     }
 }

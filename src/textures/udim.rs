@@ -2,7 +2,7 @@
 //! u from 0 to 9.
 
 use super::ImageId;
-use lumiris_numbers::math::Vec2;
+use lumiris_numbers::math::{DVec2, Vec2};
 
 /// Index into [`TextureSet::udims`](super::TextureSet::udims).
 pub type UdimId = u32;
@@ -36,12 +36,12 @@ impl Udim {
 
     /// The tile that covers a point, t upwards, and the point within it; `None` where there is none.
     #[inline]
-    pub fn tile(&self, st: Vec2) -> Option<(ImageId, Vec2)> {
+    pub fn tile(&self, st: DVec2) -> Option<(ImageId, Vec2)> {
         let corner = st.floor();
-        let rows = self.tiles.len().div_ceil(COLUMNS) as f32;
-        let is_inside = corner.x >= 0.0 && corner.x < COLUMNS as f32 && corner.y >= 0.0 && corner.y < rows;
+        let rows = self.tiles.len().div_ceil(COLUMNS) as f64;
+        let is_inside = corner.x >= 0.0 && corner.x < COLUMNS as f64 && corner.y >= 0.0 && corner.y < rows;
         let index = is_inside.then(|| corner.x as usize + COLUMNS * corner.y as usize)?;
-        Some((*self.tiles.get(index)?.as_ref()?, st - corner))
+        Some((*self.tiles.get(index)?.as_ref()?, (st - corner).as_vec2()))
     }
 }
 
@@ -55,11 +55,11 @@ mod tests {
         for (number, image) in [(1001, 7), (1002, 8), (1010, 9), (1011, 10)] {
             udim.set(number, image);
         }
-        let at = |x: f32, y: f32| udim.tile(Vec2::new(x, y)).map(|(image, _)| image);
+        let at = |x: f64, y: f64| udim.tile(DVec2::new(x, y)).map(|(image, _)| image);
         assert_eq!([at(0.0, 0.0), at(0.99, 0.99), at(1.0, 0.5), at(9.5, 0.5)], [Some(7), Some(7), Some(8), Some(9)]);
         assert_eq!([at(0.5, 1.0), at(1.5, 1.0), at(10.5, 0.5), at(-0.1, 0.5)], [Some(10), None, None, None]);
-        assert_eq!([at(0.5, -0.1), at(0.5, 1e30), at(f32::NAN, 0.5), at(2.5, 0.5)], [None; 4]);
-        assert_eq!(udim.tile(Vec2::new(1.25, 0.75)).unwrap().1, Vec2::new(0.25, 0.75));
+        assert_eq!([at(0.5, -0.1), at(0.5, 1e30), at(f64::NAN, 0.5), at(2.5, 0.5)], [None; 4]);
+        assert_eq!(udim.tile(DVec2::new(1.25, 0.75)).unwrap().1, Vec2::new(0.25, 0.75));
         assert!(!Udim::is_number(1000) && Udim::is_number(1001) && !Udim::is_number(10_000));
     }
 }

@@ -12,6 +12,7 @@ mod crosscheck;
 mod cryptomatte;
 mod dispersion;
 mod evaluated;
+mod far_away;
 mod few_samples;
 mod gltf;
 mod hair;

@@ -4,7 +4,7 @@ use lumiris::imaging::oiio::{Part, write_image};
 use lumiris::import::cache::FileCache;
 use lumiris::import::{LoadOptions, Loaded, load_text};
 use lumiris::textures::{RgbTexture, TextureContext};
-use lumiris_numbers::math::{Rgb, Vec2, Vec3};
+use lumiris_numbers::math::{DVec3, Rgb, Vec2, Vec3};
 use std::path::Path;
 
 /// Tiles 1001, 1002 and 1011 of one colour each, and files that are none.
@@ -39,7 +39,8 @@ fn each_tile_has_its_image_and_the_rest_is_black() {
     let wall = textures.rgbs.iter().find_map(|t| if let RgbTexture::Image(image) = t { Some(image) } else { None });
     let at = |u: f32, v: f32| {
         let (uv, uv1) = (Vec2::new(u, v), Vec2::ZERO);
-        let ctx = TextureContext { uv, uv_width: Vec2::ZERO, uv1, color: [1.0; 4], face: 0, p: Vec3::ZERO, n: Vec3::Z };
+        let ctx =
+            TextureContext { uv, uv_width: Vec2::ZERO, uv1, color: [1.0; 4], face: 0, p: DVec3::ZERO, n: Vec3::Z };
         textures.image_value(wall.unwrap(), &ctx)
     };
     for (u, v, value) in [

@@ -1,8 +1,10 @@
 //! Fast parsing of decimal numbers from bytes.
 //!
-//! A number with at most 19 digits and a power of ten up to 22 is exact in one f64 operation [Clinger 1990]; it is then
-//! rounded to f32, unless it is the midpoint of two f32, where the second rounding could go wrong. All other numbers
-//! take the slow, exact path of the standard library. So every result is the nearest f32.
+//! A number with at most 19 digits and a power of ten up to 22 is the nearest f64 after one operation [Clinger 1990]; an
+//! f32 is rounded from it, unless it is the midpoint of two f32, where the second rounding could go wrong. All other numbers
+//! take the slow, exact path of the standard library. So every result is the nearest f32 or f64.
+
+use std::str::FromStr;
 
 /// Why bytes are no number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -27,6 +29,31 @@ pub fn is_delimiter(byte: u8) -> bool {
 /// Reads the number at the start of `bytes`; returns it and its length. The number ends at a delimiter.
 #[inline]
 pub fn parse_f32(bytes: &[u8]) -> Result<(f32, usize), NumberError> {
+    let (value, length) = scan(bytes)?;
+    if let Some(value) = value {
+        // The middle between two f32 has exactly this tail; so do f32 subnormals' middles at other places.
+        let is_middle = value.to_bits() & 0x1fff_ffff == 0x1000_0000;
+        if !is_middle && (value == 0.0 || (1e-37..1e38).contains(&value.abs())) {
+            return Ok((value as f32, length));
+        }
+    }
+    slow::<f32>(&bytes[..length]).map(|value| (value, length))
+}
+
+/// As [`parse_f32`], with the precision of f64, and in the range of f32.
+#[inline]
+pub fn parse_f64(bytes: &[u8]) -> Result<(f64, usize), NumberError> {
+    let (value, length) = scan(bytes)?;
+    let value = match value {
+        Some(value) => value,
+        None => slow::<f64>(&bytes[..length])?,
+    };
+    if (value as f32).is_finite() { Ok((value, length)) } else { Err(NumberError::Overflow) }
+}
+
+/// The value of the number at the start of `bytes`, if it is the nearest f64 after one operation, and the number's length.
+#[inline]
+fn scan(bytes: &[u8]) -> Result<(Option<f64>, usize), NumberError> {
     let mut i = 0;
     let negative = bytes.first() == Some(&b'-');
     if negative || bytes.first() == Some(&b'+') {
@@ -64,13 +91,9 @@ pub fn parse_f32(bytes: &[u8]) -> Result<(f32, usize), NumberError> {
     if digits <= 19 && mantissa < 1 << 53 && exponent.unsigned_abs() <= 22 {
         let power = POWERS[exponent.unsigned_abs() as usize];
         let value = if exponent < 0 { mantissa as f64 / power } else { mantissa as f64 * power };
-        // The middle between two f32 has exactly this tail; so do f32 subnormals' middles at other places.
-        let is_middle = value.to_bits() & 0x1fff_ffff == 0x1000_0000;
-        if !is_middle && (mantissa == 0 || (1e-37..1e38).contains(&value)) {
-            return Ok((if negative { -value as f32 } else { value as f32 }, i));
-        }
+        return Ok((Some(if negative { -value } else { value }), i));
     }
-    slow_f32(&bytes[..i]).map(|value| (value, i))
+    Ok((None, i))
 }
 
 #[inline]
@@ -92,9 +115,9 @@ fn parse_exponent(bytes: &[u8]) -> Result<(i32, usize), NumberError> {
 }
 
 #[cold]
-fn slow_f32(text: &[u8]) -> Result<f32, NumberError> {
-    let value: f32 = std::str::from_utf8(text).ok().and_then(|t| t.parse().ok()).ok_or(NumberError::Malformed)?;
-    if value.is_finite() { Ok(value) } else { Err(NumberError::Overflow) }
+fn slow<T: FromStr + Copy + Into<f64>>(text: &[u8]) -> Result<T, NumberError> {
+    let value: T = std::str::from_utf8(text).ok().and_then(|t| t.parse().ok()).ok_or(NumberError::Malformed)?;
+    if value.into().is_finite() { Ok(value) } else { Err(NumberError::Overflow) }
 }
 
 /// Reads the whole number at the start of `bytes`; returns it and its length. It ends at a delimiter.
@@ -188,8 +211,15 @@ mod tests {
             let text = format!("{mantissa}e{exponent}");
             let expected: f32 = text.parse().unwrap();
             match parse_f32(text.as_bytes()) {
-                Ok((value, _)) => prop_assert_eq!(value.to_bits(), expected.to_bits()),
-                Err(error) => prop_assert!(error == NumberError::Overflow && expected.is_infinite()),
+                Ok((value, _)) => {
+                    prop_assert_eq!(value.to_bits(), expected.to_bits());
+                    let (value, _) = parse_f64(text.as_bytes()).unwrap();
+                    prop_assert_eq!(value.to_bits(), text.parse::<f64>().unwrap().to_bits());
+                }
+                Err(error) => {
+                    prop_assert!(error == NumberError::Overflow && expected.is_infinite());
+                    prop_assert_eq!(parse_f64(text.as_bytes()), Err(error));
+                }
             }
         }
 
@@ -199,11 +229,13 @@ mod tests {
             text.insert(point.min(text.len()), '.');
             let expected: f32 = text.parse().unwrap();
             prop_assert_eq!(parse_f32(text.as_bytes()).unwrap().0.to_bits(), expected.to_bits());
+            let expected: f64 = text.parse().unwrap();
+            prop_assert_eq!(parse_f64(text.as_bytes()).unwrap().0.to_bits(), expected.to_bits());
         }
 
         #[test]
         fn random_bytes_do_not_panic(bytes in proptest::collection::vec(any::<u8>(), 0..40)) {
-            let _ = (parse_f32(&bytes), parse_i32(&bytes));
+            let _ = (parse_f32(&bytes), parse_f64(&bytes), parse_i32(&bytes));
         }
     }
 }

@@ -5,7 +5,7 @@ use super::animation::changes;
 use super::choice::{Names, chosen, name_of, shown};
 use super::materials::{Look, Materials};
 use super::meshes::{Primitive, primitive};
-use super::nodes::{Node, instances, nodes};
+use super::nodes::{Node, instances, middle, nodes};
 use super::pose::{Pose, PoseKey, Skins};
 use super::textures::{EmissionKey, EmissionSource};
 use super::view::{camera, cameras, chosen_camera};
@@ -25,7 +25,8 @@ use crate::scene::{Choices, Scene, Surface};
 use crate::textures::TextureSet;
 use glam::Vec3A;
 use lumiris_formats::gltf::{Document, GltfError, Place};
-use lumiris_numbers::math::{Affine3A, Bounds3, Rgb, Vec3};
+use lumiris_numbers::math::origin::{near_origin, rebased};
+use lumiris_numbers::math::{Affine3A, Bounds3, DAffine3, DVec3, Rgb, Vec3};
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -43,6 +44,8 @@ pub(super) struct Assembly<'a> {
     media: MediumSet,
     /// What is inside of materials.
     interiors: HashMap<MaterialId, MediumId>,
+    /// The point of the world that is the origin of the world which is rendered.
+    origin: DVec3,
 }
 
 impl<'a> Assembly<'a> {
@@ -59,6 +62,7 @@ impl<'a> Assembly<'a> {
             lights: Vec::new(),
             media: MediumSet::default(),
             interiors: HashMap::new(),
+            origin: DVec3::ZERO,
         })
     }
 
@@ -82,6 +86,11 @@ impl<'a> Assembly<'a> {
         let nodes = nodes(self.document, &scene, &changes.unwrap_or_default())?;
         let (placed, camera_names) = cameras(self.document, &nodes, messages);
         choices.cameras = shown(&camera_names);
+        let found = chosen_camera(self.options, (&placed, &camera_names), messages);
+        self.origin = near_origin(match &found {
+            Some((node, _)) => node.world_from_node.translation,
+            None => middle(self.document, &nodes)?,
+        });
         if let Err(error) = self.add_meshes(&nodes, files, messages) {
             messages.error(&error);
         }
@@ -90,10 +99,9 @@ impl<'a> Assembly<'a> {
         if self.set.geometries.is_empty() {
             messages.warning(&self.document.root().key("meshes"), "the scene has no meshes to render");
         }
-        let found = chosen_camera(self.options, (&placed, &camera_names), messages);
         let index = found.as_ref().and_then(|(node, _)| placed.iter().position(|(other, _)| other.index == node.index));
         choices.camera = index.filter(|&i| i > 0);
-        let (camera, film) = camera(self.options, found, &bounds);
+        let (camera, film) = camera(self.options, found, (&bounds, self.origin));
         if let Some(path) = &self.options.environment {
             self.lights.extend(environment(path, files, messages));
         } else if self.lights.is_empty() && self.emitters.is_empty() {
@@ -118,6 +126,7 @@ impl<'a> Assembly<'a> {
             surfaces: self.surfaces,
             media: self.media,
             choices,
+            origin: self.origin,
         }))
     }
 
@@ -162,7 +171,7 @@ impl<'a> Assembly<'a> {
                 list.push(i as u32);
             }
         }
-        let mut skins = Skins::new(self.document, nodes);
+        let mut skins = Skins::new(self.document, nodes, self.origin);
         for (place, users) in meshes.items().zip(users) {
             // In the order of the nodes
             let (mut poses, mut indices): (Vec<(Pose, Vec<u32>)>, HashMap<PoseKey, usize>) = Default::default();
@@ -195,8 +204,8 @@ impl<'a> Assembly<'a> {
         messages: &mut Messages<'_>,
     ) -> Result<(), GltfError> {
         let name = place.key("name").text().unwrap_or("mesh").to_owned();
-        let document = self.document;
-        let placements = || users.iter().flat_map(move |&i| placements(document, &nodes[i as usize], pose));
+        let (document, to) = (self.document, self.origin);
+        let placements = || users.iter().flat_map(move |&i| placements(document, &nodes[i as usize], pose, to));
         let (mut count, mut invertible) = (0, 0);
         for m in placements() {
             (count, invertible) = (count + 1, invertible + usize::from(has_inverse(&m)));
@@ -205,8 +214,13 @@ impl<'a> Assembly<'a> {
             return Ok(());
         }
         let mut group = Vec::new();
+        let mut origin = None;
+        let rendered =
+            |m: &DAffine3, origin: Option<DVec3>| rebased(m, to, origin.unwrap_or(DVec3::ZERO)).as_affine3a();
         for place in place.key("primitives").items() {
-            let Some(Primitive { mut mesh, material }) = primitive(self.document, &place, pose, messages)? else {
+            let Some(Primitive { mut mesh, material }) =
+                primitive(self.document, &place, (pose, &mut origin), messages)?
+            else {
                 continue;
             };
             let looks = &self.materials.looks;
@@ -221,7 +235,7 @@ impl<'a> Assembly<'a> {
                 group.push(self.add_geometry(mesh.clone(), &look, &name));
             }
             for m in placements().filter(|m| !is_instanced || !has_inverse(m)) {
-                let id = self.add_geometry(mesh.transformed(&m), &look, &name);
+                let id = self.add_geometry(mesh.transformed(&rendered(&m, origin)), &look, &name);
                 self.set.root.geometries.push(id);
                 self.add_emission(id, &look, files, messages);
             }
@@ -229,7 +243,7 @@ impl<'a> Assembly<'a> {
         if !group.is_empty() {
             let id = self.set.groups.len() as u32;
             self.set.groups.push(Group { geometries: group });
-            let instance = |m: Affine3A| Instance { group: id, world_from_group: vec![m] };
+            let instance = |m: DAffine3| Instance { group: id, world_from_group: vec![rendered(&m, origin)] };
             self.set.instances.extend(placements().filter(has_inverse).map(instance));
         }
         Ok(())
@@ -272,7 +286,7 @@ impl<'a> Assembly<'a> {
         let color = Rgb::from_array(light.key("color").numbers().unwrap_or([1.0; 3])).map(|c| c.max(0.0));
         let per_candela = self.options.light_units.unwrap_or_default().per_candela();
         let intensity = color * (light.key("intensity").number().unwrap_or(1.0).max(0.0) * per_candela);
-        let m = &node.world_from_node;
+        let m = &rebased(&node.world_from_node, self.origin, DVec3::ZERO).as_affine3a();
         if !m.is_finite() {
             return;
         }
@@ -296,15 +310,22 @@ impl<'a> Assembly<'a> {
 
 /// Where a node has its mesh in a pose, as far as that is finite. They are computed anew wherever they are needed: a scene
 /// of 10⁶ nodes needs the memory for other things.
-fn placements<'n>(document: &Document, node: &'n Node, pose: &Pose) -> impl Iterator<Item = Affine3A> + use<'n> {
-    let world_from_node = if pose.is_skinned() { Affine3A::IDENTITY } else { node.world_from_node };
+fn placements<'n>(
+    document: &Document,
+    node: &'n Node,
+    pose: &Pose,
+    origin: DVec3,
+) -> impl Iterator<Item = DAffine3> + use<'n> {
+    // Joints lead to the world that is rendered
+    let world_from_node = if pose.is_skinned() { DAffine3::from_translation(origin) } else { node.world_from_node };
     // What is wrong with them was said before
     let within = instances(document, &node.place(document)).unwrap_or_default();
-    within.into_iter().map(move |m| world_from_node * m).filter(Affine3A::is_finite)
+    within.into_iter().map(move |m| world_from_node * m).filter(|m| m.as_affine3a().is_finite())
 }
 
 /// False for what makes everything flat, or thinner than f32 can invert.
-fn has_inverse(m: &Affine3A) -> bool {
+fn has_inverse(m: &DAffine3) -> bool {
+    let m = m.as_affine3a();
     m.matrix3.determinant() != 0.0 && m.inverse().is_finite()
 }
 

@@ -5,20 +5,22 @@ use super::pose::{Pose, Vertices};
 use super::vertices::InUse;
 use crate::geometry::TriangleMesh;
 use lumiris_formats::gltf::{Document, GltfError, Place};
-use lumiris_numbers::math::{Vec2, Vec3};
+use lumiris_numbers::math::origin::near_origin;
+use lumiris_numbers::math::{DVec3, Vec2, Vec3};
 
-/// A primitive in the space of its mesh.
+/// A primitive in the space of its mesh, relative to an origin.
 pub(super) struct Primitive {
     pub mesh: TriangleMesh,
     /// Index of the material.
     pub material: Option<usize>,
 }
 
-/// Triangles of a primitive, bent by a pose; `None` for points and lines.
+/// Triangles of a primitive, bent by a pose; `None` for points and lines. The first primitive of a mesh determines the origin of
+/// all of them, which is near to its vertices.
 pub(super) fn primitive(
     document: &Document,
     place: &Place<'_>,
-    pose: &Pose,
+    (pose, origin): (&Pose, &mut Option<DVec3>),
     messages: &mut Messages<'_>,
 ) -> Result<Option<Primitive>, GltfError> {
     let mode = place.key("mode").index().unwrap_or(4);
@@ -47,9 +49,14 @@ pub(super) fn primitive(
         tangents: tangents.iter().map(|&[x, y, z, _]| Vec3::new(x, y, z)).collect(),
     };
     pose.bend(document, place, &in_use, &mut vertices, messages)?;
-    let Vertices { positions, normals, tangents: moved } = vertices;
+    let Vertices { mut positions, normals, tangents: moved } = vertices;
     if let Some(i) = positions.iter().position(|p| !p.is_finite()) {
         return Err(attributes.key("POSITION").error(format!("vertex {} is not finite", in_use.vertex(i))));
+    }
+    let middle = positions.get(positions.len() / 2).map_or(DVec3::ZERO, |p| p.as_dvec3());
+    let origin = *origin.get_or_insert_with(|| near_origin(middle));
+    if origin != DVec3::ZERO {
+        positions.iter_mut().for_each(|p| *p = (p.as_dvec3() - origin).as_vec3());
     }
     let mut mesh = TriangleMesh::new(positions, triangles).map_err(|message| place.key("indices").error(message))?;
     let uvs = |name| -> Result<Vec<Vec2>, GltfError> {

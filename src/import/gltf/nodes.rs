@@ -1,9 +1,9 @@
 //! The tree of nodes: what stands where.
 
 use super::animation::{Change, Changes};
-use glam::{Mat4, Quat};
+use glam::{DMat4, DQuat};
 use lumiris_formats::gltf::{Document, GltfError, Place};
-use lumiris_numbers::math::{Affine3A, Vec3};
+use lumiris_numbers::math::{DAffine3, DVec3};
 use std::collections::HashSet;
 
 /// A node of the scene with its placement.
@@ -14,7 +14,7 @@ pub(super) struct Node {
     pub mesh: Option<usize>,
     /// False if it, or a parent, is hidden by `KHR_node_visibility`: without meshes and lights, but with cameras and joints.
     pub is_visible: bool,
-    pub world_from_node: Affine3A,
+    pub world_from_node: DAffine3,
     /// Weights of morph targets, by an animation.
     pub weights: Option<Vec<f32>>,
 }
@@ -31,8 +31,8 @@ impl Node {
 pub(super) fn nodes<'d>(document: &'d Document, scene: &Place<'d>, changes: &Changes) -> Result<Vec<Node>, GltfError> {
     let all = document.root().key("nodes");
     let count = all.len();
-    let at_root = |i| (i, Affine3A::IDENTITY, true);
-    let mut open: Vec<(usize, Affine3A, bool)> = if scene.exists() {
+    let at_root = |i| (i, DAffine3::IDENTITY, true);
+    let mut open: Vec<(usize, DAffine3, bool)> = if scene.exists() {
         scene.key("nodes").items().filter_map(|root| root.index()).map(at_root).collect()
     } else {
         let children: HashSet<usize> =
@@ -61,20 +61,47 @@ pub(super) fn nodes<'d>(document: &'d Document, scene: &Place<'d>, changes: &Cha
     Ok(nodes)
 }
 
-fn transform(place: &Place<'_>, change: &Change) -> Affine3A {
-    if let Some(m) = place.key("matrix").numbers::<16>() {
-        return Affine3A::from_mat4(Mat4::from_cols_array(&m));
+fn transform(place: &Place<'_>, change: &Change) -> DAffine3 {
+    if let Some(m) = place.key("matrix").doubles::<16>() {
+        return DAffine3::from_mat4(DMat4::from_cols_array(&m));
     }
-    let translation = Vec3::from(change.translation.or_else(|| place.key("translation").numbers()).unwrap_or([0.0; 3]));
-    let scale = Vec3::from(change.scale.or_else(|| place.key("scale").numbers()).unwrap_or([1.0; 3]));
-    let rotation = change.rotation.or_else(|| place.key("rotation").numbers()).unwrap_or([0.0, 0.0, 0.0, 1.0]);
-    let rotation = Quat::from_array(rotation);
-    let rotation = if rotation.length_squared() > 0.0 { rotation.normalize() } else { Quat::IDENTITY };
-    Affine3A::from_scale_rotation_translation(scale, rotation, translation)
+    let [translation, scale] =
+        [("translation", change.translation, 0.0), ("scale", change.scale, 1.0)].map(|(name, change, default)| {
+            let given = change.map(|v| v.map(f64::from)).or_else(|| place.key(name).doubles());
+            DVec3::from(given.unwrap_or([default; 3]))
+        });
+    let rotation = change.rotation.map(|q| q.map(f64::from)).or_else(|| place.key("rotation").doubles());
+    let rotation = unit(rotation.unwrap_or([0.0, 0.0, 0.0, 1.0]));
+    DAffine3::from_scale_rotation_translation(scale, rotation, translation)
+}
+
+/// The rotation of a quaternion of any length; of zero, none.
+fn unit(q: [f64; 4]) -> DQuat {
+    let q = DQuat::from_array(q);
+    if q.length_squared() > 0.0 { q.normalize() } else { DQuat::IDENTITY }
+}
+
+/// The middle of the meshes of a scene, by the bounds that accessors state.
+pub(super) fn middle(document: &Document, nodes: &[Node]) -> Result<DVec3, GltfError> {
+    let [meshes, accessors] = ["meshes", "accessors"].map(|key| document.root().key(key));
+    let (mut min, mut max) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+    for node in nodes {
+        let Some(mesh) = node.mesh else { continue };
+        let placements = instances(document, &node.place(document))?;
+        for primitive in meshes.item(mesh).key("primitives").items() {
+            let positions = primitive.key("attributes").key("POSITION").index();
+            let accessor = accessors.item(positions.unwrap_or(usize::MAX));
+            let corner = |key: &str| accessor.key(key).doubles().map_or(DVec3::ZERO, DVec3::from_array);
+            let center = (corner("min") + corner("max")) * 0.5;
+            let centers = placements.iter().map(|m| node.world_from_node.transform_point3(m.transform_point3(center)));
+            (min, max) = centers.fold((min, max), |(min, max), p| (min.min(p), max.max(p)));
+        }
+    }
+    Ok((min + max) * 0.5)
 }
 
 /// Placements by `EXT_mesh_gpu_instancing`, relative to the node; one if there are none.
-pub(super) fn instances(document: &Document, place: &Place<'_>) -> Result<Vec<Affine3A>, GltfError> {
+pub(super) fn instances(document: &Document, place: &Place<'_>) -> Result<Vec<DAffine3>, GltfError> {
     let attributes = place.extension("EXT_mesh_gpu_instancing").key("attributes");
     let numbers = |name: &str| attributes.key(name).index().map(|i| document.accessor(i)).transpose();
     let [translations, rotations, scales] = [numbers("TRANSLATION")?, numbers("ROTATION")?, numbers("SCALE")?];
@@ -82,13 +109,12 @@ pub(super) fn instances(document: &Document, place: &Place<'_>) -> Result<Vec<Af
     let rotations = rotations.map(|n| n.elements::<4>(0.0));
     let scales = scales.map(|n| n.elements::<3>(1.0));
     let counts = [translations.as_ref().map(Vec::len), rotations.as_ref().map(Vec::len), scales.as_ref().map(Vec::len)];
-    let Some(&count) = counts.iter().flatten().min() else { return Ok(vec![Affine3A::IDENTITY]) };
+    let Some(&count) = counts.iter().flatten().min() else { return Ok(vec![DAffine3::IDENTITY]) };
     let placement = |i: usize| {
-        let rotation = rotations.as_ref().map_or(Quat::IDENTITY, |r| Quat::from_array(r[i]));
-        let rotation = if rotation.length_squared() > 0.0 { rotation.normalize() } else { Quat::IDENTITY };
-        let scale = scales.as_ref().map_or(Vec3::ONE, |s| Vec3::from(s[i]));
-        let translation = translations.as_ref().map_or(Vec3::ZERO, |t| Vec3::from(t[i]));
-        Affine3A::from_scale_rotation_translation(scale, rotation, translation)
+        let rotation = rotations.as_ref().map_or(DQuat::IDENTITY, |r| unit(r[i].map(f64::from)));
+        let scale = scales.as_ref().map_or(DVec3::ONE, |s| DVec3::from(s[i].map(f64::from)));
+        let translation = translations.as_ref().map_or(DVec3::ZERO, |t| DVec3::from(t[i].map(f64::from)));
+        DAffine3::from_scale_rotation_translation(scale, rotation, translation)
     };
     Ok((0..count).map(placement).collect())
 }

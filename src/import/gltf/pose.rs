@@ -4,10 +4,11 @@
 use super::Messages;
 use super::nodes::Node;
 use super::vertices::InUse;
-use glam::Mat4;
+use glam::{DMat4, Mat4};
 use lumiris_formats::gltf::{Document, GltfError, Place};
+use lumiris_numbers::math::origin::rebased;
 use lumiris_numbers::math::transform::transform_normal;
-use lumiris_numbers::math::{Affine3A, Vec3};
+use lumiris_numbers::math::{Affine3A, DAffine3, DVec3, Vec3};
 use std::collections::HashMap;
 use std::sync::Arc;
 
@@ -16,7 +17,7 @@ use std::sync::Arc;
 pub(super) struct Pose {
     /// Weights of the morph targets.
     weights: Vec<f32>,
-    /// The skin, and world from mesh by each of its joints.
+    /// The skin, and the world that is rendered from mesh by each of its joints.
     skin: Option<(usize, Arc<[Affine3A]>)>,
 }
 
@@ -27,6 +28,8 @@ pub(super) type PoseKey = (Vec<u32>, Option<usize>);
 pub(super) struct Skins<'a> {
     document: &'a Document,
     nodes: &'a [Node],
+    /// The point of the world that is the origin of the space which is rendered.
+    origin: DVec3,
     /// By index of the node in the file.
     in_scene: HashMap<usize, usize>,
     joints: HashMap<usize, Arc<[Affine3A]>>,
@@ -34,13 +37,13 @@ pub(super) struct Skins<'a> {
 
 impl<'a> Skins<'a> {
     /// The skins of a scene of these nodes.
-    pub(super) fn new(document: &'a Document, nodes: &'a [Node]) -> Self {
+    pub(super) fn new(document: &'a Document, nodes: &'a [Node], origin: DVec3) -> Self {
         let has_skins = !document.root().key("skins").is_empty();
         let in_scene = nodes.iter().enumerate().filter(|_| has_skins).map(|(i, node)| (node.index, i)).collect();
-        Skins { document, nodes, in_scene, joints: HashMap::new() }
+        Skins { document, nodes, origin, in_scene, joints: HashMap::new() }
     }
 
-    /// World from mesh by each joint.
+    /// The world that is rendered from mesh, by each joint.
     fn joints(&mut self, index: usize) -> Result<Arc<[Affine3A]>, GltfError> {
         if let Some(joints) = self.joints.get(&index) {
             return Ok(Arc::clone(joints));
@@ -56,11 +59,12 @@ impl<'a> Skins<'a> {
                 return Err(place.error("the joint is not in the scene"));
             };
             let inverse = match inverses.get(i) {
-                Some(m) => Affine3A::from_mat4(Mat4::from_cols_array(m)),
-                None if inverses.is_empty() => Affine3A::IDENTITY,
+                Some(m) => DAffine3::from_mat4(DMat4::from_cols_array(&m.map(f64::from))),
+                None if inverses.is_empty() => DAffine3::IDENTITY,
                 None => return Err(skin.key("inverseBindMatrices").error("has not one matrix per joint")),
             };
-            joints.push(self.nodes[joint].world_from_node * inverse);
+            let world_from_mesh = self.nodes[joint].world_from_node * inverse;
+            joints.push(rebased(&world_from_mesh, self.origin, DVec3::ZERO).as_affine3a());
         }
         let joints: Arc<[Affine3A]> = joints.into();
         self.joints.insert(index, Arc::clone(&joints));
@@ -100,7 +104,7 @@ impl Pose {
         (self.weights.iter().map(|w| w.to_bits()).collect(), self.skin.as_ref().map(|(skin, _)| *skin))
     }
 
-    /// True if vertices become points of the world, whatever the transformation of their node.
+    /// True if vertices become points of the world that is rendered, whatever the transformation of their node.
     pub(super) fn is_skinned(&self) -> bool {
         self.skin.is_some()
     }

@@ -9,7 +9,8 @@ use crate::film::filter::PixelFilter;
 use crate::import::LoadOptions;
 use crate::scene::FilmSettings;
 use lumiris_formats::gltf::{Document, Place};
-use lumiris_numbers::math::{Affine3A, Bounds3, Vec3};
+use lumiris_numbers::math::origin::rebased;
+use lumiris_numbers::math::{Affine3A, Bounds3, DAffine3, DVec3, Vec3};
 
 /// Height of an image whose size nobody gives.
 const HEIGHT: u32 = 720;
@@ -66,13 +67,23 @@ pub(super) fn chosen_camera<'n, 'd>(
     }
 }
 
-/// A camera of the scene, or one that frames it, and the film.
-pub(super) fn camera(options: &LoadOptions, found: Option<Placed<'_, '_>>, bounds: &Bounds3) -> (Camera, FilmSettings) {
+/// A camera of the scene, or one that frames it, and the film. Bounds and camera are relative to `origin`.
+pub(super) fn camera(
+    options: &LoadOptions,
+    found: Option<Placed<'_, '_>>,
+    (bounds, origin): (&Bounds3, DVec3),
+) -> (Camera, FilmSettings) {
     let aspect = found.as_ref().and_then(|(_, c)| aspect_of(c));
     let width = (HEIGHT as f32 * aspect.unwrap_or(16.0 / 9.0)).round().clamp(1.0, 65_536.0);
     let resolution = options.resolution.unwrap_or([width as u32, HEIGHT]);
     let aspect = resolution[0] as f32 / resolution[1] as f32;
-    let camera = found.map_or_else(|| frame(bounds, aspect, resolution), |(n, c)| of_file(n, &c, aspect, resolution));
+    let camera = match found {
+        Some((node, camera)) => {
+            let world_from_node = rebased(&node.world_from_node, origin, DVec3::ZERO);
+            of_file(&world_from_node, &camera, aspect, resolution)
+        }
+        None => frame(bounds, aspect, resolution),
+    };
     let [x0, x1, y0, y1] = options.crop.unwrap_or([0.0, 1.0, 0.0, 1.0]);
     let at = |fraction: f32, size: u32| ((fraction * size as f32).ceil() as u32).min(size);
     let [w, h] = resolution;
@@ -100,9 +111,10 @@ fn half_size(orthographic: &Place<'_>) -> Option<[f32; 2]> {
 
 /// A camera of the file: it looks along −z; scales of its node do not count. In an image of another aspect ratio, a perspective
 /// camera keeps its angle of view upwards, and an orthographic one sees more, to the sides or upwards.
-fn of_file(node: &Node, camera: &Place<'_>, aspect: f32, resolution: [u32; 2]) -> Camera {
-    let (_, rotation, translation) = node.world_from_node.to_scale_rotation_translation();
-    let world_from_camera = Affine3A::from_scale_rotation_translation(Vec3::new(1.0, 1.0, -1.0), rotation, translation);
+fn of_file(world_from_node: &DAffine3, camera: &Place<'_>, aspect: f32, resolution: [u32; 2]) -> Camera {
+    let (_, rotation, translation) = world_from_node.to_scale_rotation_translation();
+    let flip = DVec3::new(1.0, 1.0, -1.0);
+    let world_from_camera = DAffine3::from_scale_rotation_translation(flip, rotation, translation).as_affine3a();
     let orthographic = camera.key("orthographic");
     if orthographic.exists() {
         let [x, y] = half_size(&orthographic).unwrap_or([1.0; 2]);

@@ -5,8 +5,9 @@ use super::descriptions::{CurveData, ShapeDesc, ShapeSource};
 use crate::geometry::{Curve, CurveKind, CurveSet};
 use lumiris_formats::diagnostic::Diagnostics;
 use lumiris_formats::pbrt::params::{ParamSet, ParamType};
+use lumiris_numbers::math::origin::relative;
 use lumiris_numbers::math::transform::transform_normal;
-use lumiris_numbers::math::{Affine3A, Vec3};
+use lumiris_numbers::math::{Affine3A, DVec3, Vec3};
 
 /// Basis of the control points.
 #[derive(Clone, Copy, PartialEq)]
@@ -44,7 +45,7 @@ pub(super) fn curve_data(p: &ParamSet, d: &mut Diagnostics) -> Option<CurveData>
     // Pieces are chosen by shape and width
     p.ignore("splitdepth");
 
-    let segments = segments(p, basis, degree, d)?;
+    let (segments, origin) = segments(p, basis, degree, d)?;
     let widths = widths(p, d)?;
     let normals = normals(p, kind, segments.len(), d)?;
     let at = |i: usize| {
@@ -53,13 +54,13 @@ pub(super) fn curve_data(p: &ParamSet, d: &mut Diagnostics) -> Option<CurveData>
     };
     let curve = |(i, &points): (usize, &[Vec3; 4])| Curve { points, width: [at(i), at(i + 1)] };
     let curves = segments.iter().enumerate().map(curve).collect();
-    Some(CurveData { kind, curves, normals })
+    Some(CurveData { kind, origin, curves, normals })
 }
 
-/// Control points of the cubic Bézier curves.
-fn segments(p: &ParamSet, basis: Basis, degree: usize, d: &mut Diagnostics) -> Option<Vec<[Vec3; 4]>> {
-    let points: Vec<Vec3> = match p.get("P", &[ParamType::Point3], d).and_then(|p| p.floats()) {
-        Some(floats) => floats.chunks_exact(3).map(Vec3::from_slice).collect(),
+/// Control points of the cubic Bézier curves, and their origin.
+fn segments(p: &ParamSet, basis: Basis, degree: usize, d: &mut Diagnostics) -> Option<(Vec<[Vec3; 4]>, DVec3)> {
+    let (points, origin) = match p.points("P", d).map(relative) {
+        Some(points) => points,
         None => {
             d.error(p.span, "a curve needs `point3 P`");
             return None;
@@ -80,7 +81,7 @@ fn segments(p: &ParamSet, basis: Basis, degree: usize, d: &mut Diagnostics) -> O
         return None;
     }
     let segment = |first: usize| cubic(&points[first..=first + degree], basis);
-    Some((0..count - degree).step_by(step).map(segment).collect())
+    Some(((0..count - degree).step_by(step).map(segment).collect(), origin))
 }
 
 /// The cubic Bézier curve of one segment of a Bézier curve or uniform B-spline of degree 2 or 3.
@@ -141,6 +142,9 @@ fn normals(p: &ParamSet, kind: CurveKind, segments: usize, d: &mut Diagnostics) 
     Some(given.windows(2).map(|n| [n[0].normalize(), n[1].normalize()]).collect())
 }
 
+/// Greatest distance along an axis between origins of curves that become one geometry.
+const MERGED: f64 = 1024.0;
+
 /// Adds the curves of `desc` to those of `last`, if nothing but their numbers tells them apart; returns `desc` if they
 /// cannot be one geometry. A head of hair has as many directives as hairs.
 pub(super) fn merged(last: Option<&mut ShapeDesc>, desc: ShapeDesc) -> Option<ShapeDesc> {
@@ -153,8 +157,12 @@ pub(super) fn merged(last: Option<&mut ShapeDesc>, desc: ShapeDesc) -> Option<Sh
         && last.object == desc.object
         && last.media.is_same(&desc.media);
     match (&mut last.source, desc.source) {
-        (ShapeSource::Curves(all), ShapeSource::Curves(data)) if is_alike && all.kind == data.kind => {
-            all.curves.extend(data.curves);
+        (ShapeSource::Curves(all), ShapeSource::Curves(data))
+            if is_alike && all.kind == data.kind && (data.origin - all.origin).abs().max_element() <= MERGED =>
+        {
+            let shift = (data.origin - all.origin).as_vec3();
+            let shifted = |c: Curve| Curve { points: c.points.map(|p| p + shift), ..c };
+            all.curves.extend(data.curves.into_iter().map(shifted));
             all.normals.extend(data.normals);
             None
         }

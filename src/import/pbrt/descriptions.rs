@@ -10,7 +10,7 @@ use lumiris_formats::color_space::ColorSpace;
 use lumiris_formats::pbrt::directive::Name;
 use lumiris_formats::pbrt::params::ParamSet;
 use lumiris_formats::source::Span;
-use lumiris_numbers::math::{Affine3A, Rgb, Vec2, Vec3};
+use lumiris_numbers::math::{Affine3A, DAffine3, DVec3, Rgb, Vec2, Vec3};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -44,6 +44,14 @@ pub(super) struct MaterialDesc {
     /// A name for people.
     pub name: String,
     pub kind: Name,
+    pub params: ParamSet,
+    pub state: ParamState,
+}
+
+/// A medium that is made once it is known where the space that is rendered has its origin.
+pub(super) struct PendingMedium {
+    /// Its place among the media.
+    pub index: usize,
     pub params: ParamSet,
     pub state: ParamState,
 }
@@ -133,7 +141,7 @@ pub(super) struct VolumeDesc {
     pub(super) le_scale: f32,
     pub(super) g: f32,
     /// From the space of the file.
-    pub(super) placement: Affine3A,
+    pub(super) placement: DAffine3,
 }
 
 /// What is behind the surface of a material.
@@ -262,7 +270,9 @@ impl ShapeSource {
 /// Arrays of a triangle mesh in object space.
 #[derive(Clone, Debug, Default)]
 pub struct MeshData {
+    /// Relative to `origin`.
     pub(super) positions: Vec<Vec3>,
+    pub(super) origin: DVec3,
     pub(super) indices: Vec<[u32; 3]>,
     pub(super) normals: Vec<Vec3>,
     pub(super) tangents: Vec<Vec3>,
@@ -274,7 +284,9 @@ pub struct MeshData {
 /// Arrays of a bilinear mesh in object space.
 #[derive(Clone, Debug, Default)]
 pub struct PatchData {
+    /// Relative to `origin`.
     pub(super) positions: Vec<Vec3>,
+    pub(super) origin: DVec3,
     pub(super) indices: Vec<[u32; 4]>,
     pub(super) normals: Vec<Vec3>,
     pub(super) uvs: Vec<Vec2>,
@@ -286,6 +298,8 @@ pub struct PatchData {
 #[derive(Clone, Debug)]
 pub struct CurveData {
     pub(super) kind: CurveKind,
+    /// The origin of the points.
+    pub(super) origin: DVec3,
     pub(super) curves: Vec<Curve>,
     /// Of ribbons, two for each curve.
     pub(super) normals: Vec<[Vec3; 2]>,
@@ -309,8 +323,10 @@ pub struct ShapeDesc {
     pub name: String,
     /// Where it stands.
     pub span: Span,
-    /// Transformation from its own space.
+    /// Transformation from its own space to that of the world, or of its object.
     pub ctm: Ctm,
+    /// The point of the world that is the origin of the space which is rendered.
+    pub origin: DVec3,
     /// `ReverseOrientation`.
     pub reverse_orientation: bool,
     /// Material.

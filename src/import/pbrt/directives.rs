@@ -56,7 +56,7 @@ impl Visitor for Builder<'_> {
             D::Accelerator(_) => {}
             D::MakeNamedMedium(name) => {
                 self.with_defaults(AttributeTarget::Medium, &mut params);
-                self.make_named_medium(name, &mut params, diagnostics);
+                self.make_named_medium(name, params, diagnostics);
             }
             D::MediumInterface { inside, outside } => {
                 let [inside, outside] = [inside, outside].map(|name| Some(name).filter(|name| !name.text.is_empty()));
@@ -131,6 +131,7 @@ impl Builder<'_> {
     }
 
     fn world_begin(&mut self) {
+        self.origin = self.options.origin();
         self.state.ctm = Ctm::IDENTITY;
         self.state.active = ActiveTimes::All;
         self.coordinate_systems.insert("world".to_owned(), Ctm::IDENTITY);

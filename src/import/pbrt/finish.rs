@@ -1,7 +1,7 @@
 //! The end of an import: reads all files in parallel, and assembles the scene in the order of its text.
 
 use super::descriptions::{AreaLightDesc, ShapeDesc};
-use super::instances::{Objects, flattened};
+use super::instances::{Objects, flattened, rendered};
 use super::lights::power_factor;
 use super::measured;
 use super::media::MediaInUse;
@@ -24,7 +24,8 @@ use crate::textures::TextureSet;
 use lumiris_formats::diagnostic::Diagnostics;
 use lumiris_formats::ply::PlyMesh;
 use lumiris_formats::source::Span;
-use lumiris_numbers::math::{Affine3A, Rgb};
+use lumiris_numbers::math::origin::rebased;
+use lumiris_numbers::math::{DAffine3, DVec3, Rgb};
 use rayon::prelude::*;
 use std::collections::{BTreeSet, HashMap};
 use std::path::{Path, PathBuf};
@@ -42,8 +43,26 @@ struct Assembly {
     /// Images that area lights emit.
     images: HashMap<PathBuf, Arc<EmissionImage>>,
     media: MediaInUse,
-    /// By object, what moves within: groups with their placements.
-    moving: Vec<Vec<(GroupId, Vec<Affine3A>)>>,
+    /// By object, what moves within, or is far from its origin: groups with their placements.
+    moving: Vec<Vec<(GroupId, Vec<DAffine3>)>>,
+    /// Groups of what is far from the origin of its object, by the index of this and their own origin.
+    far: HashMap<(usize, [u64; 3]), GroupId>,
+}
+
+impl Assembly {
+    /// The group of what stands still in an object and has this origin.
+    fn in_object(&mut self, object: usize, origin: DVec3) -> &mut Group {
+        if origin == DVec3::ZERO {
+            return &mut self.set.groups[object];
+        }
+        let group = *self.far.entry((object, origin.to_array().map(f64::to_bits))).or_insert_with(|| {
+            let group = self.set.groups.len() as GroupId;
+            self.set.groups.push(Group::default());
+            self.moving[object].push((group, vec![DAffine3::from_translation(origin)]));
+            group
+        });
+        &mut self.set.groups[group as usize]
+    }
 }
 
 impl Assembly {
@@ -131,7 +150,8 @@ impl Builder<'_> {
                 (Ok(_), None) => {}
             }
         }
-        match (Objects { objects: &self.objects, moving: &assembly.moving, shutter }).place(&self.instances) {
+        let objects = Objects { objects: &self.objects, moving: &assembly.moving, shutter, origin: self.origin };
+        match objects.place(&self.instances) {
             Ok(placed) => {
                 assembly.set.instances.extend(placed.instances);
                 placed.flat.iter().for_each(|(instance, span)| assembly.add_flat(instance, *span, d));
@@ -178,6 +198,7 @@ impl Builder<'_> {
             lights: Arc::new(lights),
             media: assembly.media.set,
             choices: Choices::default(),
+            origin: self.origin,
         };
         Some((scene, settings, given))
     }
@@ -218,15 +239,21 @@ impl Builder<'_> {
             ids.push(id);
         }
         match (desc.object, moving) {
-            (Some(object), false) => assembly.set.groups[object].geometries.extend(ids),
+            (Some(object), false) => assembly.in_object(object, made.origin).geometries.extend(ids),
             (None, false) => assembly.set.root.geometries.extend(ids),
             (object, true) => {
                 let group = assembly.set.groups.len() as u32;
                 assembly.set.groups.push(Group { geometries: ids });
-                let world_from_group = desc.ctm.samples(assembly.shutter);
+                let samples = desc.ctm.samples(assembly.shutter);
                 match object {
-                    Some(object) => assembly.moving[object].push((group, world_from_group)),
-                    None => assembly.set.instances.push(Instance { group, world_from_group }),
+                    Some(object) => {
+                        let placements = samples.iter().map(|m| rebased(m, DVec3::ZERO, made.origin)).collect();
+                        assembly.moving[object].push((group, placements));
+                    }
+                    None => {
+                        let world_from_group = rendered(&samples, self.origin, made.origin);
+                        assembly.set.instances.push(Instance { group, world_from_group });
+                    }
                 }
             }
         }

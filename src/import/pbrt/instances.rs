@@ -4,8 +4,9 @@ use super::descriptions::{InstanceDesc, ObjectDesc};
 use super::shapes::placed_quadric;
 use crate::geometry::{GroupId, Instance, Quadric, Shape};
 use lumiris_formats::source::Span;
-use lumiris_numbers::math::Affine3A;
+use lumiris_numbers::math::origin::rebased;
 use lumiris_numbers::math::transform::{compose_placements, swaps_handedness};
+use lumiris_numbers::math::{Affine3A, DAffine3, DVec3};
 
 /// Most placements of groups in a scene.
 pub(super) const MAX_INSTANCES: u64 = 100_000_000;
@@ -14,10 +15,17 @@ pub(super) const MAX_INSTANCES: u64 = 100_000_000;
 pub(super) struct Objects<'a> {
     /// Objects; each holds only those before it.
     pub objects: &'a [ObjectDesc],
-    /// By object, what moves within: groups with their placements.
-    pub moving: &'a [Vec<(GroupId, Vec<Affine3A>)>],
+    /// By object, what moves within, or is far from its origin: groups with their placements.
+    pub moving: &'a [Vec<(GroupId, Vec<DAffine3>)>],
     /// Opening and closing of the shutter as fractions of the motion.
     pub shutter: [f32; 2],
+    /// The point of the world that is the origin of the space which is rendered.
+    pub origin: DVec3,
+}
+
+/// Placements in the space that is rendered, of a group whose space has its origin at a point of its own.
+pub(super) fn rendered(placements: &[DAffine3], origin: DVec3, of_group: DVec3) -> Vec<Affine3A> {
+    placements.iter().map(|m| rebased(m, origin, of_group).as_affine3a()).collect()
 }
 
 /// Placements of groups.
@@ -66,17 +74,20 @@ impl Objects<'_> {
             return Err(format!("objects within objects make {all} instances; at most {MAX_INSTANCES} are"));
         }
         let mut placed = Placed { instances: Vec::with_capacity(all as usize), flat: Vec::new() };
-        for instance in instances {
+        for asked in instances {
             // Not by recursion: nothing limits how deep objects nest
-            let mut open = vec![(instance.object, instance.ctm.samples(self.shutter))];
+            let mut open = vec![(asked.object, asked.ctm.samples(self.shutter))];
             while let Some((object, placement)) = open.pop() {
+                let instance = |group: GroupId, placement: &[DAffine3]| Instance {
+                    group,
+                    world_from_group: rendered(placement, self.origin, DVec3::ZERO),
+                };
                 for (group, within) in &self.moving[object] {
-                    let world_from_group = compose_placements(&placement, within);
-                    placed.push(Instance { group: *group, world_from_group }, instance.span);
+                    placed.push(instance(*group, &compose_placements(&placement, within)), asked.span);
                 }
                 let within = |i: &InstanceDesc| compose_placements(&placement, &i.ctm.samples(self.shutter));
                 open.extend(self.objects[object].instances.iter().map(|i| (i.object, within(i))));
-                placed.push(Instance { group: object as GroupId, world_from_group: placement }, instance.span);
+                placed.push(instance(object as GroupId, &placement), asked.span);
             }
         }
         Ok(placed)

@@ -13,7 +13,7 @@ use lumiris_formats::names::{file_in, nfc};
 use lumiris_formats::pbrt::directive::Name;
 use lumiris_formats::pbrt::params::{ParamSet, ParamType};
 use lumiris_formats::source::Span;
-use lumiris_numbers::math::{Affine3A, Mat3, Rgb, Vec3};
+use lumiris_numbers::math::{DAffine3, DMat3, DVec3, Mat3, Rgb, Vec3};
 use std::f32::consts::PI;
 use std::sync::Arc;
 
@@ -56,23 +56,23 @@ impl Builder<'_> {
         self.color_param(p, name, SpectrumUse::Illuminant, d).unwrap_or_else(|| self.white())
     }
 
-    fn point(&self, p: &ParamSet, world_from_light: &Affine3A, scale: f32, d: &mut Diagnostics) -> Option<Light> {
+    fn point(&self, p: &ParamSet, world_from_light: &DAffine3, scale: f32, d: &mut Diagnostics) -> Option<Light> {
         let intensity = self.emitted(p, "I", d) * scale;
-        let from = p.triple("from", ParamType::Point3, d).map_or(Vec3::ZERO, Vec3::from_array);
+        let from = p.point("from", d).unwrap_or(DVec3::ZERO);
         let power = p.float("power", d).unwrap_or(0.0);
         let factor = if power > 0.0 { power / (4.0 * PI) } else { 1.0 };
-        Some(Light::Point { p: world_from_light.transform_point3(from), intensity: intensity * factor })
+        Some(Light::Point { p: world_from_light.transform_point3(from).as_vec3(), intensity: intensity * factor })
     }
 
-    fn spot(&self, p: &ParamSet, world_from_light: &Affine3A, scale: f32, d: &mut Diagnostics) -> Option<Light> {
+    fn spot(&self, p: &ParamSet, world_from_light: &DAffine3, scale: f32, d: &mut Diagnostics) -> Option<Light> {
         let intensity = self.emitted(p, "I", d) * scale;
-        let from = p.triple("from", ParamType::Point3, d).map_or(Vec3::ZERO, Vec3::from_array);
-        let to = p.triple("to", ParamType::Point3, d).map_or(Vec3::Z, Vec3::from_array);
+        let from = p.point("from", d).unwrap_or(DVec3::ZERO);
+        let to = p.point("to", d).unwrap_or(DVec3::Z);
         let cone = p.float("coneangle", d).unwrap_or(30.0);
         let delta = p.float("conedeltaangle", d).or_else(|| p.float("conedelta", d)).unwrap_or(5.0);
         let power = p.float("power", d).unwrap_or(0.0);
         let (p0, p1) = (world_from_light.transform_point3(from), world_from_light.transform_point3(to));
-        let Some(axis) = (p1 - p0).try_normalize() else {
+        let Some(axis) = (p1 - p0).as_vec3().try_normalize() else {
             d.error(p.span_of("to"), "the light and what it points at are the same point");
             return None;
         };
@@ -83,15 +83,15 @@ impl Builder<'_> {
         let cos_total = cone.to_radians().cos();
         let cos_falloff_start = (cone - delta).clamp(0.0, cone).to_radians().cos();
         let factor = if power > 0.0 { power / spot_solid_angle(cos_total, cos_falloff_start) } else { 1.0 };
-        Some(Light::Spot { p: p0, axis, cos_total, cos_falloff_start, intensity: intensity * factor })
+        Some(Light::Spot { p: p0.as_vec3(), axis, cos_total, cos_falloff_start, intensity: intensity * factor })
     }
 
-    fn distant(&self, p: &ParamSet, world_from_light: &Affine3A, scale: f32, d: &mut Diagnostics) -> Option<Light> {
+    fn distant(&self, p: &ParamSet, world_from_light: &DAffine3, scale: f32, d: &mut Diagnostics) -> Option<Light> {
         let l = self.emitted(p, "L", d) * scale;
-        let from = p.triple("from", ParamType::Point3, d).map_or(Vec3::ZERO, Vec3::from_array);
-        let to = p.triple("to", ParamType::Point3, d).map_or(Vec3::Z, Vec3::from_array);
+        let from = p.point("from", d).unwrap_or(DVec3::ZERO);
+        let to = p.point("to", d).unwrap_or(DVec3::Z);
         let illuminance = p.float("illuminance", d).unwrap_or(0.0);
-        let Some(wi_world) = world_from_light.transform_vector3(from - to).try_normalize() else {
+        let Some(wi_world) = world_from_light.transform_vector3(from - to).as_vec3().try_normalize() else {
             d.error(p.span_of("to"), "`from` and `to` are the same point");
             return None;
         };
@@ -103,11 +103,11 @@ impl Builder<'_> {
     fn infinite(
         &mut self,
         p: &ParamSet,
-        world_from_light: &Affine3A,
+        world_from_light: &DAffine3,
         scale: f32,
         d: &mut Diagnostics,
     ) -> Option<Light> {
-        let portal = portal(p, d);
+        let portal = self.portal(p, d);
         self.portals.extend(portal.map(|portal| (portal, p.span_of("portal"))));
         let illuminance = p.float("illuminance", d).unwrap_or(0.0);
         let color = self.color_param(p, "L", SpectrumUse::Illuminant, d);
@@ -127,16 +127,26 @@ impl Builder<'_> {
         Some(self.wait_for_image((&name, span), ImageUse::Environment { illuminance, portal }, world_from_light, scale))
     }
 
+    /// `portal`: corners in world space, whatever the current transformation is.
+    fn portal(&self, p: &ParamSet, d: &mut Diagnostics) -> Option<Portal> {
+        let param = p.get("portal", &[ParamType::Point3], d)?;
+        let corners = param.doubles().unwrap_or_default().chunks_exact(3).map(DVec3::from_slice);
+        let corners: Vec<Vec3> = corners.map(|corner| (corner - self.origin).as_vec3()).collect();
+        let portal =
+            <[Vec3; 4]>::try_from(corners).map_err(|_| "a portal has four corners".to_owned()).and_then(Portal::new);
+        portal.map_err(|reason| d.error(param.value_span, reason)).ok()
+    }
+
     /// A light that keeps the place of another one until the image of that is there.
     fn wait_for_image(
         &mut self,
         (name, span): (&str, Span),
         image_use: ImageUse,
-        world_from_light: &Affine3A,
+        world_from_light: &DAffine3,
         scale: f32,
     ) -> Light {
         let (path, index) = (file_in(&self.folder, name), self.lights.len());
-        let world_from_light = *world_from_light;
+        let world_from_light = world_from_light.as_affine3a();
         self.environments.push(EnvironmentDesc { path, span, image_use, world_from_light, scale, index });
         Light::InfiniteConstant { l: Rgb::BLACK }
     }
@@ -145,14 +155,14 @@ impl Builder<'_> {
     fn goniometric(
         &mut self,
         p: &ParamSet,
-        world_from_light: &Affine3A,
+        world_from_light: &DAffine3,
         scale: f32,
         d: &mut Diagnostics,
     ) -> Option<Light> {
         let intensity = self.emitted(p, "I", d);
         let power = p.float("power", d).unwrap_or(0.0);
         let name = image_of(p, "goniometric", d)?;
-        let swap = Affine3A::from_mat3(Mat3::from_cols(Vec3::X, Vec3::Z, Vec3::Y));
+        let swap = DAffine3::from_mat3(DMat3::from_cols(DVec3::X, DVec3::Z, DVec3::Y));
         let image_use = ImageUse::Goniometric { intensity, power };
         Some(self.wait_for_image((&name, p.span_of("filename")), image_use, &(*world_from_light * swap), scale))
     }
@@ -161,7 +171,7 @@ impl Builder<'_> {
     fn projection(
         &mut self,
         p: &ParamSet,
-        world_from_light: &Affine3A,
+        world_from_light: &DAffine3,
         scale: f32,
         d: &mut Diagnostics,
     ) -> Option<Light> {
@@ -172,7 +182,7 @@ impl Builder<'_> {
             d.error(p.span_of("fov"), format!("fov must be above 0 and below 180 degrees, not {fov}"));
             return None;
         }
-        let flip = Affine3A::from_scale(Vec3::new(1.0, -1.0, 1.0));
+        let flip = DAffine3::from_scale(DVec3::new(1.0, -1.0, 1.0));
         let image_use = ImageUse::Projection { fov, power };
         Some(self.wait_for_image((&name, p.span_of("filename")), image_use, &(*world_from_light * flip), scale))
     }
@@ -201,15 +211,6 @@ impl Builder<'_> {
         let l = color.unwrap_or_else(|| if image.is_some() { Rgb::WHITE } else { self.white() });
         Some(AreaLightDesc { l: l * scale, two_sided, image, power, group, span: p.span })
     }
-}
-
-/// `portal`: corners in world space, whatever the current transformation is.
-fn portal(p: &ParamSet, d: &mut Diagnostics) -> Option<Portal> {
-    let param = p.get("portal", &[ParamType::Point3], d)?;
-    let corners: Vec<Vec3> = param.floats().unwrap_or_default().chunks_exact(3).map(Vec3::from_slice).collect();
-    let portal =
-        <[Vec3; 4]>::try_from(corners).map_err(|_| "a portal has four corners".to_owned()).and_then(Portal::new);
-    portal.map_err(|reason| d.error(param.value_span, reason)).ok()
 }
 
 /// The same radiance from everywhere beyond a portal.

@@ -1,7 +1,7 @@
 //! `MakeNamedMedium` and `MediumInterface`.
 
 use super::checks::unknown;
-use super::descriptions::{MediumDesc, MediumNames, ShapeDesc};
+use super::descriptions::{MediumDesc, MediumNames, PendingMedium, ShapeDesc};
 use super::media_presets;
 use super::spectrum::SpectrumUse;
 use super::state::Builder;
@@ -15,7 +15,7 @@ use lumiris_formats::diagnostic::Diagnostics;
 use lumiris_formats::pbrt::directive::Name;
 use lumiris_formats::pbrt::params::{ParamSet, ParamType};
 use lumiris_formats::spectra::{Y_INTEGRAL, glow_rgb};
-use lumiris_numbers::math::{Affine3A, Bounds3, Rgb, Vec3};
+use lumiris_numbers::math::{DAffine3, DVec3, Rgb};
 use std::collections::HashMap;
 use std::sync::Arc;
 
@@ -48,8 +48,8 @@ impl MediaInUse {
 }
 
 impl Builder<'_> {
-    /// `MakeNamedMedium "name"`
-    pub fn make_named_medium(&mut self, name: Name, p: &mut ParamSet, d: &mut Diagnostics) {
+    /// `MakeNamedMedium "name"`, of which media are made at the end of the text.
+    pub fn make_named_medium(&mut self, name: Name, params: ParamSet, d: &mut Diagnostics) {
         if name.text.is_empty() {
             d.error(name.span, "a medium needs a name");
         }
@@ -58,11 +58,17 @@ impl Builder<'_> {
             let message = format!("medium `{}` is defined twice", name.text);
             d.error(name.span, message).label(first.name.span, "first defined here");
         }
-        let world_from_medium = self.still_transform("media", name.span, d);
+        self.pending_media.push(PendingMedium { index: self.media.len(), params, state: self.param_state() });
+        self.media.push(MediumDesc { name, medium: None, volume: None });
+    }
+
+    /// Makes a medium, when it is known where the space that is rendered has its origin.
+    pub(super) fn make_medium(&mut self, index: usize, p: &mut ParamSet, d: &mut Diagnostics) {
+        let span = self.media[index].name.span;
+        let world_from_medium = self.still_transform("media", span, d);
         let kind = p.string("type", d).unwrap_or("homogeneous").to_owned();
-        if kind != "homogeneous" && !self.has_inverse("a medium of a grid", name.span, d) {
+        if kind != "homogeneous" && !self.has_inverse("a medium of a grid", span, d) {
             p.ignore_all();
-            self.media.push(MediumDesc { name, medium: None, volume: None });
             return;
         }
         let mut volume = None;
@@ -83,7 +89,7 @@ impl Builder<'_> {
             }
         };
         p.report_unused(d);
-        self.media.push(MediumDesc { name, medium, volume });
+        (self.media[index].medium, self.media[index].volume) = (medium, volume);
     }
 
     /// σ_a and σ_s with the scale; 1 where the file says nothing.
@@ -119,7 +125,7 @@ impl Builder<'_> {
         Some(Medium::Homogeneous(Homogeneous { sigma_a, sigma_s, le, g }))
     }
 
-    fn uniform_grid(&self, p: &mut ParamSet, placement: &Affine3A, d: &mut Diagnostics) -> Option<Medium> {
+    fn uniform_grid(&self, p: &mut ParamSet, placement: &DAffine3, d: &mut Diagnostics) -> Option<Medium> {
         let scale = not_negative(p, "scale", 1.0, d);
         let g = asymmetry(p, d);
         let bounds = bounds(p, d);
@@ -151,7 +157,7 @@ impl Builder<'_> {
         Some(Medium::Heterogeneous(Arc::new(Heterogeneous::new(Field::Uniform(grid), bounds?, placement, g))))
     }
 
-    fn rgb_grid(&self, p: &ParamSet, placement: &Affine3A, d: &mut Diagnostics) -> Option<Medium> {
+    fn rgb_grid(&self, p: &ParamSet, placement: &DAffine3, d: &mut Diagnostics) -> Option<Medium> {
         let scale = not_negative(p, "scale", 1.0, d);
         let le_scale = not_negative(p, "Lescale", 1.0, d);
         let g = asymmetry(p, d);
@@ -172,7 +178,7 @@ impl Builder<'_> {
         Some(Medium::Heterogeneous(Arc::new(Heterogeneous::new(Field::Rgb(grid), bounds?, placement, g))))
     }
 
-    fn cloud(&self, p: &ParamSet, placement: &Affine3A, d: &mut Diagnostics) -> Option<Medium> {
+    fn cloud(&self, p: &ParamSet, placement: &DAffine3, d: &mut Diagnostics) -> Option<Medium> {
         let g = asymmetry(p, d);
         let bounds = bounds(p, d);
         let density = not_negative(p, "density", 1.0, d);
@@ -265,16 +271,16 @@ pub(super) fn asymmetry(p: &ParamSet, d: &mut Diagnostics) -> f32 {
     g
 }
 
-/// The box between `p0` and `p1`, in the space of the medium.
-fn bounds(p: &ParamSet, d: &mut Diagnostics) -> Option<Bounds3> {
-    let mut corner = |key, default| p.triple(key, ParamType::Point3, d).map_or(default, Vec3::from_array);
-    let (a, b) = (corner("p0", Vec3::ZERO), corner("p1", Vec3::ONE));
-    let size = (b - a).abs();
+/// The box between `p0` and `p1`, in the space of the medium: its least and its greatest corner.
+fn bounds(p: &ParamSet, d: &mut Diagnostics) -> Option<[DVec3; 2]> {
+    let mut corner = |key, default| p.point(key, d).unwrap_or(default);
+    let (a, b) = (corner("p0", DVec3::ZERO), corner("p1", DVec3::ONE));
+    let size = (b - a).abs().as_vec3();
     if !(size.min_element() > 0.0 && size.is_finite()) {
         d.error(p.span_of("p1"), "p0 and p1 must differ along every axis");
         return None;
     }
-    Some(Bounds3 { min: a.min(b), max: a.max(b) })
+    Some([a.min(b), a.max(b)])
 }
 
 fn resolution(p: &ParamSet, d: &mut Diagnostics) -> Option<[usize; 3]> {

@@ -15,6 +15,8 @@ use lumiris_formats::diagnostic::Diagnostics;
 use lumiris_formats::pbrt::directive::Name;
 use lumiris_formats::pbrt::params::ParamSet;
 use lumiris_formats::source::Span;
+use lumiris_numbers::math::origin::{near_origin, rebased};
+use lumiris_numbers::math::{Affine3A, DAffine3, DVec3};
 use std::path::{Path, PathBuf};
 
 /// The options as far as they were read.
@@ -68,6 +70,11 @@ impl Options {
         self.camera = Some((Pending { name, params }, ctm));
         self.folder = folder.to_owned();
         self.camera_medium = medium;
+    }
+
+    /// The origin of the space that is rendered: near to the camera, where its motion starts.
+    pub fn origin(&self) -> DVec3 {
+        self.camera.as_ref().map_or(DVec3::ZERO, |(_, ctm)| near_origin(affine(&ctm.start.inverse()).translation))
     }
 
     /// The files that the camera names.
@@ -170,10 +177,11 @@ impl Options {
         let Some((Pending { name, params }, ctm)) = &self.camera else {
             let aspect = resolution[0] as f32 / resolution[1] as f32;
             let window = default_screen_window(aspect);
-            let camera = Camera::perspective(affine(&Ctm::IDENTITY.start), 90.0, window, resolution, 0.0, 1e6);
+            let camera = Camera::perspective(Affine3A::IDENTITY, 90.0, window, resolution, 0.0, 1e6);
             return Some((camera, [0.0, 1.0], 1.0));
         };
-        let world_from_camera = affine(&ctm.start.inverse());
+        let to_render_space = |m: &DAffine3| rebased(m, self.origin(), DVec3::ZERO).as_affine3a();
+        let world_from_camera = to_render_space(&affine(&ctm.start.inverse()));
         let open = params.float("shutteropen", d).unwrap_or(0.0);
         let close = params.float("shutterclose", d).unwrap_or(1.0);
         if !(open < close) {
@@ -217,7 +225,8 @@ impl Options {
             }
         };
         params.report_unused(d);
-        let camera = camera?.moving(&ctm.inverse().samples(frame.shutter));
+        let places: Vec<Affine3A> = ctm.inverse().samples(frame.shutter).iter().map(to_render_space).collect();
+        let camera = camera?.moving(&places);
         Some((camera, frame.shutter, close - open))
     }
 }
@@ -241,12 +250,7 @@ fn warn_without_effect(name: &Name, d: &mut Diagnostics) {
     d.warning_once(name.span, format!("option `{}` has no effect here", name.text));
 }
 
-fn perspective(
-    p: &ParamSet,
-    world_from_camera: &lumiris_numbers::math::Affine3A,
-    frame: &CameraFrame,
-    d: &mut Diagnostics,
-) -> Option<Camera> {
+fn perspective(p: &ParamSet, world_from_camera: &Affine3A, frame: &CameraFrame, d: &mut Diagnostics) -> Option<Camera> {
     let mut fov = p.float("fov", d).unwrap_or(90.0);
     if let Some(half) = p.float("halffov", d) {
         d.warning_once(p.span_of("halffov"), "halffov is pbrt-v3; pbrt-v4 writes fov");

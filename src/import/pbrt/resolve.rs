@@ -4,7 +4,7 @@
 //! pbrt-v4 makes textures of images first, then the others of floats and those of spectra, each in the order of the
 //! text: a texture refers to those that are made before it, so that none can contain itself.
 
-use super::descriptions::{InstanceDesc, LateInstance, ParamState};
+use super::descriptions::{InstanceDesc, LateInstance, ParamState, PendingMedium};
 use super::state::Builder;
 use crate::materials::{Material, MaterialId};
 use crate::textures::FloatTextureId;
@@ -13,7 +13,7 @@ use lumiris_formats::source::Span;
 use std::collections::HashMap;
 
 impl Builder<'_> {
-    /// What the parameters of a texture or a material mean something by, here.
+    /// What the parameters of a texture, a material or a medium mean something by, here.
     pub(super) fn param_state(&self) -> ParamState {
         ParamState { ctm: self.state.ctm, color_space: self.state.color_space }
     }
@@ -24,10 +24,18 @@ impl Builder<'_> {
 
     /// Makes and finds all that has a name.
     pub fn resolve(&mut self, d: &mut Diagnostics) {
+        self.make_media(d);
         self.make_textures(d);
         self.make_materials(d);
         self.fill_late_textures(d);
         self.place_late_instances(d);
+    }
+
+    fn make_media(&mut self, d: &mut Diagnostics) {
+        for PendingMedium { index, mut params, state } in std::mem::take(&mut self.pending_media) {
+            self.set_param_state(state);
+            self.make_medium(index, &mut params, d);
+        }
     }
 
     fn make_textures(&mut self, d: &mut Diagnostics) {

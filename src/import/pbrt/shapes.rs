@@ -15,8 +15,9 @@ use lumiris_formats::pbrt::directive::Name;
 use lumiris_formats::pbrt::params::{Input, ParamSet, ParamType};
 use lumiris_formats::ply::{PlyError, PlyMesh};
 use lumiris_formats::source::Span;
+use lumiris_numbers::math::origin::{near_origin, rebased, relative};
 use lumiris_numbers::math::transform::{swaps_handedness, transform_normal};
-use lumiris_numbers::math::{Affine3A, Vec2, Vec3};
+use lumiris_numbers::math::{Affine3A, DAffine3, DVec3, Vec2, Vec3};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -25,6 +26,8 @@ use std::sync::Arc;
 pub struct Made {
     /// The shapes: a PLY file may hold triangles and patches.
     pub shapes: Vec<Shape>,
+    /// Their origin: that of the space which is rendered, but in objects and for what moves one near to the shapes.
+    pub origin: DVec3,
     /// Warnings.
     pub warnings: Vec<String>,
 }
@@ -105,6 +108,7 @@ impl Builder<'_> {
                 name,
                 span: p.span,
                 ctm: self.state.ctm,
+                origin: self.origin,
                 reverse_orientation: self.state.reverse_orientation,
                 material: self.state.material.clone(),
                 area_light: self.state.area_light.clone().filter(|_| !is_curve),
@@ -122,7 +126,11 @@ impl Builder<'_> {
     fn can_be_placed(&self, source: &ShapeSource, kind: &str, span: Span, d: &mut Diagnostics) -> bool {
         match source {
             _ if self.state.ctm.is_moving() => self.has_inverse(&format!("a moving {kind}"), span, d),
-            ShapeSource::Quadric(quadric) if placed_quadric(*quadric, &affine(&self.state.ctm.start)).is_some() => true,
+            ShapeSource::Quadric(quadric)
+                if placed_quadric(*quadric, &affine(&self.state.ctm.start).as_affine3a()).is_some() =>
+            {
+                true
+            }
             ShapeSource::Quadric(_) | ShapeSource::Curves(_) => self.has_inverse(&format!("a {kind}"), span, d),
             ShapeSource::Mesh(_) | ShapeSource::Ply(_) | ShapeSource::Loop(..) | ShapeSource::Bilinear(_) => true,
         }
@@ -194,22 +202,18 @@ fn quadric(kind: &str, p: &ParamSet, d: &mut Diagnostics) -> Option<QuadricKind>
     }
 }
 
-const POINTS: &[ParamType] = &[ParamType::Point3];
 const VECTORS: &[ParamType] = &[ParamType::Vector3];
 const NORMALS: &[ParamType] = &[ParamType::Normal];
 const UVS: &[ParamType] = &[ParamType::Point2, ParamType::Float];
 
 fn vec3s(p: &mut ParamSet, name: &'static str, types: &[ParamType], d: &mut Diagnostics) -> Option<Vec<Vec3>> {
     let floats = p.take_floats(name, types, d)?;
-    // Room for the element that a mesh adds.
-    let mut out = Vec::with_capacity(floats.len() / 3 + 1);
-    out.extend(floats.chunks_exact(3).map(Vec3::from_slice));
-    Some(out)
+    Some(floats.chunks_exact(3).map(Vec3::from_slice).collect())
 }
 
-/// The vertices of a mesh; without them the rest of it is nothing to speak of.
-fn positions(p: &mut ParamSet, d: &mut Diagnostics) -> Option<Vec<Vec3>> {
-    let positions = vec3s(p, "P", POINTS, d);
+/// The vertices of a mesh, and their origin; without them the rest of it is nothing to speak of.
+fn positions(p: &mut ParamSet, d: &mut Diagnostics) -> Option<(Vec<Vec3>, DVec3)> {
+    let positions = p.points("P", d).map(relative);
     if positions.is_none() {
         d.error(p.span, format!("{} needs `point3 P`", p.owner));
         p.ignore_all();
@@ -271,7 +275,7 @@ fn face_numbers(p: &mut ParamSet, count: usize, d: &mut Diagnostics) -> Vec<u32>
 }
 
 fn mesh_data(p: &mut ParamSet, d: &mut Diagnostics) -> Option<MeshData> {
-    let positions = positions(p, d)?;
+    let (positions, origin) = positions(p, d)?;
     let count = positions.len();
     let normals = vec3s(p, "N", NORMALS, d).unwrap_or_default();
     let tangents = vec3s(p, "S", VECTORS, d).unwrap_or_default();
@@ -285,11 +289,12 @@ fn mesh_data(p: &mut ParamSet, d: &mut Diagnostics) -> Option<MeshData> {
         tangents: per_vertex(tangents, count, "S", p, d),
         uvs: per_vertex(uvs, count, "uv", p, d),
         positions,
+        origin,
     })
 }
 
 fn patch_data(p: &mut ParamSet, d: &mut Diagnostics) -> Option<PatchData> {
-    let positions = positions(p, d)?;
+    let (positions, origin) = positions(p, d)?;
     let count = positions.len();
     let normals = vec3s(p, "N", NORMALS, d).unwrap_or_default();
     let uvs = uvs(p, d);
@@ -301,13 +306,26 @@ fn patch_data(p: &mut ParamSet, d: &mut Diagnostics) -> Option<PatchData> {
         normals: per_vertex(normals, count, "N", p, d),
         uvs: per_vertex(uvs, count, "uv", p, d),
         positions,
+        origin,
     })
 }
 
 impl ShapeDesc {
-    /// The placement of the shape in its group: the transformation, or nothing if an instance moves it.
-    fn group_from_object(&self) -> Affine3A {
-        if self.ctm.is_moving() { Affine3A::IDENTITY } else { affine(&self.ctm.start) }
+    /// How numbers relative to `origin` come into the group: by the transformation, unless an instance moves the shape.
+    fn placement(&self, origin: DVec3) -> Placement {
+        let is_moving = self.ctm.is_moving();
+        let m = if is_moving { DAffine3::IDENTITY } else { affine(&self.ctm.start) };
+        let is_still = self.object.is_none() && !is_moving;
+        let group_origin = if is_still { self.origin } else { near_origin(m.transform_point3(origin)) };
+        // pbrt flips where the transformation of the shape mirrors, moving or not.
+        let flip = self.reverse_orientation ^ swaps_handedness(&affine(&self.ctm.start).as_affine3a());
+        Placement {
+            group_from_object: rebased(&m, group_origin, origin).as_affine3a(),
+            group_origin,
+            textured_from_object: rebased(&m, self.origin, origin),
+            flip,
+            reverse: self.reverse_orientation,
+        }
     }
 
     /// Makes the shapes in the space of their group; `mesh` reads a PLY file, `textures` displace. Takes the arrays out of `self`.
@@ -316,26 +334,26 @@ impl ShapeDesc {
         mesh: &dyn Fn(&Path) -> Result<Arc<PlyMesh>, PlyError>,
         textures: &TextureSet,
     ) -> Result<Made, ShapeError> {
-        let m = self.group_from_object();
-        // pbrt flips where the transformation of the shape mirrors, moving or not.
-        let reverse = self.reverse_orientation;
-        let flip = reverse ^ swaps_handedness(&affine(&self.ctm.start));
-        let placement = Placement { group_from_object: m, flip, reverse };
         let displacement = self.displacement;
-        let finished = |data: MeshData| match &displacement {
-            Some(displacement) => displaced(data, displacement, (&m, textures)).map_err(ShapeError::Wrong),
+        let finished = |data: MeshData, placement: &Placement| match &displacement {
+            Some(displacement) => displaced(data, displacement, (placement, textures)).map_err(ShapeError::Wrong),
             None => Ok(data),
         };
         let source = std::mem::replace(&mut self.source, ShapeSource::Mesh(MeshData::default()));
         let wrong = |reason: String| ShapeError::Wrong(reason);
-        let mut made = Made::default();
+        let mut warnings = Vec::new();
+        let mut shapes = Vec::new();
+        let placement;
         match source {
             ShapeSource::Quadric(kind) => {
-                let quadric = placed_quadric(kind, &m).ok_or_else(|| wrong("the shape is flattened".to_owned()))?;
-                made.shapes.push(Shape::Quadric(Quadric { flip_normal: flip, ..quadric }));
+                placement = self.placement(DVec3::ZERO);
+                let quadric = placed_quadric(kind, &placement.group_from_object)
+                    .ok_or_else(|| wrong("the shape is flattened".to_owned()))?;
+                shapes.push(Shape::Quadric(Quadric { flip_normal: placement.flip, ..quadric }));
             }
             ShapeSource::Mesh(data) => {
-                made.shapes.push(Shape::Mesh(triangles(finished(data)?, &placement).map_err(wrong)?));
+                placement = self.placement(data.origin);
+                shapes.push(Shape::Mesh(triangles(finished(data, &placement)?, &placement).map_err(wrong)?));
             }
             ShapeSource::Loop(data, levels) => {
                 let faces = data.indices.len() as u64 * 4_u64.saturating_pow(levels);
@@ -344,6 +362,7 @@ impl ShapeDesc {
                         "{levels} levels make {faces} triangles; at most 200 million are"
                     )));
                 }
+                placement = self.placement(data.origin);
                 let mesh = loop_subdivide(levels, data.positions, data.indices).map_err(wrong)?;
                 let fine = MeshData {
                     positions: mesh.positions().to_vec(),
@@ -351,17 +370,24 @@ impl ShapeDesc {
                     indices: mesh.indices,
                     ..MeshData::default()
                 };
-                made.shapes.push(Shape::Mesh(triangles(finished(fine)?, &placement).map_err(wrong)?));
+                shapes.push(Shape::Mesh(triangles(finished(fine, &placement)?, &placement).map_err(wrong)?));
             }
-            ShapeSource::Curves(data) => made.shapes.push(Shape::Curves(placed(data, &m).map_err(wrong)?)),
-            ShapeSource::Bilinear(data) => made.shapes.push(patches(data, &placement).map_err(wrong)?),
+            ShapeSource::Curves(data) => {
+                placement = self.placement(data.origin);
+                shapes.push(Shape::Curves(placed(data, &placement.group_from_object).map_err(wrong)?));
+            }
+            ShapeSource::Bilinear(data) => {
+                placement = self.placement(data.origin);
+                shapes.push(patches(data, &placement).map_err(wrong)?);
+            }
             ShapeSource::Ply(path) => {
                 let ply = mesh(&path).map_err(|error| match error {
                     PlyError::Io { source, .. } => ShapeError::Missing(path.clone(), source.to_string()),
                     other => ShapeError::Wrong(format!("{}: {other}", path.display())),
                 })?;
                 let mut ply = Arc::unwrap_or_clone(ply);
-                made.warnings = ply.warnings.iter().map(|w| format!("{}: {w}", path.display())).collect();
+                placement = self.placement(ply.origin);
+                warnings = ply.warnings.iter().map(|w| format!("{}: {w}", path.display())).collect();
                 if displacement.is_some() {
                     let halves = ply.quads.drain(..).flat_map(|[a, b, c, d]| [[a, b, c], [a, c, d]]);
                     ply.triangles.extend(halves);
@@ -374,8 +400,9 @@ impl ShapeDesc {
                         normals: ply.normals.clone(),
                         uvs: ply.uvs.clone(),
                         faces: std::mem::take(&mut ply.quad_numbers),
+                        origin: ply.origin,
                     };
-                    made.shapes.push(patches(data, &placement).map_err(wrong)?);
+                    shapes.push(patches(data, &placement).map_err(wrong)?);
                 }
                 if !ply.triangles.is_empty() {
                     let data = MeshData {
@@ -385,12 +412,13 @@ impl ShapeDesc {
                         tangents: Vec::new(),
                         uvs: ply.uvs,
                         faces: ply.triangle_numbers,
+                        origin: ply.origin,
                     };
-                    made.shapes.push(Shape::Mesh(triangles(finished(data)?, &placement).map_err(wrong)?));
+                    shapes.push(Shape::Mesh(triangles(finished(data, &placement)?, &placement).map_err(wrong)?));
                 }
             }
         }
-        Ok(made)
+        Ok(Made { shapes, origin: placement.group_origin, warnings })
     }
 }
 
@@ -428,6 +456,10 @@ fn place_normals(normals: &mut [Vec3], m: &Affine3A, reverse: bool) {
 /// How a shape comes into its group.
 struct Placement {
     group_from_object: Affine3A,
+    group_origin: DVec3,
+    /// Into the space that textures of places go by: that which is rendered, as if what moves or is in an object stood where
+    /// it is defined.
+    textured_from_object: DAffine3,
     /// The geometric normal is reversed.
     flip: bool,
     /// `ReverseOrientation`, which reverses given normals as well.
@@ -438,13 +470,14 @@ struct Placement {
 fn displaced(
     data: MeshData,
     displacement: &DisplacementDesc,
-    (group_from_object, textures): (&Affine3A, &TextureSet),
+    (placement, textures): (&Placement, &TextureSet),
 ) -> Result<MeshData, String> {
     let mut mesh = DisplacedMesh::new(data.positions, data.normals, data.uvs, data.indices)?;
+    let Placement { group_from_object, textured_from_object, .. } = placement;
     let length = |a: Vec3, b: Vec3| group_from_object.transform_vector3(a - b).length();
     mesh.refine(length, displacement.edge_length, MAX_TRIANGLES)?;
     mesh.displace(|p, n, uv| {
-        let (p, n) = (group_from_object.transform_point3(p), transform_normal(group_from_object, n));
+        let (p, n) = (textured_from_object.transform_point3(p.as_dvec3()), transform_normal(group_from_object, n));
         let point = TextureContext { uv, uv_width: Vec2::ZERO, uv1: Vec2::ZERO, color: [1.0; 4], face: 0, p, n };
         textures.float(displacement.texture, &point)
     });

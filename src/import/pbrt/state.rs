@@ -2,7 +2,7 @@
 
 use super::descriptions::{
     AreaLightDesc, EnvironmentDesc, InstanceDesc, Interior, LateInstance, MaterialDesc, MaterialUse, MediumDesc,
-    MediumNames, ObjectDesc, ShapeDesc, ShapeSource, TextureDesc,
+    MediumNames, ObjectDesc, PendingMedium, ShapeDesc, ShapeSource, TextureDesc,
 };
 use super::options::Options;
 use super::texture_names::TextureNames;
@@ -18,7 +18,8 @@ use lumiris_formats::diagnostic::Diagnostics;
 use lumiris_formats::pbrt::directive::{ActiveTimes, AttributeTarget};
 use lumiris_formats::pbrt::params::Param;
 use lumiris_formats::source::Span;
-use lumiris_numbers::math::{Affine3A, Rgb};
+use lumiris_numbers::math::origin::rebased;
+use lumiris_numbers::math::{DAffine3, DVec3, Rgb};
 use std::cell::RefCell;
 use std::collections::{BTreeMap, HashMap};
 use std::path::{Path, PathBuf};
@@ -90,6 +91,9 @@ pub struct Builder<'a> {
     pub(super) coordinate_systems: HashMap<String, Ctm>,
     /// Camera, film, sampler, integrator.
     pub options: Options,
+    /// The point of the world that is the origin of the space which is rendered: near to the camera, and known where the
+    /// world begins.
+    pub origin: DVec3,
     /// Textures so far.
     pub textures: TextureSet,
     /// Names of float textures.
@@ -112,6 +116,8 @@ pub struct Builder<'a> {
     pub media: Vec<MediumDesc>,
     /// Indices of media by name.
     pub(super) medium_names: HashMap<String, usize>,
+    /// Media that wait for the end of the text: they may be defined before the camera.
+    pub(super) pending_media: Vec<PendingMedium>,
     /// Lights that are no surfaces.
     pub lights: Vec<Light>,
     /// Their groups.
@@ -166,6 +172,7 @@ impl<'a> Builder<'a> {
             stack: Vec::new(),
             coordinate_systems: HashMap::new(),
             options: Options::default(),
+            origin: DVec3::ZERO,
             textures,
             float_textures: TextureNames::new("float"),
             rgb_textures: TextureNames::new("spectrum"),
@@ -177,6 +184,7 @@ impl<'a> Builder<'a> {
             interiors: HashMap::new(),
             media: Vec::new(),
             medium_names: HashMap::new(),
+            pending_media: Vec::new(),
             lights: Vec::new(),
             light_groups: Vec::new(),
             environments: Vec::new(),
@@ -223,12 +231,13 @@ impl<'a> Builder<'a> {
         has
     }
 
-    /// The current transformation of something that cannot move; a motion is reported and left out.
-    pub fn still_transform(&self, what: &str, span: Span, diagnostics: &mut Diagnostics) -> Affine3A {
+    /// The current transformation, to the space that is rendered, of something that cannot move; a motion is reported and
+    /// left out.
+    pub fn still_transform(&self, what: &str, span: Span, diagnostics: &mut Diagnostics) -> DAffine3 {
         if self.state.ctm.is_moving() {
             diagnostics.warning_once(span, format!("moving {what} are not rendered: it stays where it starts"));
         }
-        affine(&self.state.ctm.start)
+        rebased(&affine(&self.state.ctm.start), self.origin, DVec3::ZERO)
     }
 }
 

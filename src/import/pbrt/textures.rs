@@ -15,7 +15,8 @@ use lumiris_formats::names::file_in;
 use lumiris_formats::pbrt::directive::Name;
 use lumiris_formats::pbrt::params::{Input, ParamSet, ParamType, SpectrumValue};
 use lumiris_formats::source::Span;
-use lumiris_numbers::math::{Affine3A, Rgb, Vec2, Vec3};
+use lumiris_numbers::math::origin::rebased;
+use lumiris_numbers::math::{DAffine3, DVec3, Rgb, Vec2, Vec3};
 
 /// Textures that may refer to each other in a chain.
 const MAX_DEPTH: u32 = 500;
@@ -176,7 +177,7 @@ impl Builder<'_> {
 
     fn direction(&self, p: &ParamSet, d: &mut Diagnostics) -> Vec3 {
         let dir = p.triple("dir", ParamType::Vector3, d).map_or(Vec3::Y, Vec3::from_array);
-        affine(&self.state.ctm.start).transform_vector3(dir).normalize_or(Vec3::Y)
+        affine(&self.state.ctm.start).transform_vector3(dir.as_dvec3()).as_vec3().normalize_or(Vec3::Y)
     }
 
     fn checker_mapping(&self, p: &ParamSet, d: &mut Diagnostics) -> CheckerboardMapping {
@@ -191,10 +192,10 @@ impl Builder<'_> {
     }
 
     /// For textures that depend on the point, which cannot be flattened.
-    fn texture_from_world(&self, p: &ParamSet, d: &mut Diagnostics) -> Affine3A {
+    fn texture_from_world(&self, p: &ParamSet, d: &mut Diagnostics) -> DAffine3 {
         match self.has_inverse("a texture in space", p.span, d) {
-            true => affine(&self.state.ctm.start.inverse()),
-            false => Affine3A::IDENTITY,
+            true => rebased(&affine(&self.state.ctm.start.inverse()), DVec3::ZERO, self.origin),
+            false => DAffine3::IDENTITY,
         }
     }
 

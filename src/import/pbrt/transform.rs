@@ -1,7 +1,8 @@
-//! The current transformation matrix, at the start and at the end of the motion.
+//! The current transformation matrix, at the start and at the end of the motion. It is f64, from the text to the space that
+//! is rendered, so that transformations may lead far away and back.
 
 use lumiris_formats::pbrt::directive::{ActiveTimes, DirectiveKind};
-use lumiris_numbers::math::{Affine3A, Mat3, Mat4, Quat, Vec3};
+use lumiris_numbers::math::{DAffine3, DMat3, DMat4, DQuat, DVec3};
 
 /// Placements between start and end that a turning motion is sampled at; between samples it is linear.
 const ROTATION_SAMPLES: usize = 17;
@@ -10,14 +11,14 @@ const ROTATION_SAMPLES: usize = 17;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ctm {
     /// At the start time.
-    pub start: Mat4,
+    pub start: DMat4,
     /// At the end time.
-    pub end: Mat4,
+    pub end: DMat4,
 }
 
 impl Ctm {
     /// No transformation.
-    pub const IDENTITY: Ctm = Ctm { start: Mat4::IDENTITY, end: Mat4::IDENTITY };
+    pub const IDENTITY: Ctm = Ctm { start: DMat4::IDENTITY, end: DMat4::IDENTITY };
 
     /// True if it moves.
     pub fn is_moving(&self) -> bool {
@@ -25,7 +26,7 @@ impl Ctm {
     }
 
     /// Applies `change` to the active times.
-    pub fn apply(&mut self, active: ActiveTimes, change: impl Fn(Mat4) -> Mat4) {
+    pub fn apply(&mut self, active: ActiveTimes, change: impl Fn(DMat4) -> DMat4) {
         if active != ActiveTimes::End {
             self.start = change(self.start);
         }
@@ -48,13 +49,15 @@ impl Ctm {
     pub fn is_invertible(&self) -> bool {
         [self.start, self.end].iter().all(|m| {
             let scale = m.x_axis.length() * m.y_axis.length() * m.z_axis.length();
-            m.is_finite() && m.determinant().abs() > f32::MIN_POSITIVE && m.determinant().abs() > 1e-12 * scale
+            m.as_mat4().is_finite()
+                && m.determinant().abs() > f64::from(f32::MIN_POSITIVE)
+                && m.determinant().abs() > 1e-12 * scale
         })
     }
 
     /// The placements at equidistant times 0..=1 of the shutter, which opens and closes at the given fractions of
     /// the motion: one if nothing moves, two if nothing turns, else enough to follow the turn.
-    pub fn samples(&self, shutter: [f32; 2]) -> Vec<Affine3A> {
+    pub fn samples(&self, shutter: [f32; 2]) -> Vec<DAffine3> {
         if !self.is_moving() {
             return vec![affine(&self.start)];
         }
@@ -63,7 +66,7 @@ impl Ctm {
         let count = if turns { ROTATION_SAMPLES } else { 2 };
         let at = |i: usize| {
             let t = shutter[0] + (shutter[1] - shutter[0]) * i as f32 / (count - 1) as f32;
-            a.interpolate(&b, t.clamp(0.0, 1.0))
+            a.interpolate(&b, f64::from(t.clamp(0.0, 1.0)))
         };
         (0..count).map(at).collect()
     }
@@ -71,21 +74,21 @@ impl Ctm {
 
 /// A matrix as translation · rotation · rest, which is how pbrt interpolates motion [Shoemake and Duff 1992].
 struct Parts {
-    translation: Vec3,
-    rotation: Quat,
-    stretch: Mat3,
+    translation: DVec3,
+    rotation: DQuat,
+    stretch: DMat3,
 }
 
 impl Parts {
-    fn new(m: &Mat4) -> Self {
-        let linear = Mat3::from_mat4(*m);
+    fn new(m: &DMat4) -> Self {
+        let linear = DMat3::from_mat4(*m);
         // Polar decomposition by averaging with the inverse transpose.
         let mut r = linear;
         for _ in 0..100 {
             let next = (r + r.inverse().transpose()) * 0.5;
-            let change = (next - r).to_cols_array().iter().fold(0.0_f32, |m, x| m.max(x.abs()));
+            let change = (next - r).to_cols_array().iter().fold(0.0_f64, |m, x| m.max(x.abs()));
             r = next;
-            if change < 1e-7 {
+            if change < 1e-14 {
                 break;
             }
         }
@@ -93,46 +96,46 @@ impl Parts {
         if r.determinant() < 0.0 {
             r *= -1.0;
         }
-        Parts { translation: m.w_axis.truncate(), rotation: Quat::from_mat3(&r), stretch: r.inverse() * linear }
+        Parts { translation: m.w_axis.truncate(), rotation: DQuat::from_mat3(&r), stretch: r.inverse() * linear }
     }
 
-    fn interpolate(&self, other: &Parts, t: f32) -> Affine3A {
-        let rotation = Mat3::from_quat(self.rotation.slerp(other.rotation, t));
+    fn interpolate(&self, other: &Parts, t: f64) -> DAffine3 {
+        let rotation = DMat3::from_quat(self.rotation.slerp(other.rotation, t));
         let stretch = self.stretch * (1.0 - t) + other.stretch * t;
-        Affine3A::from_mat3_translation(rotation * stretch, self.translation.lerp(other.translation, t))
+        DAffine3::from_mat3_translation(rotation * stretch, self.translation.lerp(other.translation, t))
     }
 }
 
 /// The affine part of a matrix.
-pub fn affine(m: &Mat4) -> Affine3A {
-    Affine3A::from_mat4(*m)
+pub fn affine(m: &DMat4) -> DAffine3 {
+    DAffine3::from_mat4(*m)
 }
 
 /// The matrix that a transform directive multiplies or sets; `None` for other directives, `Err` with a reason if its
 /// numbers make no transform.
-pub fn matrix_of(kind: &DirectiveKind) -> Option<Result<Mat4, &'static str>> {
+pub fn matrix_of(kind: &DirectiveKind) -> Option<Result<DMat4, &'static str>> {
     Some(match kind {
-        DirectiveKind::Identity => Ok(Mat4::IDENTITY),
-        DirectiveKind::Translate(v) => Ok(Mat4::from_translation(Vec3::from_array(*v))),
-        DirectiveKind::Scale(v) => Ok(Mat4::from_scale(Vec3::from_array(*v))),
-        DirectiveKind::Rotate([degrees, x, y, z]) => match Vec3::new(*x, *y, *z).try_normalize() {
-            Some(axis) => Ok(Mat4::from_axis_angle(axis, degrees.to_radians())),
+        DirectiveKind::Identity => Ok(DMat4::IDENTITY),
+        DirectiveKind::Translate(v) => Ok(DMat4::from_translation(DVec3::from_array(*v))),
+        DirectiveKind::Scale(v) => Ok(DMat4::from_scale(DVec3::from_array(*v))),
+        DirectiveKind::Rotate([degrees, x, y, z]) => match DVec3::new(*x, *y, *z).try_normalize() {
+            Some(axis) => Ok(DMat4::from_axis_angle(axis, degrees.to_radians())),
             None => Err("the axis of a rotation must not be zero"),
         },
         DirectiveKind::LookAt(v) => look_at(v),
-        DirectiveKind::Transform(m) | DirectiveKind::ConcatTransform(m) => Ok(Mat4::from_cols_array(m)),
+        DirectiveKind::Transform(m) | DirectiveKind::ConcatTransform(m) => Ok(DMat4::from_cols_array(m)),
         _ => return None,
     })
 }
 
 /// pbrt's `LookAt`: camera space is left-handed, x right, y up, z forward.
-fn look_at(v: &[f32; 9]) -> Result<Mat4, &'static str> {
-    let (eye, target, up) = (Vec3::new(v[0], v[1], v[2]), Vec3::new(v[3], v[4], v[5]), Vec3::new(v[6], v[7], v[8]));
+fn look_at(v: &[f64; 9]) -> Result<DMat4, &'static str> {
+    let (eye, target, up) = (DVec3::new(v[0], v[1], v[2]), DVec3::new(v[3], v[4], v[5]), DVec3::new(v[6], v[7], v[8]));
     let forward = (target - eye).try_normalize().ok_or("the eye and the target are the same point")?;
     let up = up.try_normalize().ok_or("the up vector is zero")?;
     let right = up.cross(forward).try_normalize().ok_or("the up vector points along the view")?;
     let world_from_camera =
-        Mat4::from_cols(right.extend(0.0), forward.cross(right).extend(0.0), forward.extend(0.0), eye.extend(1.0));
+        DMat4::from_cols(right.extend(0.0), forward.cross(right).extend(0.0), forward.extend(0.0), eye.extend(1.0));
     Ok(world_from_camera.inverse())
 }
 
@@ -143,37 +146,46 @@ mod tests {
     #[test]
     fn look_at_puts_the_target_on_the_positive_z_axis() {
         let m = look_at(&[1.0, 2.0, 3.0, 4.0, 2.0, 3.0, 0.0, 0.0, 1.0]).unwrap();
-        assert!((m.transform_point3(Vec3::new(4.0, 2.0, 3.0)) - Vec3::new(0.0, 0.0, 3.0)).length() < 1e-5);
-        assert!((m.transform_vector3(Vec3::Z) - Vec3::Y).length() < 1e-6);
+        assert!((m.transform_point3(DVec3::new(4.0, 2.0, 3.0)) - DVec3::new(0.0, 0.0, 3.0)).length() < 1e-5);
+        assert!((m.transform_vector3(DVec3::Z) - DVec3::Y).length() < 1e-6);
         // Left-handed: looking along +x with z up, the image's right is +y.
-        assert!((m.transform_vector3(Vec3::Y) - Vec3::X).length() < 1e-6);
+        assert!((m.transform_vector3(DVec3::Y) - DVec3::X).length() < 1e-6);
         assert!(look_at(&[0.0; 9]).is_err());
     }
 
     #[test]
+    fn a_camera_far_away_is_where_it_was_put() {
+        let eye = DVec3::new(1e7 + 0.3, -4e6, 5e5 + 0.1);
+        let at = |p: DVec3| p.to_array();
+        let [[a, b, c], [d, e, f]] = [at(eye), at(eye + DVec3::new(0.5, 2.0, -1.0))];
+        let world_from_camera = affine(&look_at(&[a, b, c, d, e, f, 0.0, 0.0, 1.0]).unwrap().inverse());
+        assert!((world_from_camera.translation - eye).length() < 1e-7, "{}", world_from_camera.translation);
+    }
+
+    #[test]
     fn motion_is_sampled_as_rotation_and_translation() {
-        let turn = |degrees: f32| Mat4::from_rotation_z(degrees.to_radians()) * Mat4::from_scale(Vec3::splat(2.0));
+        let turn = |degrees: f64| DMat4::from_rotation_z(degrees.to_radians()) * DMat4::from_scale(DVec3::splat(2.0));
         let ctm = Ctm { start: turn(0.0), end: turn(90.0) };
         let samples = ctm.samples([0.0, 1.0]);
         assert_eq!(samples.len(), 17);
-        let middle = samples[8].transform_point3(Vec3::X);
-        assert!((middle - Vec3::new(2.0_f32.sqrt(), 2.0_f32.sqrt(), 0.0)).length() < 1e-4, "{middle}");
-        let slide = Ctm { start: Mat4::IDENTITY, end: Mat4::from_translation(Vec3::X) };
+        let middle = samples[8].transform_point3(DVec3::X);
+        assert!((middle - DVec3::new(2.0_f64.sqrt(), 2.0_f64.sqrt(), 0.0)).length() < 1e-4, "{middle}");
+        let slide = Ctm { start: DMat4::IDENTITY, end: DMat4::from_translation(DVec3::X) };
         assert_eq!(slide.samples([0.0, 0.5])[1].translation.x, 0.5);
         assert_eq!(Ctm::IDENTITY.samples([0.0, 1.0]).len(), 1);
     }
 
     #[test]
     fn mirrored_motion_stays_mirrored() {
-        let m = Mat4::from_scale(Vec3::new(-1.0, 1.0, 1.0));
-        let ctm = Ctm { start: m, end: Mat4::from_rotation_y(1.0) * m };
+        let m = DMat4::from_scale(DVec3::new(-1.0, 1.0, 1.0));
+        let ctm = Ctm { start: m, end: DMat4::from_rotation_y(1.0) * m };
         assert!(ctm.samples([0.0, 1.0]).iter().all(|s| s.matrix3.determinant() < -0.9));
     }
 
     #[test]
     fn degenerate_matrices_are_found() {
-        assert!(!Ctm { start: Mat4::from_scale(Vec3::new(1.0, 0.0, 1.0)), end: Mat4::IDENTITY }.is_invertible());
-        assert!(!Ctm { start: Mat4::from_cols_array(&[f32::NAN; 16]), end: Mat4::IDENTITY }.is_invertible());
-        assert!(Ctm { start: Mat4::from_scale(Vec3::splat(1e-5)), end: Mat4::IDENTITY }.is_invertible());
+        assert!(!Ctm { start: DMat4::from_scale(DVec3::new(1.0, 0.0, 1.0)), end: DMat4::IDENTITY }.is_invertible());
+        assert!(!Ctm { start: DMat4::from_cols_array(&[f64::NAN; 16]), end: DMat4::IDENTITY }.is_invertible());
+        assert!(Ctm { start: DMat4::from_scale(DVec3::splat(1e-5)), end: DMat4::IDENTITY }.is_invertible());
     }
 }

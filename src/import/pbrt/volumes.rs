@@ -12,7 +12,7 @@ use lumiris_formats::names::file_in;
 use lumiris_formats::nanovdb::{GridClass, NanoError};
 use lumiris_formats::pbrt::params::ParamSet;
 use lumiris_formats::source::Span;
-use lumiris_numbers::math::{Affine3A, Bounds3, Rgb, Vec3};
+use lumiris_numbers::math::{DAffine3, DVec3, Rgb};
 use rayon::prelude::*;
 use std::collections::{HashMap, HashSet};
 use std::path::Path;
@@ -27,7 +27,7 @@ fn request(path: &Path, grid: &str, usage: VolumeUse) -> VolumeRequest {
 
 impl Builder<'_> {
     /// What the parameters say; `None` after an error.
-    pub(super) fn nanovdb(&self, p: &ParamSet, placement: Affine3A, d: &mut Diagnostics) -> Option<VolumeDesc> {
+    pub(super) fn nanovdb(&self, p: &ParamSet, placement: DAffine3, d: &mut Diagnostics) -> Option<VolumeDesc> {
         let scale = not_negative(p, "scale", 1.0, d);
         let le_scale = not_negative(p, "Lescale", 1.0, d);
         let g = asymmetry(p, d);
@@ -140,11 +140,9 @@ fn medium_of(desc: &VolumeDesc, volumes: &Volumes, d: &mut Diagnostics) -> Optio
 
     // The box of both
     let boxes = [density.bounds, hot.as_ref().and_then(|hot| hot.bounds)].into_iter().flatten();
-    let bounds = boxes.map(|corners| corners.map(|c| Vec3::from_array(c.map(|x| x as f32))));
-    let joined = bounds.reduce(|[a, b], [c, e]| [a.min(c), b.max(e)]);
-    let [min, max] = joined.unwrap_or([Vec3::ZERO, Vec3::ONE]);
-    let bounds = Bounds3 { min, max };
-    let size = bounds.diagonal();
+    let joined = boxes.map(|b| b.map(DVec3::from_array)).reduce(|[a, b], [c, e]| [a.min(c), b.max(e)]);
+    let bounds @ [min, max] = joined.unwrap_or([DVec3::ZERO, DVec3::ONE]);
+    let size = (max - min).as_vec3();
     if !(size.min_element() > 0.0 && size.is_finite()) {
         d.error(desc.span, format!("{}: its box from {min} to {max} has no volume", desc.path.display()));
         return None;

@@ -68,6 +68,7 @@ fn facts(job: &RenderJob) -> Value {
     let per_group: Vec<usize> = set.groups.iter().map(group_triangles).collect();
     let instanced: usize = set.instances.iter().map(|i| per_group[i.group as usize]).sum();
     let bounds = set.world_bounds();
+    let bounds = [bounds.min, bounds.max].map(|corner| (corner.as_dvec3() + scene.origin).to_array());
     let mut materials: BTreeMap<&str, usize> = BTreeMap::new();
     for entry in scene.materials.entries() {
         *materials.entry(entry.material.kind_name()).or_default() += 1;
@@ -86,7 +87,7 @@ fn facts(job: &RenderJob) -> Value {
             "triangles": triangles, "quadrics": quadrics, "patches": patches,
             "groups": set.groups.len(), "instances": set.instances.len(),
             "triangles_with_instances": group_triangles(&set.root) + instanced,
-            "bounds": [bounds.min.to_array(), bounds.max.to_array()],
+            "bounds": bounds,
         },
         "materials": materials,
         "lights": lights,

@@ -137,7 +137,12 @@ impl<'a> Place<'a> {
 
     /// A finite number.
     pub fn number(&self) -> Option<f32> {
-        self.value()?.number().map(|v| v as f32).filter(|v| v.is_finite())
+        self.double().map(|v| v as f32)
+    }
+
+    /// As [`Self::number`] with the precision of f64, in the range of f32.
+    pub fn double(&self) -> Option<f64> {
+        self.value()?.number().filter(|v| (*v as f32).is_finite())
     }
 
     /// An integer that is not negative, which may be written with a fraction of 0.
@@ -175,12 +180,17 @@ impl<'a> Place<'a> {
 
     /// An array of numbers, as many as asked for.
     pub fn numbers<const N: usize>(&self) -> Option<[f32; N]> {
+        self.doubles().map(|numbers| numbers.map(|v| v as f32))
+    }
+
+    /// As [`Self::numbers`] with the precision of f64, in the range of f32.
+    pub fn doubles<const N: usize>(&self) -> Option<[f64; N]> {
         if self.len() != N {
             return None;
         }
         let mut numbers = [0.0; N];
         for (number, item) in numbers.iter_mut().zip(self.items()) {
-            *number = item.number()?;
+            *number = item.double()?;
         }
         Some(numbers)
     }

@@ -35,7 +35,7 @@ impl Arguments<'_> {
     }
 
     /// `N` numbers, in brackets or not.
-    pub fn numbers<const N: usize>(&mut self, lexer: &mut Lexer<'_>, keyword: &str) -> Result<[f32; N], Reported> {
+    pub fn numbers<const N: usize>(&mut self, lexer: &mut Lexer<'_>, keyword: &str) -> Result<[f64; N], Reported> {
         let bracketed = self.peek(lexer)?.is_some_and(|t| t.kind == TokenKind::Open);
         let start = lexer.position();
         if bracketed {
@@ -43,11 +43,11 @@ impl Arguments<'_> {
         }
         let mut values = Vec::with_capacity(N);
         if bracketed {
-            lexer.numbers_f32(&mut values).map_err(|e| self.report(e))?;
+            lexer.numbers_f64(&mut values).map_err(|e| self.report(e))?;
             self.close_bracket(lexer)?;
         } else {
             for _ in 0..N {
-                values.push(lexer.number_f32().map_err(|e| self.report(e))?);
+                values.push(lexer.number_f64().map_err(|e| self.report(e))?);
             }
         }
         let (count, span) = (values.len(), lexer.span(start, lexer.position()));
@@ -59,9 +59,9 @@ impl Arguments<'_> {
 
     /// An affine matrix, column after column. pbrt divides points by w, so a last row 0 0 0 w is made 0 0 0 1; any
     /// other would be a projection.
-    pub fn matrix(&mut self, lexer: &mut Lexer<'_>, keyword: &str) -> Result<[f32; 16], Reported> {
+    pub fn matrix(&mut self, lexer: &mut Lexer<'_>, keyword: &str) -> Result<[f64; 16], Reported> {
         let start = self.peek(lexer)?.map_or(lexer.position(), |t| t.span.start as usize);
-        let m: [f32; 16] = self.numbers(lexer, keyword)?;
+        let m: [f64; 16] = self.numbers(lexer, keyword)?;
         let last_row = [m[3], m[7], m[11], m[15]];
         let [x, y, z, w] = last_row;
         if [x, y, z] != [0.0; 3] || w == 0.0 {
@@ -248,6 +248,15 @@ impl Arguments<'_> {
                     lexer.number_i32().map(|value| values.push(value))
                 };
                 read.map_err(|e| self.report(e)).map(|()| Values::Integers(values))
+            }
+            ParamType::Point3 => {
+                let mut values = Vec::new();
+                let read = if bracketed {
+                    lexer.numbers_f64(&mut values)
+                } else {
+                    lexer.number_f64().map(|value| values.push(value))
+                };
+                read.map_err(|e| self.report(e)).map(|()| Values::Doubles(values))
             }
             _ => {
                 let mut values = Vec::new();

@@ -44,12 +44,12 @@ pub enum AttributeTarget {
 #[allow(missing_docs, reason = "the variants are pbrt's directives")]
 pub enum DirectiveKind {
     Identity,
-    Translate([f32; 3]),
-    Scale([f32; 3]),
-    Rotate([f32; 4]),
-    LookAt([f32; 9]),
-    Transform([f32; 16]),
-    ConcatTransform([f32; 16]),
+    Translate([f64; 3]),
+    Scale([f64; 3]),
+    Rotate([f64; 4]),
+    LookAt([f64; 9]),
+    Transform([f64; 16]),
+    ConcatTransform([f64; 16]),
     CoordinateSystem(Name),
     CoordSysTransform(Name),
     ActiveTransform(ActiveTimes),

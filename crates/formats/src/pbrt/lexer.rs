@@ -3,7 +3,7 @@
 //! The text is bytes; bytes outside ASCII may occur in strings and comments only. Words, quoted strings and brackets
 //! are tokens; lists of numbers are parsed without creating tokens.
 
-use crate::number::{NumberError, is_delimiter, parse_f32, parse_i32};
+use crate::number::{NumberError, is_delimiter, parse_f32, parse_f64, parse_i32};
 use crate::source::{FileId, Span};
 use std::borrow::Cow;
 
@@ -145,6 +145,11 @@ impl<'a> Lexer<'a> {
         self.numbers(out, parse_f32, "a number")
     }
 
+    /// As [`Lexer::numbers_f32`] with the precision of f64.
+    pub fn numbers_f64(&mut self, out: &mut Vec<f64>) -> Result<(), LexError> {
+        self.numbers(out, parse_f64, "a number")
+    }
+
     /// As [`Lexer::numbers_f32`] for whole numbers.
     pub fn numbers_i32(&mut self, out: &mut Vec<i32>) -> Result<(), LexError> {
         self.numbers(out, parse_i32, "a whole number")
@@ -153,6 +158,11 @@ impl<'a> Lexer<'a> {
     /// Reads one number.
     pub fn number_f32(&mut self) -> Result<f32, LexError> {
         self.number(parse_f32, "a number")
+    }
+
+    /// Reads one number with the precision of f64.
+    pub fn number_f64(&mut self) -> Result<f64, LexError> {
+        self.number(parse_f64, "a number")
     }
 
     /// Reads one whole number.

@@ -6,6 +6,7 @@
 use crate::color_space::ColorSpace;
 use crate::diagnostic::{Diagnostics, similar_parameter};
 use crate::source::Span;
+use lumiris_numbers::math::DVec3;
 use std::cell::{Cell, RefCell};
 
 /// The type that a parameter declares.
@@ -109,8 +110,10 @@ impl ParamType {
 /// The values of a parameter.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Values {
-    /// Numbers of all types but `integer`.
+    /// Numbers of all types but `integer` and `point3`.
     Floats(Vec<f32>),
+    /// Numbers of `point3`: points may be far from the origin, compared with their distances.
+    Doubles(Vec<f64>),
     /// `integer`.
     Integers(Vec<i32>),
     /// `bool`.
@@ -124,6 +127,7 @@ impl Values {
     pub fn len(&self) -> usize {
         match self {
             Values::Floats(v) => v.len(),
+            Values::Doubles(v) => v.len(),
             Values::Integers(v) => v.len(),
             Values::Bools(v) => v.len(),
             Values::Strings(v) => v.len(),
@@ -142,6 +146,7 @@ impl Values {
         }
         match self {
             Values::Floats(v) => text(v),
+            Values::Doubles(v) => text(v),
             Values::Integers(v) => text(v),
             Values::Bools(v) => text(v),
             Values::Strings(v) => text(v),
@@ -310,7 +315,7 @@ impl ParamSet {
     pub fn integer(&self, name: &'static str, diagnostics: &mut Diagnostics) -> Option<i32> {
         match &self.get_one(name, &[ParamType::Integer], diagnostics)?.values {
             Values::Integers(v) => v.first().copied(),
-            Values::Floats(_) | Values::Bools(_) | Values::Strings(_) => None,
+            Values::Floats(_) | Values::Doubles(_) | Values::Bools(_) | Values::Strings(_) => None,
         }
     }
 
@@ -318,7 +323,7 @@ impl ParamSet {
     pub fn boolean(&self, name: &'static str, diagnostics: &mut Diagnostics) -> Option<bool> {
         match &self.get_one(name, &[ParamType::Bool], diagnostics)?.values {
             Values::Bools(v) => v.first().copied(),
-            Values::Floats(_) | Values::Integers(_) | Values::Strings(_) => None,
+            Values::Floats(_) | Values::Doubles(_) | Values::Integers(_) | Values::Strings(_) => None,
         }
     }
 
@@ -331,11 +336,26 @@ impl ParamSet {
     pub fn strings(&self, name: &'static str, diagnostics: &mut Diagnostics) -> Option<&[String]> {
         match &self.get(name, &[ParamType::String], diagnostics)?.values {
             Values::Strings(v) => Some(v),
-            Values::Floats(_) | Values::Integers(_) | Values::Bools(_) => None,
+            Values::Floats(_) | Values::Doubles(_) | Values::Integers(_) | Values::Bools(_) => None,
         }
     }
 
-    /// One triple of a three-dimensional type.
+    /// One point.
+    pub fn point(&self, name: &'static str, diagnostics: &mut Diagnostics) -> Option<DVec3> {
+        let point: [f64; 3] = self.get_one(name, &[ParamType::Point3], diagnostics)?.doubles()?.try_into().ok()?;
+        Some(DVec3::from_array(point))
+    }
+
+    /// The points of an array.
+    pub fn points(
+        &self,
+        name: &'static str,
+        diagnostics: &mut Diagnostics,
+    ) -> Option<impl ExactSizeIterator<Item = DVec3> + Clone> {
+        Some(self.get(name, &[ParamType::Point3], diagnostics)?.doubles()?.chunks_exact(3).map(DVec3::from_slice))
+    }
+
+    /// One triple of a three-dimensional type other than `point3`.
     pub fn triple(&self, name: &'static str, ty: ParamType, diagnostics: &mut Diagnostics) -> Option<[f32; 3]> {
         self.get_one(name, &[ty], diagnostics).and_then(|p| p.floats()?.try_into().ok())
     }
@@ -355,7 +375,7 @@ impl ParamSet {
         self.get(name, types, diagnostics)?;
         match &mut self.params.iter_mut().find(|p| p.name == name)?.values {
             Values::Floats(v) => Some(std::mem::take(v)),
-            Values::Integers(_) | Values::Bools(_) | Values::Strings(_) => None,
+            Values::Doubles(_) | Values::Integers(_) | Values::Bools(_) | Values::Strings(_) => None,
         }
     }
 
@@ -364,7 +384,7 @@ impl ParamSet {
         self.get(name, &[ParamType::Integer], diagnostics)?;
         match &mut self.params.iter_mut().find(|p| p.name == name)?.values {
             Values::Integers(v) => Some(std::mem::take(v)),
-            Values::Floats(_) | Values::Bools(_) | Values::Strings(_) => None,
+            Values::Floats(_) | Values::Doubles(_) | Values::Bools(_) | Values::Strings(_) => None,
         }
     }
 
@@ -380,7 +400,7 @@ impl ParamSet {
         match &param.values {
             Values::Strings(v) => v.first().map(|t| Input::Texture(t)),
             Values::Floats(v) => v.first().map(|&x| Input::Value(x)),
-            Values::Integers(_) | Values::Bools(_) => None,
+            Values::Doubles(_) | Values::Integers(_) | Values::Bools(_) => None,
         }
     }
 
@@ -425,11 +445,19 @@ const SPECTRUM_OR_TEXTURE: &[ParamType] =
     &[ParamType::Rgb, ParamType::Spectrum, ParamType::Texture, ParamType::Blackbody, ParamType::Xyz];
 
 impl Param {
-    /// The numbers, if they are not integers.
+    /// The numbers of points.
+    pub fn doubles(&self) -> Option<&[f64]> {
+        match &self.values {
+            Values::Doubles(v) => Some(v),
+            Values::Floats(_) | Values::Integers(_) | Values::Bools(_) | Values::Strings(_) => None,
+        }
+    }
+
+    /// The numbers, if they are neither integers nor those of points.
     pub fn floats(&self) -> Option<&[f32]> {
         match &self.values {
             Values::Floats(v) => Some(v),
-            Values::Integers(_) | Values::Bools(_) | Values::Strings(_) => None,
+            Values::Doubles(_) | Values::Integers(_) | Values::Bools(_) | Values::Strings(_) => None,
         }
     }
 
@@ -440,7 +468,7 @@ impl Param {
     fn first_string(&self) -> Option<&str> {
         match &self.values {
             Values::Strings(v) => v.first().map(String::as_str),
-            Values::Floats(_) | Values::Integers(_) | Values::Bools(_) => None,
+            Values::Floats(_) | Values::Doubles(_) | Values::Integers(_) | Values::Bools(_) => None,
         }
     }
 

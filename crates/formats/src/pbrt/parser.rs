@@ -155,7 +155,7 @@ impl Parser<'_> {
             "LookAt" => D::LookAt(self.arguments().numbers(lexer, keyword)?),
             "Transform" => D::Transform(self.arguments().matrix(lexer, keyword)?),
             "ConcatTransform" => D::ConcatTransform(self.arguments().matrix(lexer, keyword)?),
-            "TransformTimes" => D::TransformTimes(self.arguments().numbers(lexer, keyword)?),
+            "TransformTimes" => D::TransformTimes(self.arguments().numbers(lexer, keyword)?.map(|t| t as f32)),
             "ActiveTransform" => D::ActiveTransform(self.arguments().active_times(lexer)?),
             "CoordinateSystem" => D::CoordinateSystem(self.arguments().name(lexer, keyword)?),
             "CoordSysTransform" => D::CoordSysTransform(self.arguments().name(lexer, keyword)?),

@@ -18,7 +18,7 @@ mod wedges;
 
 use crate::gzip;
 use header::{Encoding, Header};
-use lumiris_numbers::math::{Vec2, Vec3};
+use lumiris_numbers::math::{DVec3, Vec2, Vec3};
 use numbers::{Ascii, Binary, Numbers};
 use std::fmt;
 use std::fs::File;
@@ -29,8 +29,10 @@ use stream::Stream;
 /// What a PLY file holds.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct PlyMesh {
-    /// Vertex positions, all finite; there is capacity for one more.
+    /// Vertex positions relative to `origin`, all finite; there is capacity for one more.
     pub positions: Vec<Vec3>,
+    /// An origin near to the vertices: numbers of double precision keep it until this is subtracted.
+    pub origin: DVec3,
     /// Normals as written, one per vertex, or empty.
     pub normals: Vec<Vec3>,
     /// Texture coordinates, one per vertex, or empty.

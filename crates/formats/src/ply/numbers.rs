@@ -3,7 +3,7 @@
 use super::header::{Element, Property, Scalar};
 use super::stream::Stream;
 use super::{Place, PlyError};
-use crate::number::{NumberError, parse_f32, parse_i32};
+use crate::number::{NumberError, parse_f32, parse_f64, parse_i32};
 
 /// Longest word of a text (bytes).
 const MAX_WORD: usize = 256;
@@ -27,6 +27,9 @@ pub(super) trait Numbers<'a> {
 
     /// The next number.
     fn float(&mut self, ty: Scalar, element: &str) -> Result<f32, PlyError>;
+
+    /// As [`Numbers::float`] with the precision of f64.
+    fn double(&mut self, ty: Scalar, element: &str) -> Result<f64, PlyError>;
 
     /// The next number, which should be whole.
     fn integer(&mut self, ty: Scalar, element: &str) -> Result<i64, PlyError>;
@@ -88,14 +91,14 @@ macro_rules! number_at {
 }
 pub(super) use number_at;
 
-/// The number of type `ty` at the offset `at`, as a float.
+/// The number of type `ty` at the offset `at`.
 #[inline]
-pub(super) fn float_at<const BIG: bool>(bytes: &[u8], at: usize, ty: Scalar) -> f32 {
+pub(super) fn double_at<const BIG: bool>(bytes: &[u8], at: usize, ty: Scalar) -> f64 {
     match ty {
-        Scalar::F32 => number_at!(f32, BIG, bytes, at),
-        Scalar::F64 => number_at!(f64, BIG, bytes, at) as f32,
+        Scalar::F32 => f64::from(number_at!(f32, BIG, bytes, at)),
+        Scalar::F64 => number_at!(f64, BIG, bytes, at),
         Scalar::I8 | Scalar::U8 | Scalar::I16 | Scalar::U16 | Scalar::I32 | Scalar::U32 => {
-            integer_at::<BIG>(bytes, at, ty) as f32
+            integer_at::<BIG>(bytes, at, ty) as f64
         }
     }
 }
@@ -132,7 +135,12 @@ impl<'a, const BIG: bool> Numbers<'a> for Binary<'_, 'a, BIG> {
 
     #[inline]
     fn float(&mut self, ty: Scalar, element: &str) -> Result<f32, PlyError> {
-        let value = float_at::<BIG>(self.0.require(ty.size(), element)?, 0, ty);
+        self.double(ty, element).map(|value| value as f32)
+    }
+
+    #[inline]
+    fn double(&mut self, ty: Scalar, element: &str) -> Result<f64, PlyError> {
+        let value = double_at::<BIG>(self.0.require(ty.size(), element)?, 0, ty);
         self.0.consume(ty.size());
         Ok(value)
     }
@@ -221,11 +229,19 @@ fn word_length(bytes: &[u8]) -> usize {
 /// As [`parse_f32`], and also `nan` and `inf` in their spellings, which exporters write for broken vertices.
 #[inline]
 fn parse_any_f32(bytes: &[u8]) -> Result<(f32, usize), NumberError> {
-    parse_f32(bytes).or_else(|error| odd_f32(&bytes[..word_length(bytes)], error))
+    parse_f32(bytes).or_else(|error| odd_float(&bytes[..word_length(bytes)], error))
+}
+
+/// As [`parse_any_f32`] with the precision of f64.
+#[inline]
+fn parse_any_f64(bytes: &[u8]) -> Result<(f64, usize), NumberError> {
+    parse_f64(bytes).or_else(|error| {
+        odd_float(&bytes[..word_length(bytes)], error).map(|(value, length)| (f64::from(value), length))
+    })
 }
 
 #[cold]
-fn odd_f32(word: &[u8], error: NumberError) -> Result<(f32, usize), NumberError> {
+fn odd_float(word: &[u8], error: NumberError) -> Result<(f32, usize), NumberError> {
     let name = word.strip_prefix(b"-").or(word.strip_prefix(b"+")).unwrap_or(word).to_ascii_lowercase();
     let negative = word.starts_with(b"-");
     let infinity = if negative { f32::NEG_INFINITY } else { f32::INFINITY };
@@ -267,6 +283,11 @@ impl<'a> Numbers<'a> for Ascii<'_, 'a> {
     #[inline]
     fn float(&mut self, _: Scalar, element: &str) -> Result<f32, PlyError> {
         self.word(element, "a number", parse_any_f32)
+    }
+
+    #[inline]
+    fn double(&mut self, _: Scalar, element: &str) -> Result<f64, PlyError> {
+        self.word(element, "a number", parse_any_f64)
     }
 
     #[inline]

@@ -191,7 +191,37 @@ fn signed_values_keep_their_sign() {
                 w.head(&format!("property {} {p}", name(ty, 0)));
             });
             w.numbers(ty, &[value; 3]);
-            assert_eq!(parse_ply(&w.bytes()).unwrap().positions, [Vec3::splat(value as f32)], "{format} {ty:?}");
+            let mesh = parse_ply(&w.bytes()).unwrap();
+            let p = mesh.positions[0].as_dvec3() + mesh.origin;
+            assert_eq!(p.as_vec3(), Vec3::splat(value as f32), "{format} {ty:?}");
+        }
+    }
+}
+
+#[test]
+fn doubles_far_from_the_origin_keep_their_differences() {
+    let at = [4e6, 4e6 + 0.01, 4e6 + 12.37];
+    for format in FORMATS {
+        for with_list in [false, true] {
+            let mut w = Writer::new(format);
+            w.head("element vertex 3\nproperty double x\nproperty double y\nproperty double z");
+            if with_list {
+                w.head("property list uchar uchar weights");
+            }
+            for x in at {
+                w.numbers(F64, &[x, -x, 0.5]);
+                if with_list {
+                    w.list(U8, U8, &[]);
+                }
+                w.end_row();
+            }
+            let mesh = parse_ply(&w.bytes()).unwrap();
+            for (x, near) in at.iter().zip(&mesh.positions) {
+                let p = near.as_dvec3() + mesh.origin;
+                assert!((p - DVec3::new(*x, -x, 0.5)).length() < 1e-5, "{format}: {p}");
+                assert!(near.length() < 120.0, "{format}: {near}");
+            }
+            assert!(mesh.positions.capacity() > 3, "room for the element that a mesh adds");
         }
     }
 }

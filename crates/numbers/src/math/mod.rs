@@ -4,7 +4,7 @@
 //! both unit and both away from the surface; the shading frame has n = +z; transforms are named
 //! `to_from`; colour is linear Rec.709; angles are radians; f32 for light.
 //!
-//! Reading order: [`rgb`], [`frame`], [`transform`], [`ray`], [`bounds`], [`warp`], [`sphere_map`], [`octahedral`],
+//! Reading order: [`rgb`], [`frame`], [`transform`], [`origin`], [`ray`], [`bounds`], [`warp`], [`sphere_map`], [`octahedral`],
 //! [`cumulative`], [`distribution`], [`texel_distribution`], [`bilinear`], [`alias`], [`hash`], [`noise`],
 //! [`number`], [`light_bound`].
 
@@ -19,6 +19,7 @@ pub mod light_bound;
 pub mod noise;
 pub mod number;
 pub mod octahedral;
+pub mod origin;
 pub mod ray;
 pub mod rgb;
 pub mod sphere_map;
@@ -31,7 +32,9 @@ pub use bilinear::{BilinearTables, Blend, ParameterGrid, PiecewiseBilinear2D};
 pub use bounds::Bounds3;
 pub use distribution::{PiecewiseConstant1D, PiecewiseConstant2D, Sample1D, Sample2D};
 pub use frame::Frame;
-pub use glam::{Affine3A, DAffine3, DVec2, DVec3, Mat3, Mat3A, Mat4, Quat, Vec2, Vec3, Vec3A, Vec4};
+pub use glam::{
+    Affine3A, DAffine3, DMat3, DMat4, DQuat, DVec2, DVec3, Mat3, Mat3A, Mat4, Quat, Vec2, Vec3, Vec3A, Vec4,
+};
 pub use ray::Ray;
 pub use rgb::{Rgb, luminance};
 pub use texel_distribution::TexelDistribution;

@@ -1,7 +1,7 @@
 //! Gradient noise in three dimensions [Perlin 2002], with the permutation of that paper, so that clouds are those of
 //! other renderers.
 
-use super::Vec3;
+use super::{DVec3, Vec3};
 
 /// A permutation of 0..=255.
 const PERMUTATION: [u8; 256] = [
@@ -37,9 +37,9 @@ fn corner(cell: [usize; 3], offset: Vec3) -> f32 {
 }
 
 /// Noise of the frequency 1, about −1..1, which is 0 at all integer points.
-pub fn noise(p: Vec3) -> f32 {
+pub fn noise(p: DVec3) -> f32 {
     let base = p.floor();
-    let f = p - base;
+    let f = (p - base).as_vec3();
     let cell: [usize; 3] = std::array::from_fn(|axis| (base[axis] as i64 & 255) as usize);
     let at = |dx: usize, dy: usize, dz: usize| {
         let lattice = [(cell[0] + dx) & 255, (cell[1] + dy) & 255, (cell[2] + dz) & 255];
@@ -55,10 +55,10 @@ pub fn noise(p: Vec3) -> f32 {
 }
 
 /// The gradient of [`noise`], by differences.
-pub fn gradient(p: Vec3) -> Vec3 {
+pub fn gradient(p: DVec3) -> Vec3 {
     let here = noise(p);
-    let along = |axis: Vec3| noise(p + axis * DELTA) - here;
-    Vec3::new(along(Vec3::X), along(Vec3::Y), along(Vec3::Z)) / DELTA
+    let along = |axis: DVec3| noise(p + axis * f64::from(DELTA)) - here;
+    Vec3::new(along(DVec3::X), along(DVec3::Y), along(DVec3::Z)) / DELTA
 }
 
 #[cfg(test)]
@@ -72,9 +72,9 @@ mod tests {
         assert!(seen.iter().all(|&s| s), "a permutation");
         let (mut sum, mut greatest) = (0.0, 0.0_f32);
         for i in 0..40_000 {
-            let p = Vec3::new(i as f32 * 0.137 - 900.0, i as f32 * 0.071, i as f32 * 0.0913 - 7.0);
+            let p = DVec3::new(f64::from(i) * 0.137 - 900.0, f64::from(i) * 0.071, f64::from(i) * 0.0913 - 7.0);
             assert_eq!(noise(p.floor()), 0.0);
-            let (a, b) = (noise(p), noise(p + Vec3::splat(1e-3)));
+            let (a, b) = (noise(p), noise(p + DVec3::splat(1e-3)));
             assert!((a - b).abs() < 1e-2, "{p} {a} {b}");
             sum += a;
             greatest = greatest.max(a.abs());

@@ -1,6 +1,6 @@
 //! Time-dependent transforms, and the transformation of normals.
 
-use glam::{Affine3A, Mat3A, Vec3};
+use glam::{Affine3A, DAffine3, Mat3A, Vec3};
 
 /// Transforms a normal by the inverse transpose of `to_from`; the result is unit, or zero if the map is singular.
 #[inline]
@@ -30,26 +30,42 @@ pub fn lerp_affine(a: &Affine3A, b: &Affine3A, t: f32) -> Affine3A {
 /// is at least one sample.
 #[inline]
 pub fn placement_at(samples: &[Affine3A], time: f32) -> Affine3A {
-    let last = samples.len() - 1;
-    if last == 0 {
-        return samples[0];
+    match segment_at(samples.len(), time) {
+        Some((i, t)) => lerp_affine(&samples[i], &samples[i + 1], t),
+        None => samples[0],
     }
+}
+
+/// Of `count` samples at equidistant times 0..=1, the last one before `time`, and the fraction of the way to the next; `None` of
+/// a single sample.
+#[inline]
+fn segment_at(count: usize, time: f32) -> Option<(usize, f32)> {
+    let last = count - 1;
     let x = time.clamp(0.0, 1.0) * last as f32;
-    let i = (x as usize).min(last - 1);
-    lerp_affine(&samples[i], &samples[i + 1], x - i as f32)
+    let i = (x as usize).min(last.checked_sub(1)?);
+    Some((i, x - i as f32))
 }
 
 /// The placements of something that moves within something that moves. Between samples the product of both is no longer linear, so there
 /// are as many as the finer motion has.
-pub fn compose_placements(outer: &[Affine3A], inner: &[Affine3A]) -> Vec<Affine3A> {
+pub fn compose_placements(outer: &[DAffine3], inner: &[DAffine3]) -> Vec<DAffine3> {
     let count = outer.len().max(inner.len());
     let time = |i: usize| if count == 1 { 0.0 } else { i as f32 / (count - 1) as f32 };
-    (0..count).map(|i| placement_at(outer, time(i)) * placement_at(inner, time(i))).collect()
+    let at = |samples: &[DAffine3], time: f32| match segment_at(samples.len(), time) {
+        Some((i, t)) => {
+            let (a, b, t) = (samples[i], samples[i + 1], f64::from(t));
+            let (matrix3, translation) = (a.matrix3 * (1.0 - t) + b.matrix3 * t, a.translation.lerp(b.translation, t));
+            DAffine3 { matrix3, translation }
+        }
+        None => samples[0],
+    };
+    (0..count).map(|i| at(outer, time(i)) * at(inner, time(i))).collect()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use glam::DVec3;
 
     #[test]
     fn normals_stay_perpendicular_under_shear_and_mirror() {
@@ -63,15 +79,16 @@ mod tests {
 
     #[test]
     fn motions_within_motions_are_products_at_the_times_of_the_finer() {
-        let moves = |steps: usize| -> Vec<Affine3A> {
-            (0..=steps).map(|i| Affine3A::from_translation(Vec3::X * (i as f32 / steps as f32))).collect()
+        let moves = |steps: usize| -> Vec<DAffine3> {
+            (0..=steps).map(|i| DAffine3::from_translation(DVec3::X * (i as f64 / steps as f64))).collect()
         };
-        let turned = Affine3A::from_rotation_z(std::f32::consts::FRAC_PI_2);
+        let turned = DAffine3::from_rotation_z(std::f64::consts::FRAC_PI_2);
+        let single = |made: &[DAffine3]| -> Vec<Affine3A> { made.iter().map(DAffine3::as_affine3a).collect() };
         let made = compose_placements(&moves(1), &moves(4));
         assert_eq!(made.len(), 5);
-        assert_eq!(placement_at(&made, 0.375).translation.x, 0.75);
+        assert_eq!(placement_at(&single(&made), 0.375).translation.x, 0.75);
         let made = compose_placements(&[turned], &moves(2));
-        assert!((placement_at(&made, 0.5).transform_point3(Vec3::ZERO) - Vec3::Y * 0.5).length() < 1e-6);
+        assert!((placement_at(&single(&made), 0.5).transform_point3(Vec3::ZERO) - Vec3::Y * 0.5).length() < 1e-6);
         assert_eq!(compose_placements(&[turned], &[turned]).len(), 1);
     }
 

@@ -53,7 +53,15 @@ fn diffuse_at(world: &World, wo: Vec3, hit: &Hit) -> Option<Seen> {
     let ray = Ray { o: Vec3::ZERO, d: -wo, t_max: f32::INFINITY, time: 0.5 };
     let surface = scene.geometry.surface_hit_of_ray(hit.geometry, hit.primitive, hit.instance, hit.uv, &ray);
     let (uv1, color, face) = (surface.vertex.uv1, surface.vertex.color, surface.vertex.face);
-    let context = TextureContext { uv: surface.uv, uv_width: Vec2::ZERO, uv1, color, face, p: surface.p, n: surface.n };
+    let context = TextureContext {
+        uv: surface.uv,
+        uv_width: Vec2::ZERO,
+        uv1,
+        color,
+        face,
+        p: surface.p.as_dvec3(),
+        n: surface.n,
+    };
     let material = scene.surfaces[hit.geometry as usize].material;
     let bsdf = scene.materials.bsdf(material, &scene.textures, &surface, &context, wo)?;
     let part = bsdf.lambertian(wo).filter(|part| part.rest.is_none())?;

@@ -1,0 +1,64 @@
+//! Origins near to points that are far from the origin of the world.
+//!
+//! An f32 has 24 bits: 10⁷ units from the origin neighbouring numbers are a unit apart. Coordinates and transformations
+//! are therefore f64 until an origin near to them is subtracted. Origins are on a grid of 128 units: what is within 64
+//! units of the origin of the world stays as it is, bit for bit; elsewhere what is near to an origin has coordinates of
+//! up to 64 units, which f32 resolves to 4·10⁻⁶; and short decimals and powers of two stay short.
+
+use super::{DAffine3, DVec3, Vec3};
+
+/// Distance of the origins along each axis.
+const GRID: f64 = 128.0;
+
+/// The origin that is nearest to a point; that of the world if the point is not finite.
+pub fn near_origin(p: DVec3) -> DVec3 {
+    // Adding zero makes −0 positive
+    let origin = (p / GRID).round() * GRID + 0.0;
+    if origin.is_finite() { origin } else { DVec3::ZERO }
+}
+
+/// Points relative to an origin near to them, and this origin. Whatever its place, the point in the middle of the list
+/// chooses it: the first is for some programs a point that no face uses.
+pub fn relative(points: impl ExactSizeIterator<Item = DVec3> + Clone) -> (Vec<Vec3>, DVec3) {
+    let origin = points.clone().nth(points.len() / 2).map_or(DVec3::ZERO, near_origin);
+    // Room for the element that a mesh adds
+    let mut out = Vec::with_capacity(points.len() + 1);
+    out.extend(points.map(|p| (p - origin).as_vec3()));
+    (out, origin)
+}
+
+/// The map between two spaces whose points are relative to the origins `to` and `from`.
+pub fn rebased(to_from: &DAffine3, to: DVec3, from: DVec3) -> DAffine3 {
+    DAffine3 { matrix3: to_from.matrix3, translation: to_from.transform_point3(from) - to }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn points_near_to_the_origin_stay_and_others_come_within_64_units() {
+        assert_eq!(near_origin(DVec3::new(63.9, -63.9, 0.0)), DVec3::ZERO);
+        assert_eq!(near_origin(DVec3::new(1e7, -130.0, 65.0)), DVec3::new(1e7, -128.0, 128.0));
+        assert_eq!(near_origin(DVec3::splat(-0.1)).to_array().map(f64::to_bits), [0; 3]);
+        assert_eq!(near_origin(DVec3::new(f64::NAN, 1e9, 0.0)), DVec3::ZERO);
+        let points = [DVec3::new(0.1, -0.0, 7e30), DVec3::new(0.3, 1.0, 2.0)];
+        let (near, origin) = relative(points.into_iter());
+        assert_eq!(
+            (near[0].to_array().map(f32::to_bits), origin),
+            ([0.1, -0.0, 7e30_f32].map(f32::to_bits), DVec3::ZERO)
+        );
+        let (near, origin) = relative(points.map(|p| p + DVec3::X * 4e6).into_iter());
+        assert_eq!((near[1].x, origin.x), (0.3 + 4e6_f64.rem_euclid(128.0) as f32, 4e6 - 4e6_f64.rem_euclid(128.0)));
+    }
+
+    #[test]
+    fn rebased_maps_lead_to_the_same_points() {
+        let m = DAffine3::from_rotation_x(0.3) * DAffine3::from_translation(DVec3::new(1e7, 2e7, -3e7));
+        let (p, from) = (DVec3::new(0.25, 1.5, -2.0), DVec3::new(128.0, -1e6, 5e6));
+        let expected = m.transform_point3(p + from);
+        let to = near_origin(expected);
+        let made = rebased(&m, to, from).transform_point3(p);
+        assert!((made + to - expected).length() < 1e-7 && made.length() < 200.0, "{made}");
+    }
+}
