@@ -307,7 +307,7 @@ fn flattened_meshes_patches_and_disks_are_flat_and_others_are_errors_with_their_
             assert_eq!(bounds.max.to_array(), [max[0], max[1], 5.0], "{world}");
             assert_eq!((bounds.min.z, geometry.instances.len()), (5.0, 0), "{world}");
             let hit = geometry.surface_hit(geometry.root.geometries[0], 0, u32::MAX, [0.3, 0.2], 0.0);
-            assert_eq!((hit.n.z, hit.ns.z), (1.0, 1.0), "{world}");
+            assert!(hit.n.z > 0.999_999 && hit.ns.z > 0.999_999, "{world}: {hit:?}");
         }
     }
     let flat = |rest: &str| load_with("", &format!("Scale 1 1 0\n{rest}")).unwrap_err();
@@ -327,7 +327,7 @@ fn flattened_meshes_patches_and_disks_are_flat_and_others_are_errors_with_their_
     assert!(error.contains("of the object cannot be flattened") && error.contains("scene.pbrt:6:13"), "{error}");
     let error = load_with("Scale 0 1 1 Camera \"perspective\"", "").unwrap_err();
     assert!(error.contains("a camera cannot be flattened") && error.contains("scene.pbrt:2:13"), "{error}");
-    assert!(load_with("", "Scale 1 1 0 Shape \"disk\" Scale 1e39 1 1").unwrap_err().contains("not finite"));
+    assert!(load_with("", "Scale 1e30 1 1 Scale 1e30 1 1").unwrap_err().contains("not finite"));
 }
 
 #[test]
