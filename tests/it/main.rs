@@ -34,6 +34,7 @@ mod ptex;
 mod roulette;
 mod sample_allocation;
 mod subsurface;
+mod surfaces;
 mod texture_pyramids;
 mod texture_tiles;
 mod udim;

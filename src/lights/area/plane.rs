@@ -33,8 +33,9 @@ impl Plane {
                 let plane = Plane::new(&r.corners(), r.n);
                 Some(Plane { error: plane.error + r.flatness_error, ..plane })
             }
-            AreaShape::Quadric(quadric) => quadric.disk_plane().map(|([center, extent], n)| {
-                Plane { error: n.abs().dot(extent) * ROUNDING, ..Plane::new(&[center], n) }
+            AreaShape::Quadric(quadric) => quadric.disk_plane().map(|([center, extent], n)| Plane {
+                error: n.abs().dot(extent) * ROUNDING,
+                ..Plane::new(&[center], n)
             }),
             AreaShape::Patch(patch) => {
                 let plane = Plane::new(&patch.corners, patch.mean_normal());
