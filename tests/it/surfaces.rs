@@ -13,7 +13,8 @@ use std::sync::atomic::AtomicBool;
 
 /// Red channels of the pixels.
 fn pixels(job: &RenderJob) -> Vec<f64> {
-    let rendering = render(job, &RenderSettings::default(), &AtomicBool::new(false), &|_| ()).unwrap();
+    let settings = RenderSettings { spp: job.settings().sampling.spp, ..RenderSettings::default() };
+    let rendering = render(job, &settings, &AtomicBool::new(false), &|_| ()).unwrap();
     rendering.film.pixels().iter().map(|p| PixelSums::mean(p)[0]).collect()
 }
 
@@ -159,15 +160,16 @@ fn a_flat_emitter_does_not_light_itself() {
 #[test]
 fn a_flat_emitter_does_not_hide_other_light_from_itself() {
     // A sky of 0.5 adds as much; the emitter would hide a sixth of it
-    for at in placements() {
+    for at in placements().into_iter().step_by(2) {
         for (name, shape) in flat_shapes(&at) {
             let lights = r#"LightSource "infinite" "rgb L" [0.5 0.5 0.5] Material "diffuse" "rgb reflectance" [1 1 1]
                 AreaLightSource "diffuse" "rgb L" [1 1 1] "bool twosided" true "#;
-            let mut scene = job(&format!("{}{lights}{shape}", header(&at, 128, 1)), AccelKind::Embree);
+            let mut scene = job(&format!("{}{lights}{shape}", header(&at, 512, 1)), AccelKind::Embree);
             for estimator in [EstimatorKind::Mis, EstimatorKind::Ris] {
                 scene.change(|s| (s.integrator.estimator, s.integrator.samples) = (estimator, Some(2)));
                 let mean = mean(&scene);
-                assert!((mean - 1.5).abs() < 0.03, "{name} at {at:?}: {mean} by {estimator:?}");
+                // Five standard errors; a sixth of the sky is 0.08
+                assert!((mean - 1.5).abs() < 0.04, "{name} at {at:?}: {mean} by {estimator:?}");
             }
         }
     }
@@ -190,10 +192,11 @@ fn surfaces_of_two_kinds_in_the_same_place_do_not_shadow_each_other() {
         ];
         for (i, j) in (0..kinds.len()).flat_map(|j| (0..j).map(move |i| (i, j))) {
             let world = r#"LightSource "infinite" "rgb L" [1 1 1] Material "diffuse" "rgb reflectance" [0.5 0.5 0.5] "#;
-            let text = format!("{}{world}{}{}", header(&at, 64, 2), kinds[i], kinds[j]);
+            let text = format!("{}{world}{}{}", header(&at, 256, 2), kinds[i], kinds[j]);
             let mut scene = job(&text, AccelKind::Embree);
             scene.change(|s| (s.integrator.estimator, s.integrator.samples) = (EstimatorKind::Mis, Some(2)));
             let mean = mean(&scene);
+            // Five standard errors
             assert!((mean - 0.5).abs() < 0.015, "{} {} at {at:?}: {mean}", kinds[i], kinds[j]);
         }
     }
@@ -281,7 +284,8 @@ fn an_alpha_of_half_lets_a_quarter_through_where_it_is_crossed_twice() {
             Translate 0 0 -5 Shape "disk" "float radius" 3 AttributeEnd "#;
         let floor = r#"Material "diffuse" "rgb reflectance" [0.5 0.5 0.5]
             Shape "trianglemesh" "point3 P" [-9 -9 -5  9 -9 -5  9 9 -5  -9 9 -5] "integer indices" [0 1 2 0 2 3] "#;
-        let distant = r#"LightSource "distant" "point3 from" [0 0 1] "point3 to" [0 0 0] "rgb L" [6.2832 6.2832 6.2832] "#;
+        let distant =
+            r#"LightSource "distant" "point3 from" [0 0 1] "point3 to" [0 0 0] "rgb L" [6.2832 6.2832 6.2832] "#;
         let point = r#"LightSource "point" "point3 from" [0 0 4] "rgb I" [508.938 508.938 508.938] "#;
         let scenes = [
             ("camera rays", format!("{}{shape}{lamp}", view(9.0, 0))),
@@ -292,7 +296,8 @@ fn an_alpha_of_half_lets_a_quarter_through_where_it_is_crossed_twice() {
             let found = [AccelKind::Embree, AccelKind::Bvh].map(|accel| mean(&job(&text, accel)));
             // Five standard deviations of 4096 decisions
             assert!((found[0] - 0.25).abs() < 0.034, "{name}, {rays}: {found:?}");
-            assert_eq!(found[0], found[1], "{name}, {rays}");
+            // Rays at edges of triangles may decide otherwise
+            assert!((found[0] - found[1]).abs() < 1e-3, "{name}, {rays}: {found:?}");
         }
     }
 }
