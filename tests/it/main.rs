@@ -37,6 +37,7 @@ mod roulette;
 mod same_light;
 mod sample_allocation;
 mod subsurface;
+mod surfaces;
 mod texture_pyramids;
 mod texture_tiles;
 mod udim;
