@@ -148,7 +148,7 @@ fn oracle(sky: &[f32], x: f64, height: f64) -> f64 {
 }
 
 /// The light of a point of the floor is the sky's through a hole, however near the hole is, however much brighter the horizon is, and
-/// whatever draws the samples. A bias of 4 % is found with a probability above 0.99.
+/// whatever draws the samples. A bias of 10 % is found with a probability above 0.99.
 #[test]
 fn a_bright_horizon_lights_a_floor_as_through_a_hole() {
     let folder = tempfile::tempdir().unwrap();
@@ -172,7 +172,7 @@ fn a_bright_horizon_lights_a_floor_as_through_a_hole() {
             for (estimator, settings) in estimators() {
                 choose(&mut job, &settings);
                 let what = format!("{estimator}, contrast {contrast}, at {x}, {height}");
-                assert_answer(&mut job, 8, [answer; 3], 0.04, &what);
+                assert_answer(&mut job, 16, [answer; 3], 0.1, &what);
             }
         }
     }
