@@ -388,7 +388,7 @@ fn a_copy_of_the_executable_alone_reads_and_writes_images() {
     std::fs::copy(env!("CARGO_BIN_EXE_lumiris"), &program).unwrap();
     let run = |args: &[&str]| Command::new(&program).args(args).current_dir(folder.path()).output().unwrap();
     let small = ["--resolution", "8x6", "--spp", "1", "--estimator", "mis", "-q", "-o", "a.exr", "-o", "a.png"];
-    let output = run(&[&["render", &scene("analytic/rectangle.pbrt")], &small[..]].concat());
+    let output = run(&[&["render", &scene("analytic/rectangle.pbrt")][..], &small[..]].concat());
     assert!(output.status.success(), "{}", stderr(&output));
     let output = run(&["compare", "a.exr", "a.exr"]);
     assert!(output.status.success(), "{}", stderr(&output));

@@ -103,8 +103,8 @@ fn options_without_effect_are_named() {
         lines.filter_map(|line| Some(line.split_once(" has no effect on ")?.0.to_owned())).collect()
     };
     assert_eq!(warnings(&said), ["--proposals 16", "--cache-error 0.1"], "{said}");
-    for (options, expected) in [
-        ("--estimator ris --proposals 16 --samples 2", &[][..]),
+    let cases: [(&str, &[&str]); 7] = [
+        ("--estimator ris --proposals 16 --samples 2", &[]),
         ("--integrator direct --max-depth 7 --estimator mis", &["--max-depth 7"]),
         (
             "--integrator photon-map --photons 100 --allocation adaptive --path-reuse 4",
@@ -114,7 +114,8 @@ fn options_without_effect_are_named() {
         ("--estimator mis --cryptomatte --exr-type half --aov depth", &["--aov", "--cryptomatte", "--exr-type"]),
         ("--estimator mis --cryptomatte --exr-type half --aov depth -o a.exr", &[]),
         ("--estimator mis --aov none --exposure 1", &[]),
-    ] {
+    ];
+    for (options, expected) in cases {
         let said = stderr(&lumiris(&format!("{image} -q {options}"), folder));
         assert_eq!(warnings(&said), expected, "{options}: {said}");
     }

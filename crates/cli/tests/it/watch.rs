@@ -306,7 +306,7 @@ fn requests_are_short_and_have_no_body_whatever_they_announce() {
     let state = view.state();
     let tiles = format!("GET /tiles?image={}&layer=0&since=0 HTTP/1.1\r\n{host}\r\n", state["image"]);
     let held: Vec<TcpStream> =
-        (0..300).map(|i| view.send(if i % 2 == 0 { b"GET / HT" } else { tiles.as_bytes() })).collect();
+        (0..300).map(|i| view.send(if i % 2 == 0 { &b"GET / HT"[..] } else { tiles.as_bytes() })).collect();
     let start = Instant::now();
     assert_eq!(view.get("/state").0, 200);
     assert!(start.elapsed() < Duration::from_secs(8), "{:?}", start.elapsed());
