@@ -52,12 +52,7 @@ impl Shape {
     /// The first hit of `primitive`, which is no triangle, in (0, t_max) that `accepts` takes: it gets the hit and which
     /// crossing of the primitive by the ray's line it is, 0 or 1.
     #[inline]
-    pub fn intersect(
-        &self,
-        primitive: u32,
-        ray: &Ray,
-        accepts: impl Fn(&LocalHit, usize) -> bool,
-    ) -> Option<LocalHit> {
+    pub fn intersect(&self, primitive: u32, ray: &Ray, accepts: impl Fn(&LocalHit, usize) -> bool) -> Option<LocalHit> {
         match self {
             Shape::Quadric(quadric) => quadric.intersect_where(ray, accepts),
             Shape::Bilinear(mesh) => mesh.intersect_patch_where(primitive as usize, ray, accepts),
