@@ -94,9 +94,11 @@ fn flat_shapes(at: &Affine3A) -> Vec<(&'static str, String)> {
     ]
 }
 
+type Change = Box<dyn Fn(&mut Settings)>;
+
 /// Every way to estimate direct light.
-fn estimators() -> Vec<(String, Box<dyn Fn(&mut Settings)>)> {
-    let mut all: Vec<(String, Box<dyn Fn(&mut Settings)>)> = Vec::new();
+fn estimators() -> Vec<(String, Change)> {
+    let mut all: Vec<(String, Change)> = Vec::new();
     for (kind, samples) in [
         (EstimatorKind::Auto, None),
         (EstimatorKind::Mc, Some(2)),
