@@ -152,8 +152,12 @@ impl LensSystem {
     /// Angle between the rays of film points at (x, y) whose distance is 1 m, as far as it is small (radians).
     pub fn spread(&self, film: Vec2) -> f32 {
         let tangent = f64::from(film.length()) / self.image_distance;
-        let cos = 1.0 / (1.0 + tangent * tangent).sqrt();
-        (cos.powf(1.5) / self.image_distance) as f32
+        self.spread_towards((1.0 / (1.0 + tangent * tangent).sqrt()) as f32)
+    }
+
+    /// The same towards points at the cosine `cos` to the axis.
+    pub fn spread_towards(&self, cos: f32) -> f32 {
+        (f64::from(cos).powf(1.5) / self.image_distance) as f32
     }
 
     /// The ray (of weight 0) from a film point through a point of the rear plane, which is given for film points on the x

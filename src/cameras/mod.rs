@@ -150,6 +150,32 @@ impl CameraBase {
     fn pixel_area(&self, window: &[f32; 4]) -> f32 {
         ((window[1] - window[0]) * (window[3] - window[2]) / (self.resolution.x * self.resolution.y)).abs()
     }
+
+    /// Angle between the rays of neighbouring pixels of a perspective camera (radians), at the cosine `cos` to its axis: a
+    /// pixel of area a on the plane z = 1 subtends a·cos³θ.
+    #[inline]
+    fn perspective_spread(&self, window: &[f32; 4], tan_half_fov: f32, cos: f32) -> f32 {
+        (self.pixel_area(window) * cos).sqrt() * cos * tan_half_fov
+    }
+
+    /// The same of a spherical camera, at the sine `sin` to its upward axis.
+    #[inline]
+    fn spherical_spread(&self, mapping: SphericalMapping, sin: f32) -> f32 {
+        let pixels = self.resolution.x * self.resolution.y;
+        let solid_angle = match mapping {
+            SphericalMapping::EquiRectangular => 2.0 * PI * PI * sin / pixels,
+            SphericalMapping::EqualArea => 4.0 * PI / pixels,
+        };
+        solid_angle.sqrt()
+    }
+
+    /// Distance between the parallel rays of neighbouring pixels, in world units.
+    #[inline]
+    fn parallel_width(&self, window: &[f32; 4], time: f32) -> f32 {
+        let m = placement_at(&self.world_from_camera, time).matrix3;
+        let scale = m.x_axis.cross(m.y_axis).length();
+        (self.pixel_area(window) * scale).sqrt()
+    }
 }
 
 impl Lens {
@@ -272,33 +298,24 @@ impl Camera {
             Camera::Perspective { base, screen_window, tan_half_fov, lens } => {
                 let d = (base.screen_point(screen_window, film_xy) * *tan_half_fov).extend(1.0);
                 let (o, through) = lens.through(Vec3::ZERO, d, u_lens);
-                // A pixel of area a on the plane z = 1 subtends a·cos³θ.
-                let cos = 1.0 / d.length();
-                let spread = (base.pixel_area(screen_window) * cos).sqrt() * cos * *tan_half_fov;
+                let spread = base.perspective_spread(screen_window, *tan_half_fov, 1.0 / d.length());
                 CameraRay { ray: base.ray(o, through, time_u), spread, width0: 0.0, weight: 1.0 }
             }
             Camera::Orthographic { base, screen_window, lens } => {
                 let o = base.screen_point(screen_window, film_xy).extend(0.0);
                 let (o, d) = lens.through(o, Vec3::Z, u_lens);
-                let m = placement_at(&base.world_from_camera, base.time(time_u)).matrix3;
-                let scale = m.x_axis.cross(m.y_axis).length();
-                let width0 = (base.pixel_area(screen_window) * scale).sqrt();
+                let width0 = base.parallel_width(screen_window, base.time(time_u));
                 CameraRay { ray: base.ray(o, d, time_u), spread: 0.0, width0, weight: 1.0 }
             }
             Camera::Spherical { base, mapping } => {
                 let p = film_xy / base.resolution;
-                let pixels = base.resolution.x * base.resolution.y;
-                let (d, solid_angle) = match mapping {
-                    SphericalMapping::EquiRectangular => {
-                        let d = lat_long_to_sphere(p);
-                        (d, 2.0 * PI * PI * d.truncate().length() / pixels)
-                    }
-                    SphericalMapping::EqualArea => {
-                        (equal_area_square_to_sphere(wrap_equal_area_square(p)), 4.0 * PI / pixels)
-                    }
+                let d = match mapping {
+                    SphericalMapping::EquiRectangular => lat_long_to_sphere(p),
+                    SphericalMapping::EqualArea => equal_area_square_to_sphere(wrap_equal_area_square(p)),
                 };
+                let spread = base.spherical_spread(*mapping, d.truncate().length());
                 let d = Vec3::new(d.x, d.z, d.y);
-                CameraRay { ray: base.ray(Vec3::ZERO, d, time_u), spread: solid_angle.sqrt(), width0: 0.0, weight: 1.0 }
+                CameraRay { ray: base.ray(Vec3::ZERO, d, time_u), spread, width0: 0.0, weight: 1.0 }
             }
             Camera::Realistic { base, film_size, lens } => {
                 // The film sees the scene upside down and mirrored: its upper left corner is at the lower right
@@ -312,6 +329,34 @@ impl Camera {
 }
 
 impl Camera {
+    /// Width of a pixel (scene units) at the point `p` of world space if the camera saw it directly at the time `time`,
+    /// beside the image or behind the camera by the same formula. Unlike the width along a path it depends on nothing but
+    /// the point, so all techniques that find a path agree on it [Pharr et al. 2023, §10.1.3].
+    #[inline]
+    pub fn pixel_width(&self, p: Vec3, time: f32) -> f32 {
+        let base = self.base();
+        let world_from_camera = placement_at(&base.world_from_camera, time);
+        let d = p - world_from_camera.transform_point3(Vec3::ZERO);
+        let distance = d.length();
+        if !(distance > 0.0) {
+            return 0.0;
+        }
+        let cos_to = |axis: Vec3| (d.dot(world_from_camera.transform_vector3(axis).normalize()) / distance).abs();
+        match self {
+            Camera::Perspective { base, screen_window, tan_half_fov, .. } => {
+                base.perspective_spread(screen_window, *tan_half_fov, cos_to(Vec3::Z)) * distance
+            }
+            Camera::Orthographic { base, screen_window, .. } => base.parallel_width(screen_window, time),
+            Camera::Spherical { base, mapping } => {
+                let sin = (1.0 - cos_to(Vec3::Y).powi(2)).max(0.0).sqrt();
+                base.spherical_spread(*mapping, sin) * distance
+            }
+            Camera::Realistic { base, film_size, lens } => {
+                lens.spread_towards(cos_to(Vec3::Z)) * film_size.x / base.resolution.x * distance
+            }
+        }
+    }
+
     /// True if [`Self::project`] knows where it sees points.
     pub fn projects(&self) -> bool {
         matches!(self, Camera::Perspective { .. })
@@ -411,6 +456,27 @@ mod tests {
                 assert!((seen.density / expected - 1.0).abs() < 2e-3, "{} {expected}", seen.density);
                 assert!(camera.project(ray.at(-t), u, 0.5).is_none());
             }
+        }
+    }
+
+    #[test]
+    fn pixels_are_as_wide_at_a_point_as_along_the_ray_that_sees_it() {
+        use lumiris_numbers::math::Quat;
+        let placement = Affine3A::from_rotation_translation(Quat::from_rotation_y(0.7), Vec3::ONE);
+        let spherical = |mapping| Camera::spherical(placement, [200, 100], mapping);
+        for camera in [
+            perspective(placement, 100.0, PINHOLE),
+            orthographic(placement * Affine3A::from_scale(Vec3::new(-2.0, 1.0, 1.0)), [-2.0, 2.0, -1.0, 1.0], PINHOLE),
+            spherical(SphericalMapping::EquiRectangular),
+            spherical(SphericalMapping::EqualArea),
+        ] {
+            for (film, t) in [([3.0, 5.0], 0.5), ([150.0, 70.0], 4.0), ([100.0, 50.0], 1e4)] {
+                let CameraRay { ray, spread, width0, .. } = camera.ray(Vec2::from(film), [0.5; 2], 0.5);
+                let (width, along) = (camera.pixel_width(ray.at(t), ray.time), width0 + spread * t);
+                assert!((width / along - 1.0).abs() < 2e-3, "{camera:?} {film:?} {t}: {width} {along}");
+            }
+            let behind = camera.pixel_width(Vec3::ONE - placement.transform_vector3(Vec3::Z), 0.5);
+            assert!(behind > 0.0 && behind < 1.0 && camera.pixel_width(Vec3::ONE, 0.5).is_finite());
         }
     }
 

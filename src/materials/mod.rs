@@ -251,8 +251,8 @@ impl MaterialSet {
     }
 
     /// Finds out which materials bundle light to caustics, by one value of each of their textures, that of an image being its
-    /// mean. Images are there by now. It is the same at all points of a material: techniques that share paths, and see a texture at other places or
-    /// widths, must agree on it.
+    /// mean. Images are there by now. It is the same at all points of a material: techniques that share paths, and see a texture at other places, must
+    /// agree on it.
     #[must_use]
     pub fn find_caustics(self, textures: &TextureSet) -> Self {
         let t = Textures { set: textures, ctx: &TextureContext::whole() };

@@ -18,7 +18,7 @@ pub struct SurfaceInteraction {
     pub surface: SurfaceHit,
     /// Unit direction to where the ray came from.
     pub wo: Vec3,
-    /// Width of a pixel at the hit (m).
+    /// Width of a pixel at the hit along the path (m).
     pub width: f32,
     /// Distance along the ray (m).
     pub distance: f32,
@@ -27,12 +27,16 @@ pub struct SurfaceInteraction {
 
 impl SurfaceInteraction {
     /// The first hit of `ray`. A pixel is `width` wide at its origin, and `spread` wider per unit length.
+    ///
+    /// Textures are filtered by the pixel that sees the point directly, whatever path comes here: light paths, photons and
+    /// shadow rays must meet the same surface as the camera paths with which they share light.
     pub fn new(job: &RenderJob, ray: &Ray, (width, spread): (f32, f32), hit: &Hit) -> Self {
         let set = &job.world.scene.geometry;
         let surface = set.surface_hit_of_ray(hit.geometry, hit.primitive, hit.instance, hit.uv, ray);
         let distance = hit.t * ray.d.length();
         let width = width + spread * distance;
-        let footprint = width * job.settings().sampling.footprint();
+        let seen = job.world.scene.camera.pixel_width(surface.p, ray.time);
+        let footprint = seen * job.settings().sampling.footprint();
         let extent = |d: Vec3| {
             let length = d.length();
             if length > 0.0 { footprint / length } else { 0.0 }

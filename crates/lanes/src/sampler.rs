@@ -4,7 +4,7 @@
 //! A point's index is shuffled and each coordinate scrambled by the hash of Laine and Karras, which flips each digit by
 //! those before it. The first coordinate is the index with its digits reversed, the second is that multiplied by
 //! Pascal's triangle modulo 2, which is five steps on the digits; the others are products with the columns of their
-//! matrices [Joe and Kuo 2008]. An index has 16 digits.
+//! matrices [Joe and Kuo 2008]. An index has 16 digits. A second scramble follows, with a seed of its own.
 
 use fearless_simd::{Level, dispatch};
 use lumiris_numbers::math::ONE_MINUS_EPSILON;
@@ -27,19 +27,21 @@ const COLUMNS: [[u32; 16]; 2] = [
 
 /// Draws N ≤ 4 numbers of each stream: `out[d][i]` is the d-th of stream `i`. All slices have the same length.
 pub fn draw<const N: usize>(level: Level, streams: &[SampleStream], mut out: [&mut [f32]; N]) {
-    let (mut index, mut seed) = ([0; CHUNK], [0; CHUNK]);
+    let (mut index, mut seeds) = ([0; CHUNK], [[0; CHUNK]; 2]);
     for (chunk, streams) in streams.chunks(CHUNK).enumerate() {
         let first = chunk * CHUNK;
         let mut are_nets = true;
         for (lane, stream) in streams.iter().enumerate() {
             match stream.net_point() {
-                Some(point) => (index[lane], seed[lane]) = (point.index, point.seed),
+                Some(point) => {
+                    (index[lane], seeds[0][lane], seeds[1][lane]) = (point.index, point.seed, point.scramble);
+                }
                 None => are_nets = false,
             }
         }
         if are_nets {
             let mut u = [[0.0; CHUNK]; N];
-            dispatch!(level, _simd => coordinates(&index, &seed, &mut u));
+            dispatch!(level, _simd => coordinates(&index, &seeds, &mut u));
             for (out, u) in out.iter_mut().zip(&u) {
                 out[first..first + streams.len()].copy_from_slice(&u[..streams.len()]);
             }
@@ -54,7 +56,11 @@ pub fn draw<const N: usize>(level: Level, streams: &[SampleStream], mut out: [&m
 }
 
 #[inline(always)]
-fn coordinates<const N: usize>(index: &[u32; CHUNK], seed: &[u32; CHUNK], out: &mut [[f32; CHUNK]; N]) {
+fn coordinates<const N: usize>(
+    index: &[u32; CHUNK],
+    [seed, scramble]: &[[u32; CHUNK]; 2],
+    out: &mut [[f32; CHUNK]; N],
+) {
     let mut shuffled = [0; CHUNK];
     for i in 0..CHUNK {
         shuffled[i] = permuted(index[i].reverse_bits(), seed[i]) >> 16;
@@ -81,7 +87,8 @@ fn coordinates<const N: usize>(index: &[u32; CHUNK], seed: &[u32; CHUNK], out: &
             }
         }
         for i in 0..CHUNK {
-            out[i] = unit(permuted(digits[i], seed[i].rotate_right(8 * d as u32)).reverse_bits());
+            let once = permuted(digits[i], seed[i].rotate_right(8 * d as u32));
+            out[i] = unit(permuted(once, scramble[i].rotate_right(8 * d as u32)).reverse_bits());
         }
     }
 }

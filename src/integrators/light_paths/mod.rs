@@ -10,9 +10,10 @@
 //! metal or glass the densities differ a little more, which the heuristic may leave out. Weights depend on nothing that only
 //! one of both knows: those of a path sum to one, whatever was drawn, and how many light samples there are.
 //!
-//! Which materials count as metal and glass is a property of the material, textures and all
-//! ([`crate::materials::MaterialSet::find_caustics`]): at other widths of their textures, the two would not agree. Where a
-//! mixture is drawn anew for each direction, a light path may both go on as over metal and be seen as on another surface.
+//! Both must meet the same surfaces. Textures and bumps are filtered by a footprint that depends on the point alone
+//! ([`crate::scene::SurfaceInteraction::new`]). Which materials count as metal and glass is a property of the material,
+//! textures and all ([`crate::materials::MaterialSet::find_caustics`]). Where a mixture is drawn anew for each direction, a
+//! light path may both go on as over metal and be seen as on another surface.
 //!
 //! Camera paths keep what a smooth coat at the first vertex mirrors, and the light of the last vertex that the settings
 //! allow. The k-th sample of each pixel has the k-th set of light paths, as many as `light_paths` says for each pixel. So

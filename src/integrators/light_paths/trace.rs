@@ -173,7 +173,7 @@ impl LightPath {
             return None;
         }
 
-        // The surface as a camera ray meets it, whose footprint its textures are filtered by
+        // The surface as a camera ray meets it
         let from = camera.ray(seen.film_xy, [l0, l1], 0.0);
         let d = p - seen.o;
         let distance = d.length();
