@@ -153,6 +153,22 @@ mod tests {
     }
 
     #[test]
+    fn patterns_far_from_the_origin_of_their_space_are_those_near_to_it() {
+        let far = DVec3::new(1e7, -4e6, 512_000.0);
+        for i in 0..200_u16 {
+            let p = at(Vec3::new(0.137, 0.071, -0.093) * f32::from(i), Vec2::ZERO);
+            let of = |o: DVec3| {
+                let texture_from_world = DAffine3::from_translation(o);
+                let (vs, vt, delta) = (Vec3::X, Vec3::Y, Vec2::ZERO);
+                let (st, _) = Mapping2d::Planar { vs, vt, delta, texture_from_world }.map(&p);
+                (CheckerboardMapping::Cubes { texture_from_world }.is_even(&p), st - o.truncate())
+            };
+            let ((even, st), (even_far, st_far)) = (of(DVec3::ZERO), of(far));
+            assert!(even == even_far && (st - st_far).length() < 1e-8, "{i}");
+        }
+    }
+
+    #[test]
     fn checkerboards_alternate_on_both_sides_of_zero() {
         let squares = CheckerboardMapping::Squares(Mapping2d::default());
         let even = |x: f32, y: f32| squares.is_even(&at(Vec3::ZERO, Vec2::new(x, y)));

@@ -137,13 +137,15 @@ fn a_scene_has_the_same_image_wherever_it_is_and_however_it_comes_there() {
     let near = image(&(head(NEAR) + &way(NEAR, "", NEAR)));
     let matrix = format!("ConcatTransform [ 1 0 0 0  0 1 0 0  0 0 1 0  {} 1 ]", points(FAR, &[NEAR]));
     let there_and_back = format!("{} Scale 4 4 4 Scale 0.25 0.25 0.25 {}", translate(FAR), translate(back(FAR)));
+    // The transformation of a camera is that of the world to the camera
+    let moved_head = head(NEAR).replace("\nCamera", &format!("\n{}\nCamera", translate(FAR)));
     let system = format!("{} CoordinateSystem \"far\" Identity CoordSysTransform \"far\"", translate(FAR));
     for (name, text) in [
         ("points in the text", head(FAR) + &way(FAR, "", FAR)),
         ("a translation", head(FAR) + &way(NEAR, &translate(FAR), FAR)),
         ("a matrix", head(FAR) + &way(NEAR, &matrix, FAR)),
         ("a coordinate system", head(FAR) + &way(NEAR, &system, FAR)),
-        ("the camera's transformation", translate(FAR) + &head(NEAR) + &way(NEAR, &translate(back(FAR)), back(FAR))),
+        ("the camera's transformation", moved_head + &way(NEAR, &translate(back(FAR)), back(FAR))),
         ("points that are moved back", head(NEAR) + &way(FAR, &translate(back(FAR)), NEAR)),
         ("there and back", head(NEAR) + &way(NEAR, &there_and_back, NEAR)),
     ] {
