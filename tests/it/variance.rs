@@ -76,8 +76,8 @@ const SCENES: [&str; 8] = [
     "talbot/spheres",
 ];
 
-/// More of them: files, divided by colons.
-const MORE_SCENES: &str = "VARIANCE_SCENES";
+/// Others instead of them: files, divided by colons.
+const OTHER_SCENES: &str = "VARIANCE_SCENES";
 
 fn job(case: &Case, sampler: SamplerKind) -> RenderJob {
     let mut job = job_of(Path::new(env!("CARGO_MANIFEST_DIR")).join(case.scene), case.size);
@@ -201,7 +201,9 @@ Material "conductor" "float roughness" 0.05
 AttributeBegin Translate 0.4 -0.6 0.2 Shape "sphere" "float radius" 0.4 AttributeEnd
 "#;
 
-/// With 24 seeds the lamp's edge, some 40 pixels, has standard errors of √(2/24/40) = 5 % of both variances.
+/// The edge of the lamp, of few pixels, has most of the variance: with 24 seeds, the ratio has a standard error of 7 to 10 %,
+/// and 19 % where numbers are adaptive. Of 3 standard errors, a right one fails with a probability of 0.003, and with 10 % a factor
+/// of 1.8 is found with one of 0.9. Blocks have errors of 10 %.
 #[test]
 fn variances_are_those_between_seeds_in_every_mode() {
     let loaded = load_text(ROOM, "room", Path::new("."), &LoadOptions::default(), &FileCache::default());
@@ -213,7 +215,7 @@ fn variances_are_those_between_seeds_in_every_mode() {
         set(&mut job, mode);
         let s = study(&mut job, 8, 24);
         let what = format!("{}: {} ± {}, blocks {:?}", mode.name, s.stated, s.error, s.blocks);
-        assert!(s.error < 0.09 && (s.stated - 1.0).abs() < 0.3, "{what}");
+        assert!(s.error < 0.25 && (s.stated - 1.0).abs() < 3.0 * s.error, "{what}");
         let [median, least, most] = s.blocks;
         assert!((0.75..1.33).contains(&median) && least > 0.2 && most < 5.0, "{what}");
     }
@@ -255,10 +257,10 @@ fn replicas_change_no_image_and_do_not_depend_on_tiles_and_threads() {
 #[allow(clippy::print_stdout)]
 fn table() {
     println!("| scene | mode | s²/N | stated | ± | median block | least | most |\n|---|---|---|---|---|---|---|---|");
-    let own = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes");
-    let more = std::env::var(MORE_SCENES).unwrap_or_default();
-    let more = more.split(':').filter(|path| !path.is_empty()).map(PathBuf::from);
-    for path in SCENES.map(|name| own.join(name).with_extension("pbrt")).into_iter().chain(more) {
+    let own = |name: &&str| Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes").join(name).with_extension("pbrt");
+    let others = |paths: String| paths.split(':').map(PathBuf::from).collect();
+    let paths: Vec<PathBuf> = std::env::var(OTHER_SCENES).map_or_else(|_| SCENES.iter().map(own).collect(), others);
+    for path in paths {
         let mut job = job_of(path.clone(), [96, 64]);
         let base = *job.settings();
         for mode in &MODES {
