@@ -39,7 +39,8 @@ fn mean(light: &str, estimator: EstimatorKind) -> f64 {
     let loaded = load_text(&text, "floor.pbrt", Path::new("."), &load, &FileCache::default());
     let mut job = loaded.map_err(|d| d.to_string()).unwrap().job(AccelKind::Bvh, None).unwrap();
     job.change(|s| (s.integrator.estimator, s.integrator.samples) = (estimator, Some(8)));
-    let rendering = render(&job, &RenderSettings::default(), &AtomicBool::new(false), &|_| ()).unwrap();
+    let settings = RenderSettings { spp: 64, ..RenderSettings::default() };
+    let rendering = render(&job, &settings, &AtomicBool::new(false), &|_| ()).unwrap();
     let values = lumiris::render::output::channels(&rendering.film, &[], None).data;
     values.iter().map(|&v| f64::from(v)).sum::<f64>() / values.len() as f64
 }

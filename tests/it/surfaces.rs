@@ -129,11 +129,6 @@ fn estimators() -> Vec<(String, Change)> {
         };
         all.push((format!("irradiance cache of {cached:?}"), Box::new(change)));
     }
-    let change = |s: &mut Settings| {
-        s.integrator.kind = IntegratorKind::PhotonMap;
-        (s.integrator.photons.photons, s.integrator.photons.paths) = (1000, 10_000);
-    };
-    all.push(("photon map".into(), Box::new(change)));
     all
 }
 

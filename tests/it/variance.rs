@@ -202,7 +202,7 @@ AttributeBegin Translate 0.4 -0.6 0.2 Shape "sphere" "float radius" 0.4 Attribut
 "#;
 
 /// The edge of the lamp, of few pixels, has most of the variance: with 24 seeds, the ratio has a standard error of 7 to 10 %,
-/// and 19 % where numbers are adaptive. Of 3 standard errors, a right one fails with a probability of 0.003, and with 10 % a factor
+/// 19 % where numbers are adaptive, and 30 % with roulette and splitting. Of 3 standard errors, a right one fails with a probability of 0.003, and with 10 % a factor
 /// of 1.8 is found with one of 0.9. Blocks have errors of 10 %.
 #[test]
 fn variances_are_those_between_seeds_in_every_mode() {
@@ -215,7 +215,7 @@ fn variances_are_those_between_seeds_in_every_mode() {
         set(&mut job, mode);
         let s = study(&mut job, 8, 24);
         let what = format!("{}: {} ± {}, blocks {:?}", mode.name, s.stated, s.error, s.blocks);
-        assert!(s.error < 0.25 && (s.stated - 1.0).abs() < 3.0 * s.error, "{what}");
+        assert!(s.error < 0.35 && (s.stated - 1.0).abs() < 3.0 * s.error, "{what}");
         let [median, least, most] = s.blocks;
         assert!((0.75..1.33).contains(&median) && least > 0.2 && most < 5.0, "{what}");
     }

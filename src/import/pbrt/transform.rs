@@ -40,16 +40,16 @@ impl Ctm {
         Ctm { start: self.start.inverse(), end: self.end.inverse() }
     }
 
-    /// True if all its numbers are finite.
+    /// True if all its numbers are in the range of f32.
     pub fn is_finite(&self) -> bool {
-        self.start.is_finite() && self.end.is_finite()
+        [self.start, self.end].iter().all(|m| m.as_mat4().is_finite())
     }
 
     /// True if it can be inverted and all its numbers are finite. What it places is flat otherwise: meshes are rendered so.
     pub fn is_invertible(&self) -> bool {
         [self.start, self.end].iter().all(|m| {
             let scale = m.x_axis.length() * m.y_axis.length() * m.z_axis.length();
-            m.as_mat4().is_finite()
+            self.is_finite()
                 && m.determinant().abs() > f64::from(f32::MIN_POSITIVE)
                 && m.determinant().abs() > 1e-12 * scale
         })

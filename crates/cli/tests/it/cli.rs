@@ -390,7 +390,7 @@ fn a_copy_of_the_executable_alone_reads_and_writes_images() {
     let small = ["--resolution", "8x6", "--spp", "1", "--estimator", "mis", "-q", "-o", "a.exr", "-o", "a.png"];
     let output = run(&[&["render", &scene("analytic/rectangle.pbrt")][..], &small[..]].concat());
     assert!(output.status.success(), "{}", stderr(&output));
-    let output = run(&["compare", "a.exr", "a.exr"]);
+    let output = run(&["compare", "a.exr", "--reference", "a.exr"]);
     assert!(output.status.success(), "{}", stderr(&output));
 }
 
