@@ -57,8 +57,8 @@ impl PartOptions {
             interval(given).ok_or_else(|| PyValueError::new_err("checkpoint: expected a positive number of seconds"))
         });
         let checkpoint = checkpoint.transpose()?;
-        let files = checkpoint.iter().map(|(path, _)| path).chain(&self.part_file);
-        files.map(|path| check_destination(path).map(drop)).collect::<io::Result<()>>()?;
+        let mut files = checkpoint.iter().map(|(path, _)| path).chain(&self.part_file);
+        files.try_for_each(|path| check_destination(path).map(drop))?;
         Ok(Parts { extent, file: self.part_file, checkpoint, resume: self.resume })
     }
 }

@@ -174,7 +174,8 @@ impl<'a> Assembly<'a> {
         let mut skins = Skins::new(self.document, nodes, self.origin);
         for (place, users) in meshes.items().zip(users) {
             // In the order of the nodes
-            let (mut poses, mut indices): (Vec<(Pose, Vec<u32>)>, HashMap<PoseKey, usize>) = Default::default();
+            let mut poses: Vec<(Pose, Vec<u32>)> = Vec::new();
+            let mut indices: HashMap<PoseKey, usize> = HashMap::new();
             for i in users {
                 let node = &nodes[i as usize];
                 let of_node = node.place(self.document);

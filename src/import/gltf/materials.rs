@@ -115,7 +115,7 @@ impl<'a> Materials<'a> {
         let dispersion = if is_unlit { None } else { dispersion(place) };
         self.entries.push(MaterialEntry { name, material, normal_map, displacement: None, dispersion });
         let emission = if is_unlit { color } else { emitted(place) };
-        let emissive = if is_unlit { base.clone() } else { place.key("emissiveTexture") };
+        let emissive = if is_unlit { base } else { place.key("emissiveTexture") };
         let emission_image = if emission.is_black() { None } else { self.textures.emission(&emissive, messages)? };
         Ok(Look {
             material: (self.entries.len() - 1) as MaterialId,

@@ -147,12 +147,9 @@ fn patch(mesh: &BilinearMesh, i: usize, textured: bool) -> AreaShape {
         if mesh.uvs.is_empty() { [Vec2::ZERO, Vec2::X, Vec2::Y, Vec2::ONE] } else { vertices.map(|v| mesh.uvs[v]) };
     let light = PatchLight::new(corners, orientation(mesh, i), uvs);
     let uvs_fit = (uvs[1] + uvs[2] - uvs[0] - uvs[3]).abs().max_element() <= 1e-5;
-    if uvs_fit || !textured {
-        if let Some(rectangle) = rectangle(corners, light.mean_normal(), [uvs[0], uvs[1], uvs[2]]) {
-            return AreaShape::Rectangle(rectangle);
-        }
-    }
-    AreaShape::Patch(Box::new(light))
+    let has_its_uvs = uvs_fit || !textured;
+    let flat = has_its_uvs.then(|| rectangle(corners, light.mean_normal(), [uvs[0], uvs[1], uvs[2]])).flatten();
+    flat.map_or_else(|| AreaShape::Patch(Box::new(light)), AreaShape::Rectangle)
 }
 
 /// Whether patch `i` emits on the reverse of ∂p/∂u × ∂p/∂v: vertex normals decide if there are any.
