@@ -109,7 +109,7 @@ def test_none_leaves_a_setting_and_old_names_are_accepted() -> None:
     assert lumiris.render(SCENE, resolution=(4, 3), spp=None).metadata["lumiris:spp"] == "4"
     old = {"light_choice": "power"}
     assert lumiris.render(SCENE, **TINY, **old).metadata["lumiris:light_sampler"] == "power"  # type: ignore[arg-type]
-    roulette = lumiris.render(SCENE, **TINY, integrator="path", roulette_depth=False)
+    roulette = lumiris.render(SCENE, **TINY, integrator="path", max_depth=3, roulette_depth=False)
     assert roulette.metadata["lumiris:roulette_depth"] == "off"
 
 
