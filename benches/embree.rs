@@ -9,7 +9,7 @@ use lumiris::accel::embree::bare::Bare;
 use lumiris::accel::embree::{EmbreeAccel, EmbreeError};
 use lumiris::accel::{Accel, Coherence, Hit, RayBatch};
 use lumiris::geometry::{Geometry, GeometrySet, Group, Shape, TriangleMesh, Visibility};
-use lumiris::render::bench::{Pair, RayCase};
+use lumiris_bench::stages::{Pair, RayCase};
 use lumiris_numbers::math::ray::offset_origin;
 use lumiris_numbers::math::{Frame, Ray, Vec3, warp};
 use lumiris_test_support::random::{RngExt, pcg32};

@@ -12,7 +12,8 @@
 //! | 5 | [`scene`] |
 //! | 6 | [`import`], [`direct`], [`photons`] |
 //! | 7 | [`integrators`] |
-//! | 8 | [`render`] |
+//! | 8 | [`planning`] |
+//! | 9 | [`render`] |
 
 pub mod accel;
 pub mod bsdfs;
@@ -27,6 +28,7 @@ pub mod lights;
 pub mod materials;
 pub mod media;
 pub mod photons;
+pub mod planning;
 pub mod render;
 pub mod scene;
 pub mod settings;

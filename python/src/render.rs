@@ -12,12 +12,12 @@ use lumiris::import::cache::FileCache;
 use lumiris::import::fingerprint::SceneFiles;
 use lumiris::import::gltf::LightUnits;
 use lumiris::import::{LoadOptions, Loaded, load_text, load_with};
-use lumiris::render::allocation::complete_for_noise;
+use lumiris::planning::allocation::complete_for_noise;
+use lumiris::planning::preparation::{complete_for_time, pilot_deadline};
+use lumiris::planning::{PlanError, Preparation, prepare};
 use lumiris::render::cryptomatte::{Cryptomatte, cryptomattes};
 use lumiris::render::output::{self, Aov};
 use lumiris::render::parts::{Asked, FilmFile, PartError, Storage, Stored};
-use lumiris::render::plan::{Preparation, prepare};
-use lumiris::render::processor_time;
 use lumiris::render::{Continuation, Progress, RenderError, RenderSettings, Rendering, go_on};
 use lumiris::scene::RenderJob;
 use lumiris::settings::value::{Kind, Value};
@@ -208,6 +208,10 @@ impl Request {
         apply(&self.plan, &mut loaded.settings);
         apply(&self.settings, &mut loaded.settings);
         loaded.given.extend(named(&self.settings));
+        if let Some(time) = self.render.time_limit.filter(|_| stored.is_none()) {
+            let has_spp = self.spp().is_some();
+            complete_for_time(&mut loaded.settings, has_spp, time, loaded.scene.film.bounds.area());
+        }
         complete_for_noise(&mut loaded.settings, self.spp().is_some())
             .map_err(|needs| Failure::Value(format!("noise {needs}")))?;
         // More samples belong to what the first ones were prepared for
@@ -238,7 +242,7 @@ impl Request {
         let mut asked = self.asked.clone();
         let stored = self.parts.stored().map_err(Failure::Part)?;
         stored.as_ref().map_or(Ok(()), |stored| asked.complete(stored)).map_err(Failure::Part)?;
-        let before = processor_time::of_process();
+        let start = Instant::now();
         let mut loaded = self.load(&asked, stored.as_ref())?;
         let mut warnings = Vec::from_iter(Some(loaded.warnings.to_string()).filter(|text| !text.is_empty()));
         if loaded.settings.integrator.leaves_lights_out() {
@@ -247,23 +251,22 @@ impl Request {
         goes_on()?;
         let (files, given) = (std::mem::take(&mut loaded.files), std::mem::take(&mut loaded.given));
         let mut job = loaded.job(asked.accel, self.packet_width).map_err(|error| other(&error))?;
-        let loading = processor_time::of_process().saturating_sub(before);
         let extent = &self.parts.extent;
-        let divided = extent.check_settings(job.settings(), &job.world.scene.film.bounds, &asked.scene);
+        let divided = extent.check_settings(job.settings());
         divided.map_err(|error| Failure::Value(in_words_of_python(&error)))?;
         goes_on()?;
         let asks_for_ratio = asked.aovs.as_ref().is_some_and(|list| list.contains(&Aov::Ratio));
-        let start = Instant::now();
+        let limit = self.render.time_limit.filter(|_| stored.is_none());
         let how = Preparation {
             threads: self.render.threads,
             ratio_map: asks_for_ratio,
-            time_limit: self.render.time_limit.filter(|_| stored.is_none() && self.plan.is_empty()),
-            loading,
+            deadline: limit.and_then(|limit| pilot_deadline(start, limit)),
             stop,
+            ..Preparation::default()
         };
         let before = *job.settings();
         let plan = prepare(&mut job, &how).map_err(|error| match error {
-            RenderError::Stopped => Failure::Stopped,
+            PlanError::Stopped => Failure::Stopped,
             error => other(&error),
         })?;
         warnings.extend(plan.warnings);

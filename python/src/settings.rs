@@ -1,11 +1,12 @@
 //! The table of settings as keyword arguments: the names of the command line with underscores.
 
 use lumiris::settings::Settings;
-use lumiris::settings::table::{GROUPS, Setting, rows};
+use lumiris::settings::table::{GROUPS, Removed, Setting, rows};
 use lumiris::settings::value::{Kind, Value};
-use pyo3::exceptions::{PyTypeError, PyValueError};
+use pyo3::exceptions::{PyTypeError, PyUserWarning, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
+use std::ffi::CString;
 
 /// Settings with their values, in the order of the table.
 pub(crate) type Given = Vec<(&'static Setting, Value)>;
@@ -43,7 +44,12 @@ pub(crate) fn parse_plan(plan: &[(String, String)]) -> PyResult<Given> {
         let wrong = |expected| PyValueError::new_err(format!("plan: `{key}`: {expected}, but found `{text}`"));
         Ok((row, row.kind.parse(text).map_err(wrong)?))
     };
-    plan.iter().map(parse).collect()
+    let (removed, present): (Vec<_>, Vec<_>) = plan.iter().partition(|(key, _)| Removed::of_key(key).is_some());
+    for removed in removed.iter().filter_map(|(key, _)| Removed::of_key(key)) {
+        let note = CString::new(format!("plan: {}", removed.note(removed.key)))?;
+        Python::attach(|py| PyErr::warn(py, &py.get_type::<PyUserWarning>(), &note, 1))?;
+    }
+    present.into_iter().map(parse).collect()
 }
 
 /// The settings as messages name them.
@@ -69,7 +75,7 @@ pub(crate) fn settings(py: Python<'_>) -> PyResult<Bound<'_, PyDict>> {
             let (names, numbers): (Vec<&str>, Option<&str>) = match row.kind {
                 Kind::Choice { names, .. } => (names.to_vec(), None),
                 Kind::Integer { words, .. } => (words.to_vec(), Some("int")),
-                Kind::Real { words, .. } => (words.to_vec(), Some("float")),
+                Kind::Real { words, .. } | Kind::Percentage { words } => (words.to_vec(), Some("float")),
                 Kind::Pair { .. } => (Vec::new(), Some("pair")),
                 Kind::Graded { plain, graded, .. } => {
                     ([plain].into_iter().chain(graded.iter().copied()).collect(), Some("graded"))

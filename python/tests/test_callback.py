@@ -35,7 +35,7 @@ def test_every_pass_is_told_with_its_image() -> None:
 
 
 def test_false_ends_the_rendering_after_the_pass() -> None:
-    image = lumiris.render(SCENE, spp=64, callback=lambda progress: progress.passes < 3)
+    image = lumiris.render(SCENE, spp=64, allocation="uniform", callback=lambda progress: progress.passes < 3)
     assert not image.complete and image.metadata["lumiris:complete"] == "false"
     assert (image["samples"] == 4).all()
     assert np.array_equal(image["beauty"], lumiris.render(SCENE, spp=4)["beauty"])

@@ -176,9 +176,9 @@ def test_light_groups_are_layers_that_add_up_to_the_image() -> None:
 
 
 def test_a_plan_gives_the_image_that_it_came_from() -> None:
-    options: Dict[str, Any] = {"spp": 4, "estimator": "ris", "resolution": (16, 16)}
+    options: Dict[str, Any] = {"spp": 4, "resolution": (16, 16)}
     first = lumiris.render(SCENE, **options)
-    assert "proposals" in first.plan
+    assert "samples" in first.plan
     again = lumiris.render(SCENE, **options, plan=first.plan)
     assert np.array_equal(first["beauty"], again["beauty"])
 

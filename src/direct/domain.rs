@@ -20,8 +20,6 @@ pub(super) const RESAMPLE: u32 = 8;
 pub(super) const STRATA: u32 = 9;
 /// Group g of the lights uses the domain `GROUP + g`.
 pub(super) const GROUP: u32 = 16;
-/// Half h of the samples uses the domain `HALF + h`.
-pub(super) const HALF: u32 = 32;
 /// Contributing light number k uses the domain `CONTRIBUTING + k`.
 pub(super) const CONTRIBUTING: u32 = 64;
 /// Segment number k of a point goes through media by the domain `TRANSMITTANCE + k`.

@@ -45,7 +45,6 @@ use estimators::Batch;
 pub use estimators::Estimator;
 pub use fits::Fits;
 use lumiris_numbers::math::{Rgb, Vec3};
-use point::halves;
 pub use point::{ShadingPoint, lobe_for_lights};
 pub use stats::DirectStats;
 use std::time::Instant;
@@ -87,8 +86,6 @@ impl DirectStage {
     ) {
         out.clear();
         out.resize(points.len(), Rgb::BLACK);
-        let halves = estimator.has_halves().then(|| halves(points));
-        let points = halves.as_deref().unwrap_or(points);
         let batch = &mut self.batch;
 
         // T1: propose candidates. `ris` selects as well: it makes proposals and draws from them, chunk by chunk

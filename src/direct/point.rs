@@ -1,6 +1,5 @@
 //! A point at which direct light is estimated, and the rays that leave it.
 
-use super::domain;
 use crate::lights::{GlossyLobe, LightCtx, LightSample, LightSampling};
 use crate::materials::SurfaceBsdf;
 use crate::media::{MediumId, Sides};
@@ -101,14 +100,4 @@ impl ShadingPoint<'_> {
         let end = sample.t.is_finite().then_some((sample.p, sample.p_error, sample.n));
         self.segment(sample.wi, end)
     }
-}
-
-/// Both halves of every point's samples, one after the other, as points with separate random numbers.
-pub(super) fn halves<'a>(points: &[ShadingPoint<'a>]) -> Vec<ShadingPoint<'a>> {
-    let half = |point: &ShadingPoint<'a>, h: u32| {
-        let samples = (point.sample_counts.samples + 1 - h) / 2;
-        let sample_counts = SampleCounts { samples, proposals: samples };
-        ShadingPoint { sample_counts, stream: point.stream.domain(domain::HALF + h), ..*point }
-    };
-    points.iter().flat_map(|p| [half(p, 0), half(p, 1)]).collect()
 }

@@ -99,11 +99,6 @@ impl ProposalColumns {
         Some((self.chosen[proposal].0, sample))
     }
 
-    /// The light of a proposal, which is that of its sample if it is by BSDF sampling.
-    pub fn light_of(&self, proposal: usize, by_bsdf: Option<&Candidate>) -> LightId {
-        by_bsdf.map_or(self.chosen[proposal].0, |candidate| candidate.light)
-    }
-
     /// Σ c·V̂ over the proposals of a point, of which `bsdf_samples` are those by BSDF sampling.
     pub fn known(&self, range: PointProposals, bsdf_samples: &[Candidate]) -> Known {
         let PointProposals { start, bsdf_start, end } = range;
@@ -156,7 +151,7 @@ impl ProposalColumns {
         for (i, c) in (bsdf_start..end).zip(bsdf_samples) {
             let cos = || point.bsdf.cos(c.segment.d.normalize());
             self.p_hat[i] = match techniques.target {
-                Target::Fgl | Target::FglControl => c.f.luminance(),
+                Target::Fgl => c.f.luminance(),
                 Target::Visibility | Target::VisibilityControl => {
                     self.visibility[i] = job.lights.visibility(&ctx, &contributing, c.light);
                     c.f.luminance() * factor(techniques.target, self.visibility[i])
@@ -239,7 +234,7 @@ impl ProposalColumns {
         let [wi, li] = [wi, li].map(|c| c.get(end).map(|c| &c[start..]));
         let f_cos = self.f_cos.each_mut().map(|a| &mut a[start..end]);
         match techniques.target {
-            Target::Fgl | Target::FglControl | Target::Visibility | Target::VisibilityControl => {
+            Target::Fgl | Target::Visibility | Target::VisibilityControl => {
                 point.bsdf.eval_lanes(point.wo, wi, f_cos, &mut self.p_bsdf[start..end])
             }
             Target::Gv | Target::Gvl => {
@@ -269,7 +264,7 @@ impl ProposalColumns {
         };
         combine::combine(lumiris_lanes::level(), &proposals, &mut out);
         match techniques.target {
-            Target::Fgl | Target::FglControl | Target::Gvl => {}
+            Target::Fgl | Target::Gvl => {}
             Target::Gv => {
                 for i in start..end {
                     self.p_hat[i] = self.f_cos[0][i];

@@ -16,7 +16,7 @@ pub mod variance;
 
 use accumulator::PixelAccumulator;
 use lumiris_numbers::math::{Rgb, Vec3};
-use noise::Noise;
+use noise::{Block, Noise};
 use packed::PackedSums;
 use rayon::prelude::*;
 use replicas::Replica;
@@ -149,6 +149,13 @@ impl PixelBounds {
         self.width() as usize * self.height() as usize
     }
 
+    /// Coordinates of all pixels, row by row.
+    pub fn pixels(&self) -> impl ExactSizeIterator<Item = [u32; 2]> + use<> {
+        let PixelBounds { x0, y0, .. } = *self;
+        let width = self.width();
+        (0..self.area()).map(move |i| [x0 + i as u32 % width, y0 + i as u32 / width])
+    }
+
     /// Rectangles of at most `size` × `size` that cover this one, row by row.
     pub fn tiles(&self, size: u32) -> Vec<PixelBounds> {
         let size = size.max(1);
@@ -159,6 +166,18 @@ impl PixelBounds {
             }
         }
         tiles
+    }
+
+    /// Indices of the pixels that this has in common with another one, here and there, a row at a time. Both count row by row.
+    pub fn common_rows(&self, other: &PixelBounds) -> impl Iterator<Item = (Range<usize>, Range<usize>)> + use<> {
+        let (a, b) = (*self, *other);
+        let (x0, x1) = (a.x0.max(b.x0), a.x1.min(b.x1));
+        let row = move |of: &PixelBounds, y: u32| {
+            let first = (y - of.y0) as usize * of.width() as usize;
+            first + (x0 - of.x0) as usize..first + (x1 - of.x0) as usize
+        };
+        let rows = if x0 < x1 { a.y0.max(b.y0)..a.y1.min(b.y1) } else { 0..0 };
+        rows.map(move |y| (row(&a, y), row(&b, y)))
     }
 }
 
@@ -193,7 +212,7 @@ pub struct Film {
 }
 
 /// What a film is like on the whole.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Summary {
     /// Least and greatest number of samples of a pixel.
     pub samples: [u64; 2],
@@ -207,6 +226,8 @@ pub struct Summary {
     pub invalid: u64,
     /// By the variances of the pixels' means.
     pub noise: Noise,
+    /// Its blocks, by the same.
+    pub blocks: Vec<Block>,
     /// True if there are records of an irradiance cache.
     pub has_records: bool,
 }
@@ -364,9 +385,9 @@ impl Film {
             self.variance_scale();
             let bands = self.bands().map_init(Default::default, |(pixels, variances), rows| {
                 self.read_rows_with_variances(rows.clone(), pixels, variances);
-                let noise =
+                let blocks =
                     noise::of_blocks(&PixelBounds { y0: rows.start, y1: rows.end, ..self.bounds }, pixels, variances);
-                BandSummary::new(pixels, noise)
+                BandSummary::new(pixels, blocks)
             });
             BandSummary::of_all(&bands.collect::<Vec<_>>())
         })
@@ -383,13 +404,12 @@ struct BandSummary {
     all_samples: u64,
     pixels: [u64; 2],
     invalid: u64,
-    /// Of its blocks.
-    noise: Vec<f64>,
+    blocks: Vec<Block>,
     has_records: bool,
 }
 
 impl BandSummary {
-    fn new(pixels: &[PixelSums], noise: Vec<f64>) -> Self {
+    fn new(pixels: &[PixelSums], blocks: Vec<Block>) -> Self {
         let counts = || pixels.iter().map(|p| p.count);
         BandSummary {
             samples: [counts().min().unwrap_or(0), counts().max().unwrap_or(0)],
@@ -397,12 +417,13 @@ impl BandSummary {
             all_samples: counts().sum(),
             pixels: [pixels.len() as u64, counts().filter(|n| *n > 0).count() as u64],
             invalid: pixels.iter().map(|p| p.invalid).sum(),
-            noise,
+            blocks,
             has_records: pixels.iter().any(|p| p.records > 0),
         }
     }
 
     fn of_all(bands: &[BandSummary]) -> Summary {
+        let blocks: Vec<Block> = bands.iter().flat_map(|band| band.blocks.iter().copied()).collect();
         Summary {
             samples: [
                 bands.iter().map(|band| band.samples[0]).min().unwrap_or(0),
@@ -412,7 +433,8 @@ impl BandSummary {
             all_samples: bands.iter().map(|band| band.all_samples).sum(),
             pixels: [0, 1].map(|i| bands.iter().map(|band| band.pixels[i]).sum()),
             invalid: bands.iter().map(|band| band.invalid).sum(),
-            noise: Noise::of_image(bands.iter().flat_map(|band| band.noise.iter().copied()).collect()),
+            noise: Noise::of_image(&blocks),
+            blocks,
             has_records: bands.iter().any(|band| band.has_records),
         }
     }

@@ -15,6 +15,43 @@ pub fn of_block(mean: f64, variance: f64) -> f64 {
     variance.sqrt() / (mean.abs() + DEFAULT_EPSILON)
 }
 
+/// How much more noise than asked for a block may have by the samples of the image to count as one that has it: the estimate of a
+/// block's noise is noisy itself, and so is the pilot's, which its number of samples follows from.
+pub const TOLERANCE: f64 = 1.25;
+
+/// A block that has light, and pixels with two samples.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Block {
+    /// Its noise.
+    pub noise: f64,
+    /// Greatest number of samples of a pixel.
+    pub samples: u64,
+}
+
+/// Shares of the blocks by a noise that was asked for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Reached {
+    /// Those that have it, within [`TOLERANCE`].
+    pub reached: f64,
+    /// Those that have more, with pixels of as many samples as there may be.
+    pub limited: f64,
+    /// All others.
+    pub others: f64,
+}
+
+impl Reached {
+    /// Where there are at most `limit` samples per pixel; `None` if the noise of no block is known.
+    pub fn of(blocks: &[Block], target: f64, limit: u32) -> Option<Self> {
+        let share = |is_one: &dyn Fn(&Block) -> bool| {
+            blocks.iter().filter(|block| is_one(block)).count() as f64 / blocks.len() as f64
+        };
+        let is_reached = |block: &Block| block.noise <= TOLERANCE * target;
+        let reached = share(&is_reached);
+        let limited = share(&|block| !is_reached(block) && block.samples >= u64::from(limit));
+        (!blocks.is_empty()).then_some(Reached { reached, limited, others: (1.0 - reached - limited).max(0.0) })
+    }
+}
+
 /// The noise of an image.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Noise {
@@ -26,7 +63,8 @@ pub struct Noise {
 
 impl Noise {
     /// From the noise of all blocks.
-    pub(super) fn of_image(mut blocks: Vec<f64>) -> Self {
+    pub(super) fn of_image(blocks: &[Block]) -> Self {
+        let mut blocks: Vec<f64> = blocks.iter().map(|block| block.noise).collect();
         blocks.sort_unstable_by(f64::total_cmp);
         let (below, middle) = (blocks.len().saturating_sub(1) / 2, blocks.len() / 2);
         let Some(&upper) = blocks.get(middle) else { return Noise { median: f64::INFINITY, above_twice: 0.0 } };
@@ -38,18 +76,19 @@ impl Noise {
 
 /// The noise of the blocks of some rows, [`BLOCK`] at most, by the variances of their pixels' means; of those that have light, and
 /// pixels with two samples. Channels are taken to vary together, as they do with the light that a path finds.
-pub(super) fn of_blocks(rows: &PixelBounds, pixels: &[PixelSums], variances: &[[f64; 3]]) -> Vec<f64> {
+pub(super) fn of_blocks(rows: &PixelBounds, pixels: &[PixelSums], variances: &[[f64; 3]]) -> Vec<Block> {
     let width = rows.width() as usize;
     let of_columns = |first: usize| {
         let columns = first..width.min(first + BLOCK as usize);
         let indices = (0..rows.height() as usize).flat_map(|y| columns.clone().map(move |x| y * width + x));
-        let (mut count, mut mean, mut variance) = (0.0, 0.0, 0.0);
+        let (mut count, mut mean, mut variance, mut samples) = (0.0, 0.0, 0.0, 0);
         for i in indices.filter(|i| pixels[*i].count > 1) {
             count += 1.0;
+            samples = samples.max(pixels[i].count);
             mean += luminance(pixels[i].mean());
             variance += luminance(variances[i].map(f64::sqrt)).powi(2);
         }
-        (mean != 0.0 || variance > 0.0).then(|| of_block(mean / count, variance / count))
+        (mean != 0.0 || variance > 0.0).then(|| Block { noise: of_block(mean / count, variance / count), samples })
     };
     (0..width).step_by(BLOCK as usize).filter_map(of_columns).collect()
 }
@@ -59,7 +98,7 @@ mod tests {
     use super::*;
 
     /// A row of two blocks and a half with a mean of 1, where the first is black.
-    fn noise(variance_of: impl Fn(usize) -> f64) -> Vec<f64> {
+    fn blocks(variance_of: impl Fn(usize) -> f64) -> Vec<Block> {
         let rows = PixelBounds { x0: 5, x1: 45, y0: 3, y1: 4 };
         let pixel = |x: usize| {
             let value = if x < 16 { 0.0 } else { 1.0 };
@@ -73,17 +112,33 @@ mod tests {
     #[test]
     fn the_noise_of_a_block_is_its_standard_error_by_its_mean() {
         // One pixel of 16, and half of 8
-        let found = noise(|x| if x == 20 { 0.16 } else { f64::from(u8::from(x > 35)) });
+        let found = blocks(|x| if x == 20 { 0.16 } else { f64::from(u8::from(x > 35)) });
         let expected = [0.1 / 1.01, (0.5_f64).sqrt() / 1.01];
         assert_eq!(found.len(), 2, "a black block is none");
-        assert!(found.iter().zip(expected).all(|(a, b)| (a / b - 1.0).abs() < 1e-12), "{found:?}");
+        assert!(
+            found.iter().zip(expected).all(|(a, b)| (a.noise / b - 1.0).abs() < 1e-12 && a.samples == 4),
+            "{found:?}"
+        );
+    }
+
+    fn of(noise: &[f64]) -> Noise {
+        Noise::of_image(&noise.iter().map(|&noise| Block { noise, samples: 4 }).collect::<Vec<_>>())
     }
 
     #[test]
     fn one_block_of_any_noise_does_not_change_the_median() {
-        let noise = Noise::of_image(vec![0.1, 9.29, 0.2, 0.3, 0.15]);
+        let noise = of(&[0.1, 9.29, 0.2, 0.3, 0.15]);
         assert_eq!(noise, Noise { median: 0.2, above_twice: 0.2 });
-        assert_eq!(Noise::of_image(vec![0.1, 0.3]), Noise { median: 0.2, above_twice: 0.0 });
-        assert_eq!(Noise::of_image(Vec::new()).median, f64::INFINITY);
+        assert_eq!(of(&[0.1, 0.3]), Noise { median: 0.2, above_twice: 0.0 });
+        assert_eq!(of(&[]).median, f64::INFINITY);
+    }
+
+    #[test]
+    fn blocks_above_the_noise_that_was_asked_for_hit_the_limit_or_not() {
+        let block = |noise, samples| Block { noise, samples };
+        let blocks = [block(0.01, 3), block(0.0249, 64), block(0.026, 64), block(0.03, 63)];
+        let expected = Reached { reached: 0.5, limited: 0.25, others: 0.25 };
+        assert_eq!(Reached::of(&blocks, 0.02, 64), Some(expected));
+        assert_eq!(Reached::of(&[], 0.02, 64), None);
     }
 }

@@ -50,7 +50,7 @@ impl VertexSearch {
         let scale = path.ray.d.length();
         let (o, d) = (path.ray.o, path.ray.d / scale);
         let segment = Segment { o, d, length: hit.map_or(f32::INFINITY, |hit| hit.t * scale) };
-        let [stream, _] = self.arrivals.streams(&at.samples[path.sample as usize], path.branch);
+        let stream = at.samples[path.sample as usize].stream;
         let mut numbers = Numbers::new(stream.domain(domain::FLIGHT + at.vertex).domain(path.passed));
         let Flight { end, .. } = medium.fly(&segment, path.beta, &mut numbers, || None, (0.0, |_: &Glimpse| 1.0));
         let (t, weight) = match end {
@@ -111,7 +111,7 @@ impl VertexSearch {
 
     /// Random numbers of what happens at the end of a flight.
     fn walk_numbers(&self, at: &Stage<'_, '_>, path: &PathState) -> [f32; 3] {
-        let [stream, _] = self.arrivals.streams(&at.samples[path.sample as usize], path.branch);
+        let stream = at.samples[path.sample as usize].stream;
         stream.domain(domain::WALK + at.vertex).domain(path.passed).draw::<3>()
     }
 }

@@ -31,7 +31,7 @@ pub fn obstacle(job: &RenderJob) -> Option<&'static str> {
     let of_paths = matches!(settings.kind, IntegratorKind::Direct | IntegratorKind::Path);
     let has_sums = match Estimator::at_vertex(settings, 0) {
         Estimator::Mc(_) | Estimator::Mis(_) | Estimator::Contributing(_) => true,
-        Estimator::Ris(ris) => !ris.has_control() && !ris.has_fitted_control(),
+        Estimator::Ris(ris) => !ris.has_control(),
         Estimator::Ocv(_) | Estimator::OptimalMis(_) | Estimator::Correlated(_) => false,
     };
     let reasons = [

@@ -3,10 +3,10 @@
 //! An [`Integrator`] is what all threads share while an image is rendered: it prepares what samples need, makes a
 //! [`Tracer`] for each thread, and reports. Reading order: `segment` is a path between two vertices, `vertices` finds
 //! the next ones, `interior` walks through materials on the way there, and [`path`] is the loop over them; `wavefront` has the vertices of `mc` and `mis` side by side.
-//! `roulette` decides which paths end and split where they arrive (`arrivals`), by what `pilot` paths found.
-//! Pixels that are neighbours may share paths ([`reuse`]), and light paths bring caustics ([`light_paths`]). [`through_media`] says which settings know participating media. [`irradiance_cache`] and [`photon_map`] replace the light that Lambertian parts reflect (`diffuse`).
+//! Pixels that are neighbours may share paths ([`reuse`]; which ones: [`cells`]), and light paths bring caustics ([`light_paths`]). [`through_media`] says which settings know participating media. [`irradiance_cache`] and [`photon_map`] replace the light that Lambertian parts reflect (`diffuse`).
 
-mod arrivals;
+pub mod camera_samples;
+pub mod cells;
 mod diffuse;
 mod interior;
 pub mod irradiance_cache;
@@ -14,9 +14,7 @@ pub mod light_layers;
 pub mod light_paths;
 pub mod path;
 pub mod photon_map;
-mod pilot;
 pub mod reuse;
-mod roulette;
 mod segment;
 pub mod through_media;
 mod vertices;
@@ -26,13 +24,12 @@ pub use irradiance_cache::{CacheIntegrator, CacheReport, IrradianceCache};
 pub use light_paths::LightPathStats;
 pub use path::{CameraSample, PathIntegrator, PathStats, PathTracer};
 pub use photon_map::{MapStats, PhotonMapIntegrator};
-pub use pilot::GuidedIntegrator;
 
 use crate::direct::Fits;
 use crate::film::{FeatureSet, PixelSample};
 use crate::photons::PhotonError;
 use crate::scene::RenderJob;
-use crate::settings::{IntegratorKind, RouletteKind};
+use crate::settings::IntegratorKind;
 use lumiris_numbers::math::Rgb;
 use std::sync::atomic::AtomicBool;
 
@@ -84,9 +81,6 @@ pub fn integrator<'a>(
     stop: &'a AtomicBool,
 ) -> Result<Box<dyn Integrator + 'a>, PhotonError> {
     Ok(match job.settings().integrator.kind {
-        IntegratorKind::Path if job.settings().integrator.roulette != RouletteKind::Throughput => {
-            Box::new(GuidedIntegrator::new(job))
-        }
         IntegratorKind::Direct | IntegratorKind::Path => Box::new(PathIntegrator::new(job)),
         IntegratorKind::IrradianceCache => Box::new(CacheIntegrator::new(job, cameras, stop)),
         IntegratorKind::PhotonMap => Box::new(PhotonMapIntegrator::new(job, cameras, stop)?),

@@ -11,8 +11,9 @@
 //!
 //! All integrators follow their paths through the one loop here; [`AtVertices`] is what they do differently.
 
+use super::cells::Groups;
 use super::light_paths::{LightImage, LightPilot};
-use super::reuse::{self, Groups, Place, Reuse};
+use super::reuse::{self, Place, Reuse};
 pub use super::segment::{CameraSample, PathStats};
 use super::segment::{PathState, Vertex, emptied, extend, extend_to_emitter};
 pub use super::vertices::Recording;
@@ -114,6 +115,9 @@ pub struct Outcome {
     pub contribution: Rgb,
 }
 
+/// Paths that are traced together: enough that stages run long, few enough that their data stays in the cache.
+pub const BATCH_PATHS: usize = 4096;
+
 /// Traces paths; holds the buffers of one worker.
 #[derive(Debug, Default)]
 pub struct PathTracer {
@@ -213,8 +217,7 @@ impl PathTracer {
                 break;
             }
             let estimate = Estimate::new(settings, vertex).filter(|_| is_plain && !job.shadows_pass());
-            let room = count * self.search.arrivals.max_paths() as usize;
-            let mut batch = estimate.map(|e| Batch::new(self.buffers.take().unwrap_or_default(), e, room));
+            let mut batch = estimate.map(|e| Batch::new(self.buffers.take().unwrap_or_default(), e, count));
             let stage = Stage { job, vertex, depth, samples, out: &mut *out, batch: batch.as_mut() };
             let vertices = self.search.find(stage);
             let found = Found { vertex, paths: &self.search.active, vertices: &vertices };

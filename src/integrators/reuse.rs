@@ -12,32 +12,29 @@
 //! whether an x_i takes part does not depend on the direction that it drew, and light from surfaces that are not
 //! Lambertian, beyond others that do not scatter, or of emitters, remains with its own path.
 //!
-//! The samples of one turn in a block of pixels are a group. Where blocks lie depends on the turn, so that the noise of
-//! two pixels is never the same for all samples. Groups end at [cells](CELL), which are always rendered together: so
-//! images do not depend on tiles. Where pixels have different numbers of samples, those of one turn are of the same part of
-//! the image ([`crate::scene::PixelSamples::turn`]); the numbers are independent of the samples, and so is who is in a group.
+//! The samples of one turn in a block of pixels are a group. Blocks depend on the turn, so that the noise of two pixels is never
+//! the same for all samples, and are within [cells](super::cells), which are always rendered together. Where pixels have
+//! different numbers of samples, those of one turn are of the same part of the image
+//! ([`crate::scene::PixelSamples::turn`]); the numbers are independent of the samples, and so is who is in a group.
 
+use super::cells::Groups;
 use super::light_layers;
 use super::segment::CameraSample;
 use crate::accel::{Coherence, RayBatch};
+use crate::direct::Estimator;
 use crate::film::PixelSample;
 use crate::scene::RenderJob;
-use crate::settings::{IntegratorKind, RouletteKind};
+use crate::settings::IntegratorKind;
 use lumiris_lanes::columns::{Column, Columns3, padded, reserve};
 use lumiris_lanes::connections::{Connections, Vertices, connect};
 use lumiris_lanes::lane::LANES;
 use lumiris_lanes::level;
 use lumiris_lanes::vertex::Ends;
-use lumiris_numbers::math::hash::pcg4d;
 use lumiris_numbers::math::ray::SEGMENT_END;
 use lumiris_numbers::math::{Rgb, Vec3};
 
-/// Edge of the squares of pixels that groups lie in, from the corner of the image.
-pub const CELL: u32 = 16;
 /// Second vertices that are connected together.
 const TOGETHER: usize = 16;
-/// Seed of where blocks lie.
-const SEED: u32 = 0x72_65_75_73;
 
 /// The edge of the blocks of pixels that share paths; 1 if none do.
 pub fn edge(job: &RenderJob) -> u32 {
@@ -52,7 +49,10 @@ pub fn obstacle(job: &RenderJob) -> Option<&'static str> {
     let reasons = [
         (settings.depth() < 2, "paths of one bounce have nothing to share"),
         (settings.kind != IntegratorKind::Path, "only the integrator path has paths of its own for each pixel"),
-        (settings.roulette != RouletteKind::Throughput, "they split"),
+        (
+            Estimator::at_vertex(settings, 0).is_progressive(),
+            "with a progressive estimator, samples depend on earlier ones of their pixel",
+        ),
         (
             job.shadows_pass(),
             "rays may pass surfaces between their vertices, bounds of media or mixtures with `interface`",
@@ -62,18 +62,6 @@ pub fn obstacle(job: &RenderJob) -> Option<&'static str> {
         (geometry.has_motion() || is_cut_out, "what a ray meets varies with time or is cut out at random"),
     ];
     reasons.into_iter().find(|(holds, _)| *holds).map(|(_, reason)| reason)
-}
-
-/// Which samples of a batch are a group.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Groups {
-    /// None: the batch does not have all samples of a cell.
-    #[default]
-    None,
-    /// Those of a block, which lies anywhere in its cell.
-    Cells,
-    /// Those of a block of a grid over the image.
-    Grid,
 }
 
 /// A Lambertian vertex: its point, the bound of its rounding error, and the geometric and the shading normal on the side
@@ -249,7 +237,9 @@ impl Reuse {
             return 0;
         }
         let (origin, groups, edge) = (job.world.scene.film.bounds, self.groups, self.edge);
-        let group = |s: &CameraSample| groups.of(edge, [s.pixel[0] - origin.x0, s.pixel[1] - origin.y0], s.turn);
+        let rule = (edge, job.settings().sampling.seed);
+        let pixel = |s: &CameraSample| [s.pixel[0] - origin.x0, s.pixel[1] - origin.y0];
+        let group = |s: &CameraSample| groups.of(rule, pixel(s), (s.turn, s.is_replica));
         self.order.clear();
         self.order.extend(samples.iter().zip(0_u128..).map(|(s, i)| u128::from(group(s)) << 32 | i));
         self.order.sort_unstable();
@@ -403,24 +393,5 @@ impl Places {
     fn vertices(&self, len: usize) -> Vertices<'_> {
         let Places { p, p_error, n, ns } = self;
         Vertices { ends: Ends { p: p.get(len), p_error: p_error.get(len), n: n.get(len) }, ns: ns.get(len) }
-    }
-}
-
-impl Groups {
-    /// The group of a sample of a pixel, counted from the corner of the image.
-    fn of(self, edge: u32, [x, y]: [u32; 2], turn: u32) -> u64 {
-        let (cell, block) = match self {
-            Groups::None => return 0,
-            Groups::Grid => ([x / edge, y / edge], [0; 2]),
-            Groups::Cells => {
-                let cell = [x / CELL, y / CELL];
-                let [dx, dy, ..] = pcg4d([cell[0], cell[1], turn, SEED]);
-                let block = |p: u32, d: u32| (p % CELL + d % edge) / edge;
-                (cell, [block(x, dx), block(y, dy)])
-            }
-        };
-        // A batch has few cells, near each other, and at most CELL blocks in a row of one
-        let ([cell_x, cell_y], [block_x, block_y]) = (cell.map(|c| u64::from(c & 0x7ff)), block.map(u64::from));
-        u64::from(turn) << 32 | cell_y << 21 | cell_x << 10 | block_y << 5 | block_x
     }
 }

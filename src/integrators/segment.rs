@@ -28,9 +28,6 @@ pub(super) mod domain {
     pub(crate) const ALBEDO: u32 = 4;
     /// Vertex k uses the domain `VERTEX + k` of the camera sample.
     pub(crate) const VERTEX: u32 = 16;
-    /// Paths that are `count` at vertex k use points of the domain `SPLIT + 16 k + count` in place of that of the path
-    /// which they were until then.
-    pub(crate) const SPLIT: u32 = 1 << 20;
     /// The way to vertex k, through media, uses the domain `FLIGHT + k`.
     pub(crate) const FLIGHT: u32 = 1 << 19;
     /// The light about which distances of a flight may be equiangular.
@@ -116,8 +113,6 @@ pub struct CameraSample {
 pub(super) struct PathState {
     /// Index of the camera sample.
     pub(super) sample: u32,
-    /// Number of its random numbers, if it is one of several paths of the sample; 0 are those of the sample.
-    pub(super) branch: u32,
     pub(super) ray: Ray,
     pub(super) beta: Rgb,
     /// Squared relative index of refraction along the path, which roulette takes out of β.
@@ -146,8 +141,6 @@ pub(super) struct PathState {
 pub(super) struct Carried {
     /// Index of the camera sample.
     pub(super) sample: u32,
-    /// See [`PathState`].
-    pub(super) branch: u32,
     pub(super) beta: Rgb,
     pub(super) eta_scale: f32,
     /// Width of a pixel at the vertex, and its growth per unit length.
@@ -166,9 +159,8 @@ impl PathState {
     /// At a vertex with the throughput `beta`, where a pixel has the given width.
     #[inline]
     pub(super) fn carried(&self, beta: Rgb, width: f32) -> Carried {
-        let PathState { sample, branch, eta_scale, spread, passed, wavelength, chain, ray: Ray { time, .. }, .. } =
-            *self;
-        Carried { sample, branch, beta, eta_scale, width, spread, time, passed, wavelength, chain }
+        let PathState { sample, eta_scale, spread, passed, wavelength, chain, ray: Ray { time, .. }, .. } = *self;
+        Carried { sample, beta, eta_scale, width, spread, time, passed, wavelength, chain }
     }
 
     /// What the path carries of the emission of a surface, with the weight of the technique that found it.
@@ -309,11 +301,10 @@ impl Carried {
     /// The path from the origin `o` on in the direction `wi`, with what [`Self::beyond`] says.
     #[inline]
     pub(super) fn segment(&self, o: Vec3, wi: Vec3, beta: Rgb, eta_scale: f32) -> PathState {
-        let Carried { sample, branch, width, spread, time, wavelength, chain, .. } = *self;
+        let Carried { sample, width, spread, time, wavelength, chain, .. } = *self;
         let ray = Ray { o, d: wi, t_max: f32::INFINITY, time };
         PathState {
             sample,
-            branch,
             ray,
             beta,
             eta_scale,

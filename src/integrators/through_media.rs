@@ -1,7 +1,7 @@
 //! Which settings estimate light transport through media.
 
 use crate::scene::RenderJob;
-use crate::settings::{EstimatorKind, IntegratorKind, IntegratorSettings, Target};
+use crate::settings::{EstimatorKind, IntegratorKind, IntegratorSettings};
 
 /// Why an image of these settings cannot be rendered where there are media, and what can; `None` if it can.
 pub fn obstacle_of(settings: &IntegratorSettings) -> Option<String> {
@@ -30,9 +30,7 @@ pub fn obstacle_of(settings: &IntegratorSettings) -> Option<String> {
             <&str>::from(settings.estimator)
         ));
     }
-    // What a pixel has of its light is weakened on the way, and not what is fitted
-    let is_fitted = settings.estimator == EstimatorKind::Ris && settings.ris.target == Target::FglControl;
-    (traces_first(settings) || is_fitted).then(|| {
+    traces_first(settings).then(|| {
         let target: &'static str = settings.ris.target.into();
         format!(
             "the target {target} leaves out participating media, which this scene has: fgl and visibility know them"

@@ -1,7 +1,6 @@
 //! From rays to vertices: paths are traced to the next surface that scatters, and carry what they see of emitters on the
 //! way.
 
-use super::arrivals::Arrivals;
 use super::light_layers::LayerSums;
 use super::light_paths::{Chain, Guide};
 use super::segment::{CameraSample, Carried, PathState, PathStats, Vertex, domain, emptied};
@@ -73,8 +72,6 @@ pub(super) struct VertexSearch {
     pub(super) only_reflected: bool,
     /// The features of first surfaces that are determined.
     pub(super) features: FeatureSet,
-    /// What is done about paths that arrive at vertices.
-    pub(super) arrivals: Arrivals,
     /// What is of each light group.
     pub(super) layers: LayerSums,
     /// Of the light paths that bring a part of the light, if any do.
@@ -89,11 +86,9 @@ impl VertexSearch {
         out.clear();
         out.resize(samples.len(), PixelSample::default());
         self.layers.begin(samples.len());
-        self.arrivals.start();
         self.active.clear();
         self.active.extend(samples.iter().enumerate().map(|(i, s)| PathState {
             sample: i as u32,
-            branch: 0,
             ray: s.ray.ray,
             beta: Rgb::splat(s.weight),
             eta_scale: 1.0,
@@ -173,14 +168,7 @@ impl VertexSearch {
             } else {
                 Chain::NONE
             };
-            let place = || (path.ray.at(hit.t), facing_normal(at.job, hit, d));
-            let found = at.out[path.sample as usize].radiance;
-            let (arrivals, branch) = (&mut self.arrivals, carried.branch);
-            let count = arrivals.arrive((sample, found), at.vertex, &mut carried, place);
-            for index in 0..count {
-                carried.branch = arrivals.branch(sample, branch, at.vertex, (count, index));
-                batch.push_hit(at.job, (&carried, d), hit, rho, arrivals.streams(sample, carried.branch));
-            }
+            batch.push_hit(at.job, (&carried, d), hit, rho, [sample.stream, sample.direct]);
         }
         true
     }
@@ -226,24 +214,17 @@ impl VertexSearch {
         let path = &path;
         let media = interaction.sides(at.job, path.medium);
         let Some((bsdf, beta)) = self.leave(at, (path, beta), &interaction, (bsdf, media)) else { return };
-        let out = &at.out[path.sample as usize];
         let mut carried = path.carried(beta, width);
         carried.chain = self.chain(at, path, &interaction, &bsdf);
-        let (surface, wo) = (interaction.surface, interaction.wo);
-        let place = || (surface.p, if surface.n.dot(wo) < 0.0 { -surface.n } else { surface.n });
-        let count = self.arrivals.arrive((sample, out.radiance), at.vertex, &mut carried, place);
-        let parent = carried.branch;
-        for index in 0..count {
-            carried.branch = self.arrivals.branch(sample, parent, at.vertex, (count, index));
-            let streams = self.arrivals.streams(sample, carried.branch);
-            let is_taken = |batch: &mut &mut Batch<'w>| batch.push_vertex(&carried, &interaction, &bsdf, streams);
-            if media == Sides::default() && at.batch.as_mut().is_some_and(is_taken) {
-                continue;
-            }
-            let [stream, direct] = streams.map(|s| s.domain(domain::VERTEX + at.vertex));
-            self.keep(path, &carried);
-            vertices.push(Vertex { surface, bsdf, wo, stream, direct, is_next: path.passed == 0, media });
+        let streams = [sample.stream, sample.direct];
+        let is_taken = |batch: &mut &mut Batch<'w>| batch.push_vertex(&carried, &interaction, &bsdf, streams);
+        if media == Sides::default() && at.batch.as_mut().is_some_and(is_taken) {
+            return;
         }
+        let (surface, wo) = (interaction.surface, interaction.wo);
+        let [stream, direct] = streams.map(|s| s.domain(domain::VERTEX + at.vertex));
+        self.keep(path, &carried);
+        vertices.push(Vertex { surface, bsdf, wo, stream, direct, is_next: path.passed == 0, media });
     }
 
     /// True if light paths bring light to what the path has met.
@@ -271,7 +252,7 @@ impl VertexSearch {
     fn wavelength(&self, at: &Stage<'_, '_>, path: &PathState) -> (f32, Rgb) {
         path.wavelength.map_or_else(
             || {
-                let [stream, _] = self.arrivals.streams(&at.samples[path.sample as usize], path.branch);
+                let stream = at.samples[path.sample as usize].stream;
                 sample_wavelength(stream.domain(domain::WAVELENGTH).draw::<1>()[0])
             },
             |lambda| (lambda, Rgb::WHITE),
@@ -281,9 +262,8 @@ impl VertexSearch {
     /// Keeps a path at a vertex, with what it has carried there.
     #[inline]
     fn keep(&mut self, path: &PathState, carried: &Carried) {
-        let Carried { beta, branch, width, wavelength, chain, .. } = *carried;
+        let Carried { beta, width, wavelength, chain, .. } = *carried;
         self.kept.push(PathState {
-            branch,
             beta,
             width,
             wavelength,
@@ -312,7 +292,7 @@ impl VertexSearch {
         let scale = path.ray.d.length();
         let (o, d) = (path.ray.o, path.ray.d / scale);
         let segment = Segment { o, d, length: hit.map_or(f32::INFINITY, |hit| hit.t * scale) };
-        let [stream, _] = self.arrivals.streams(&at.samples[path.sample as usize], path.branch);
+        let stream = at.samples[path.sample as usize].stream;
         let mut numbers = Numbers::new(stream.domain(domain::FLIGHT + at.vertex).domain(path.passed));
         // What light samples could have found as well, which need no more to be seen than what is near
         let technique = path.technique.filter(|technique| technique.pdf.is_some());
@@ -352,18 +332,12 @@ impl VertexSearch {
         vertices: &mut Vec<Vertex<'w>>,
     ) {
         let Some(beta) = path.beta_beyond_emitter() else { return };
-        let (sample, out) = (&at.samples[path.sample as usize], &at.out[path.sample as usize]);
+        let sample = &at.samples[path.sample as usize];
         let (width, wo) = (path.width + path.spread * t, bsdf.frame.z);
-        let mut carried = path.carried(beta * weight, width);
-        let count = self.arrivals.arrive((sample, out.radiance), at.vertex, &mut carried, || (surface.p, wo));
-        let (parent, media) = (carried.branch, Sides::both(path.medium));
-        for index in 0..count {
-            carried.branch = self.arrivals.branch(sample, parent, at.vertex, (count, index));
-            let streams = self.arrivals.streams(sample, carried.branch);
-            let [stream, direct] = streams.map(|s| s.domain(domain::VERTEX + at.vertex));
-            self.keep(path, &carried);
-            vertices.push(Vertex { surface, bsdf, wo, stream, direct, is_next: path.passed == 0, media });
-        }
+        let [stream, direct] = [sample.stream, sample.direct].map(|s| s.domain(domain::VERTEX + at.vertex));
+        self.keep(path, &path.carried(beta * weight, width));
+        let media = Sides::both(path.medium);
+        vertices.push(Vertex { surface, bsdf, wo, stream, direct, is_next: path.passed == 0, media });
     }
 
     /// Adds what the escaped paths carry of infinite lights, with the weight of the technique that found it.

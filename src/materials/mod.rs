@@ -261,6 +261,11 @@ impl MaterialSet {
         MaterialSet { caustics, ..self }
     }
 
+    /// True if any material bundles light to caustics.
+    pub fn make_caustics(&self) -> bool {
+        self.caustics.contains(&true)
+    }
+
     /// True if what a hit of the material is made of is drawn anew for every direction.
     pub fn is_mixture(&self, id: MaterialId) -> bool {
         matches!(self.entries[id as usize].material, Material::Mix { .. })

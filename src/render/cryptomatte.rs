@@ -11,7 +11,7 @@
 use super::{BATCH_PATHS, RenderSettings, ThreadError, position, thread_pool};
 use crate::accel::{Coherence, Hit, RayBatch};
 use crate::film::{Film, PixelBounds};
-use crate::render::camera_samples::{CameraSampler, Scratch};
+use crate::integrators::camera_samples::{CameraSampler, Scratch};
 use crate::scene::{RenderJob, Scene};
 use rayon::prelude::*;
 use std::collections::{BTreeMap, HashSet};

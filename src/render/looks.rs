@@ -4,11 +4,11 @@
 //! far lower cost. At the edge of a lamp nearly all of the variance is that of the former: so the sample is *split* there
 //! [Arvo and Kirk 1990] into several camera rays, of which only one becomes a path. With the emission e that its own ray
 //! sees, and that of m − 1 others, the sample f becomes f − e + (e + Σ e_i)/m, which has the same expected value. How many
-//! there are follows from a pilot ([`super::allocation`]) and not from the samples themselves.
+//! there are follows from a pilot ([`crate::planning::allocation`]) and not from the samples themselves.
 
-use super::camera_samples::{CameraSampler, Scratch};
 use super::tiles::batches;
 use crate::film::{FeatureSet, PixelSample};
+use crate::integrators::camera_samples::{CameraSampler, Scratch};
 use crate::integrators::path::CameraSample;
 use crate::integrators::{PathStats, PathTracer, Tracer};
 use crate::scene::RenderJob;

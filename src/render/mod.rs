@@ -4,56 +4,37 @@
 //! by its coordinates and their index, traced independently of what else is in their batch, and added to exact sums; so
 //! neither threads, nor tiles, nor passes, nor [`parts`] of the image change a bit.
 
-pub mod allocation;
-mod allocation_counts;
-pub mod auto;
-mod auto_candidates;
-mod auto_check;
-mod auto_contributing;
-mod auto_lights;
-mod auto_measure;
-mod auto_pixels;
-mod auto_reuse;
-mod auto_round;
-pub mod bench;
-pub mod bench_frame;
-pub mod bench_photons;
-mod camera_samples;
-mod control_pilot;
+pub mod batches;
+pub mod cell_progress;
 mod control_variates;
-pub mod crosscheck;
 pub mod cryptomatte;
-pub mod efficiency;
 mod looks;
 pub mod memory;
-pub mod noise;
 pub mod output;
+mod pace;
 pub mod parts;
-mod pilot_samples;
-pub mod plan;
-mod preparation;
-pub mod processor_time;
 mod run;
+mod shared_cells;
 mod tiles;
-pub mod visibility_cache;
 mod worker;
 
 use crate::direct::Estimator;
 use crate::film::Film;
 pub use crate::integrators::CacheReport;
-use crate::integrators::{LightPathStats, MapStats, PathStats, through_media};
+pub use crate::integrators::path::BATCH_PATHS;
+use crate::integrators::{LightPathStats, MapStats, PathStats, reuse, through_media};
 use crate::photons::PhotonError;
+use crate::planning::PlanError;
+pub use crate::planning::preparation::{ThreadError, thread_pool};
 use crate::scene::RenderJob;
 use crate::settings::Settings;
+use cell_progress::CellProgress;
 use parts::{Checkpoints, PartError, StoredTile};
-use run::{Run, batch_parts, camera_batches};
+use run::Run;
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 use tiles::position;
 pub use tiles::{TileShare, Tiles};
-
-/// Paths that are traced together: enough that stages run long, few enough that their data stays in the cache.
-const BATCH_PATHS: usize = 4096;
 
 /// How to render. Only the sample range affects the image.
 #[derive(Clone, Copy, Debug)]
@@ -71,7 +52,7 @@ pub struct RenderSettings {
     pub skip: u32,
     /// The pixels that are rendered; all if `None`.
     pub share: Option<TileShare>,
-    /// Stops after the first pass that ends later than this.
+    /// No tile is begun later than this; without a sample, half a second later, or 3 %.
     pub time_limit: Option<Duration>,
     /// Estimates some pixels twice, which gives the variance of pixel means; see [`crate::film::replicas`].
     pub with_replicas: bool,
@@ -146,6 +127,8 @@ pub type PassObserver<'a> = dyn Fn(&Progress) + Sync + 'a;
 pub struct Continuation<'a> {
     /// The sums of an earlier rendering by the same settings. Their tiles are those of the rendering.
     pub stored: Option<Vec<StoredTile>>,
+    /// How far its cells are.
+    pub cells: CellProgress,
     /// Stores the sums from time to time, and in the end.
     pub checkpoints: Option<&'a mut Checkpoints>,
     /// Whether the exact sums are part of the result.
@@ -168,6 +151,9 @@ pub enum RenderError {
     /// There are media, and the settings leave them out.
     #[error("{0}")]
     Media(String),
+    /// A share of the pixels is asked for, and pixels share paths.
+    #[error("{SHARED}")]
+    Shared,
     /// It was stopped before the first sample.
     #[error("stopped before the first sample")]
     Stopped,
@@ -179,13 +165,19 @@ pub enum RenderError {
     Stored(#[from] PartError),
 }
 
-/// Why threads could not start.
-#[derive(Debug, thiserror::Error)]
-#[error("cannot start {threads} threads: {cause}")]
-pub struct ThreadError {
-    threads: usize,
-    cause: rayon::ThreadPoolBuildError,
+impl From<PlanError> for RenderError {
+    fn from(error: PlanError) -> Self {
+        match error {
+            PlanError::Threads(error) => RenderError::Threads(error),
+            PlanError::Media(obstacle) => RenderError::Media(obstacle),
+            PlanError::Stopped => RenderError::Stopped,
+        }
+    }
 }
+
+/// Why a part of an image whose pixels share paths cannot be a share of the pixels.
+pub(crate) const SHARED: &str = "pixels share paths with others all over the image: divide it with --part-by samples, or render \
+                                 with --path-reuse 1";
 
 /// Renders. `stop` ends it after the tiles under way; `observe` is called from worker threads.
 pub fn render(
@@ -208,6 +200,9 @@ pub fn go_on(
     if let Some(obstacle) = through_media::obstacle(job) {
         return Err(RenderError::Media(obstacle));
     }
+    if settings.share.is_some() && reuse::edge(job) > 1 {
+        return Err(RenderError::Shared);
+    }
     let pool = thread_pool(settings.threads)?;
     let threads = pool.current_num_threads();
     pool.install(|| Run::new(job, settings, stop, observe).run(threads, continuation))
@@ -216,11 +211,4 @@ pub fn go_on(
 /// True if the samples of a pixel depend on earlier ones: it cannot be divided into parts.
 pub fn depends_on_earlier_samples(settings: &Settings) -> bool {
     Estimator::at_vertex(&settings.integrator, 0).is_progressive()
-}
-
-/// Threads, all cores if their number is not given.
-pub fn thread_pool(threads: Option<usize>) -> Result<rayon::ThreadPool, ThreadError> {
-    let threads = threads.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, usize::from));
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
-    pool.map_err(|cause| ThreadError { threads, cause })
 }

@@ -240,10 +240,10 @@ pub fn metadata(film: &FilmSettings, settings: &Settings) -> Vec<(String, String
         ("resolution", format!("{}x{}", film.resolution[0], film.resolution[1])),
         ("crop", format!("{},{},{},{}", b.x0, b.x1, b.y0, b.y1)),
     ];
-    let version = [("version", env!("CARGO_PKG_VERSION").to_owned())].into_iter();
+    let own = [("version", env!("CARGO_PKG_VERSION").to_owned()), ("summary", settings.summary())].into_iter();
     let recorded = settings.recorded().map(|(key, value)| (key, value.to_string()));
     let biases = settings.biases().into_iter().map(|bias| ("biased", bias.to_owned()));
-    let entries = version.chain(film).chain(recorded).chain(biases);
+    let entries = own.chain(film).chain(recorded).chain(biases);
     entries.map(|(key, value)| (format!("lumiris:{key}"), value)).collect()
 }
 

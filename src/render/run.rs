@@ -1,20 +1,23 @@
 //! A rendering under way: passes over all tiles, which pause for checkpoints.
 
-use super::camera_samples::{self, CameraSampler};
+use super::cell_progress::CellProgress;
 use super::control_variates;
+use super::pace::{of_first_samples, pass_in_time};
 use super::parts::{Checkpoints, PartError, StoredTile};
-use super::tiles::{SHARE_TILE, Tile, Tiles, batches, bounds_of_tiles, empty_layers, film, position, replica_choice};
+use super::tiles::{Tile, Tiles, batches, bounds_of_tiles, empty_layers, film, position, replica_choice};
 use super::worker::{AnyWorker, Workers};
 use super::{BATCH_PATHS, Continuation, Progress, RenderError, RenderSettings, Rendering, TileObserver};
-use crate::direct::Estimator;
+use crate::direct::{Estimator, Fits};
 use crate::film::packed::PackedSums;
+use crate::film::replicas::ReplicaAccumulator;
 use crate::film::replicas::ReplicaChoice;
 use crate::film::{FeatureSet, Film, FilmTile, PixelBounds};
 use crate::imaging::tiles::TileStore;
+use crate::integrators::camera_samples::{self, CameraSampler};
+use crate::integrators::cells::{self, REPLICA_CELL};
 use crate::integrators::path::CameraSample;
 use crate::integrators::{PathStats, Statistics, integrator, light_layers, reuse};
 use crate::scene::{FilmSettings, RenderJob};
-use crate::settings::{SamplingSettings, Settings};
 use lumiris_numbers::estimators::ocv::block_of;
 use lumiris_numbers::math::hash::pcg4d;
 use rayon::prelude::*;
@@ -30,59 +33,37 @@ const NOISE_INTERVAL: Duration = Duration::from_secs(1);
 /// The same by the time that one of them takes.
 const NOISE_REST: u32 = 50;
 
-// All samples of a cell are in one batch, and cells in one part of an image
-const _: () = assert!(BATCH_PATHS >= reuse::CELL.pow(2) as usize && SHARE_TILE.is_multiple_of(reuse::CELL));
+// All samples of a turn in a cell are in one batch
+const _: () = assert!(BATCH_PATHS >= cells::CELL.pow(2) as usize && BATCH_PATHS >= REPLICA_CELL.pow(2) as usize);
 
 /// Combined with the seed of the image to give that of replicas.
 const REPLICA_SEED: u32 = 0x72_65_70_73;
 
-/// Pixels of a tile.
-pub(super) type TilePart = (PixelBounds, Range<usize>);
-
-/// The pixels of batches as the renderer makes them in its first pass, spread over the image, about `rays` camera
-/// samples together; and the range of samples of each.
-pub(super) fn batch_parts(run: &Run<'_>, rays: usize) -> (Vec<TilePart>, Range<u32>) {
-    let per_pixel = run.settings.spp.min(run.pass_length()).max(1);
-    let pixels_per_batch = (BATCH_PATHS / per_pixel as usize).max(1);
-    let tiles = run.job.world.scene.film.bounds.tiles(run.tile_size);
-    let parts: Vec<_> = tiles
-        .iter()
-        .flat_map(|tile| {
-            let area = tile.area();
-            (0..area).step_by(pixels_per_batch).map(move |p| (*tile, p..area.min(p + pixels_per_batch)))
-        })
-        .collect();
-
-    // Every k-th batch
-    let all: usize = parts.iter().map(|(_, pixels)| pixels.len() * per_pixel as usize).sum();
-    let stride = all.div_ceil(rays.max(1)).max(1);
-    (parts.into_iter().step_by(stride).collect(), 0..per_pixel)
+/// A pass over all tiles.
+pub(super) struct Pass<'a> {
+    pub(super) samples: Range<u32>,
+    /// What those who observe it are told of the noise.
+    pub(super) noise: Option<f64>,
+    pub(super) watch: Option<&'a TileObserver<'a>>,
+    /// Nothing is begun after that.
+    pause: Option<Instant>,
 }
 
-/// Batches of camera samples as the renderer makes them in its first pass, spread over the image; about `rays`
-/// together.
-pub(super) fn camera_batches(job: &RenderJob, tile_size: u32, rays: usize) -> Vec<Vec<CameraSample>> {
-    let stop = AtomicBool::new(false);
-    let settings = RenderSettings { tile_size, spp: job.settings().sampling.spp, ..RenderSettings::default() };
-    let run = Run::new(job, &settings, &stop, &|_| ());
-    let (parts, samples) = batch_parts(&run, rays);
-    let mut scratch = camera_samples::Scratch::default();
-    let chosen = parts.iter().map(|(tile, pixels)| {
-        let mut batch = Vec::new();
-        run.camera_samples(tile, pixels.clone(), &samples, &mut scratch, &mut batch);
-        batch.iter_mut().for_each(|s| s.fit -= pixels.start as u32);
-        batch
-    });
-    chosen.collect()
+impl Pass<'_> {
+    /// True if it pauses.
+    pub(super) fn is_over(&self) -> bool {
+        self.pause.is_some_and(|pause| Instant::now() >= pause)
+    }
 }
 
 /// A rendering under way.
 pub(super) struct Run<'a> {
     pub(super) job: &'a RenderJob,
     settings: &'a RenderSettings,
-    shares_paths: bool,
-    /// Edge of tiles: of whole cells where pixels share paths.
-    tile_size: u32,
+    /// Passes are of cells, not of tiles.
+    pub(super) shares_paths: bool,
+    /// Edge of tiles: where pixels share paths, that of the cells that are estimated twice.
+    pub(super) tile_size: u32,
     stop: &'a AtomicBool,
     /// Where texels are that did not fit into memory.
     texels: Option<&'a TileStore>,
@@ -106,7 +87,7 @@ impl<'a> Run<'a> {
             job,
             settings,
             shares_paths,
-            tile_size: if shares_paths { reuse::CELL } else { settings.tile_size },
+            tile_size: if shares_paths { REPLICA_CELL } else { settings.tile_size },
             stop,
             texels: job.world.scene.textures.store(),
             observe,
@@ -119,32 +100,32 @@ impl<'a> Run<'a> {
     }
 
     pub(super) fn run(self, threads: usize, continuation: Continuation<'_>) -> Result<Rendering, RenderError> {
-        let Continuation { stored, mut checkpoints, keeps_sums, watch, passes } = continuation;
+        let Continuation { stored, cells, mut checkpoints, keeps_sums, watch, passes } = continuation;
         let seed = self.job.settings().sampling.seed;
         let cameras = |pixel, sample| self.camera.sample_of_seed(pixel, sample, seed);
         let mut integrator = integrator(self.job, &cameras, self.stop)?;
-        let mut tiles = self.tiles(stored)?;
+        let mut tiles = self.tiles(stored, cells)?;
 
         let end = self.end();
-        let begin = tiles.iter().map(|t| t.done).min().unwrap_or(end);
+        let begin = tiles.tiles.iter().map(|t| t.done).min().unwrap_or(end);
         let (mut first, mut noise, mut observed) = (begin, None, self.start + NOISE_INTERVAL);
         let mut stats = PathStats::default();
-        while first < end && !self.stopped() {
+        while first < end && !self.stopped(first - begin) {
             let served = end.min(first.saturating_add(integrator.prepare(first)?));
             let workers = Workers::new(&*integrator, self.features(), light_layers::count(self.job));
-            while first < served && !self.stopped() {
+            while first < served && !self.stopped(first - begin) {
                 let length = self.next_pass(first - self.settings.first_sample, first - begin);
                 let samples = first..first.saturating_add(length).min(served);
-                let watched = (noise, watch);
-                stats.merge(&self.whole_pass(&workers, &mut tiles, samples.clone(), watched, &mut checkpoints));
                 first = samples.end;
+                let pass = Pass { samples, noise, watch, pause: None };
+                stats.merge(&self.whole_pass(&workers, &mut tiles, pass, &mut checkpoints));
                 self.passes.fetch_add(1, Ordering::Relaxed);
                 if let (Some(passes), false) = (passes, self.stop.load(Ordering::Relaxed)) {
-                    passes(&self.progress(self.samples_total(&tiles), noise));
+                    passes(&self.progress(self.samples_total(&tiles.tiles), noise));
                 }
                 let now = Instant::now();
-                if now >= observed && first < end {
-                    noise = Some(self.film(&tiles).summary().noise.median);
+                if now >= observed && first < end && !self.is_late() {
+                    noise = Some(self.film(&tiles.tiles).summary().noise.median);
                     observed = Instant::now() + NOISE_INTERVAL.max(now.elapsed() * NOISE_REST);
                 }
             }
@@ -154,21 +135,21 @@ impl<'a> Run<'a> {
         if let Some(failure) = self.failure() {
             return Err(RenderError::Texels(failure.to_owned()));
         }
-        let complete = tiles.iter().all(|t| t.done >= end);
+        let complete = tiles.tiles.iter().all(|t| t.done >= end);
         let keeps_sums = keeps_sums || checkpoints.is_some();
         let Statistics { paths: stats, cache, photons, light, records } = integrator.statistics(stats);
-        add_records(&records, &mut tiles);
-        let mut film = self.film(&tiles);
-        control_variates::correct(&mut film, &tiles);
+        add_records(&records, &mut tiles.tiles);
+        let mut film = self.film(&tiles.tiles);
+        control_variates::correct(&mut film, &tiles.tiles);
         if let Some(checkpoints) = checkpoints {
             checkpoints.finish(&tiles);
         }
-        let sums = keeps_sums.then_some(Tiles(tiles));
+        let sums = keeps_sums.then_some(tiles);
         Ok(Rendering { film, stats, cache, photons, light, elapsed: self.start.elapsed(), complete, threads, sums })
     }
 
     /// Camera samples of all tiles, as if every pixel had the same number.
-    fn samples_total(&self, tiles: &[Tile]) -> u64 {
+    pub(super) fn samples_total(&self, tiles: &[Tile]) -> u64 {
         tiles.iter().map(|t| t.bounds.area() as u64).sum::<u64>() * u64::from(self.end() - self.begin())
     }
 
@@ -185,12 +166,12 @@ impl<'a> Run<'a> {
     }
 
     /// The index of the sample after the last one.
-    fn end(&self) -> u32 {
+    pub(super) fn end(&self) -> u32 {
         self.settings.first_sample + self.settings.spp
     }
 
     /// The tiles, with what is stored of them.
-    fn tiles(&self, stored: Option<Vec<StoredTile>>) -> Result<Vec<Tile>, PartError> {
+    fn tiles(&self, stored: Option<Vec<StoredTile>>, cells: CellProgress) -> Result<Tiles, PartError> {
         let replicas = replica_choice(self.job, self.settings);
         let bounds = self.job.world.scene.film.bounds;
         let tiles = match stored {
@@ -202,7 +183,8 @@ impl<'a> Run<'a> {
         }?;
         let done = |t: &Tile| t.bounds.area() as u64 * u64::from(t.done - self.begin());
         self.samples_done.store(tiles.iter().map(done).sum(), Ordering::Relaxed);
-        Ok(tiles)
+        let tiles = Tiles { tiles, cells };
+        if self.has_cells(&tiles) { Ok(tiles) } else { Err(PartError::Sums("their cells are not the same")) }
     }
 
     /// The index of the first sample that is not left to others.
@@ -214,22 +196,25 @@ impl<'a> Run<'a> {
     fn whole_pass(
         &self,
         workers: &Workers<'_>,
-        tiles: &mut [Tile],
-        samples: Range<u32>,
-        (noise, watch): (Option<f64>, Option<&TileObserver<'_>>),
+        tiles: &mut Tiles,
+        mut pass: Pass<'_>,
         checkpoints: &mut Option<&mut Checkpoints>,
     ) -> PathStats {
         let mut stats = PathStats::default();
         loop {
-            let pause = checkpoints.as_ref().map(|c| c.due());
-            stats.merge(&self.pass(workers, tiles, samples.clone(), (noise, watch, pause)));
+            pass.pause = checkpoints.as_ref().map(|c| c.due());
+            stats.merge(&if self.shares_paths {
+                self.pass_of_cells(workers, tiles, &pass)
+            } else {
+                self.pass(workers, &mut tiles.tiles, &pass)
+            });
             match checkpoints {
                 Some(checkpoints) if checkpoints.due() <= Instant::now() && self.failure().is_none() => {
                     checkpoints.store(tiles);
                 }
                 _ => {}
             }
-            if self.stops_at_once() || tiles.iter().all(|t| t.done >= samples.end) {
+            if self.stops_at_once() || tiles.tiles.iter().all(|t| t.done >= pass.samples.end || self.leaves(t.done)) {
                 return stats;
             }
         }
@@ -262,7 +247,7 @@ impl<'a> Run<'a> {
     }
 
     /// The film of one tile.
-    fn film_of(&self, tile: &Tile) -> Film {
+    pub(super) fn film_of(&self, tile: &Tile) -> Film {
         let pixels = FilmTile { bounds: tile.bounds, sums: Arc::clone(&tile.sums) };
         Film::new(self.job.world.scene.film.resolution, tile.bounds, vec![pixels], Vec::new())
     }
@@ -270,7 +255,8 @@ impl<'a> Run<'a> {
     /// Samples per pixel of the next pass over all tiles: 1, 1, 2, 4, …, so that there is a whole image soon. It lies
     /// within a block of what is fitted in blocks. `done` samples per pixel are rendered, `now` of them by this run.
     fn next_pass(&self, done: u32, now: u32) -> u32 {
-        let length = self.samples_in_time(now).min(done.clamp(1, self.pass_length()));
+        let longest = done.clamp(1, self.pass_length());
+        let length = self.in_time(now, longest).unwrap_or(longest);
         if !Estimator::at_vertex(&self.job.settings().integrator, 0).is_progressive() {
             return length;
         }
@@ -279,27 +265,34 @@ impl<'a> Run<'a> {
     }
 
     /// Samples per pixel of the longest pass.
-    fn pass_length(&self) -> u32 {
+    pub(super) fn pass_length(&self) -> u32 {
         (BATCH_PATHS as u32 / self.tile_size.max(1).pow(2)).clamp(1, 64)
     }
 
-    /// Samples per pixel that fit into the time that is left, at the speed so far; at least one.
-    fn samples_in_time(&self, done: u32) -> u32 {
-        let Some(limit) = self.settings.time_limit.filter(|_| done > 0) else { return u32::MAX };
-        let elapsed = self.start.elapsed();
-        let left = limit.saturating_sub(elapsed).as_secs_f64();
-        ((left * f64::from(done) / elapsed.as_secs_f64().max(1e-9)) as u32).max(1)
+    /// Samples per pixel of the next pass, at most `longest`, as the time limit has it; `done` are those of this run.
+    fn in_time(&self, done: u32, longest: u32) -> Option<u32> {
+        let limit = self.settings.time_limit.filter(|_| done > 0)?;
+        Some(pass_in_time(done, self.start.elapsed(), limit, longest))
     }
 
-    /// True if no pass is to be begun any more; there is one, however little time there is.
-    fn stopped(&self) -> bool {
-        let is_over = |limit| self.start.elapsed() >= limit && self.passes.load(Ordering::Relaxed) > 0;
-        let late = self.settings.time_limit.is_some_and(is_over);
-        late || self.stops_at_once()
+    /// True if no pass is to be begun any more, after `done` samples per pixel of this run.
+    fn stopped(&self, done: u32) -> bool {
+        self.in_time(done, 1) == Some(0) || self.stops_at_once()
+    }
+
+    /// True once the time is over.
+    fn is_late(&self) -> bool {
+        self.settings.time_limit.is_some_and(|limit| self.start.elapsed() >= limit)
+    }
+
+    /// True if pixels with this next sample get none any more for want of time; their first one is granted a little more.
+    pub(super) fn leaves(&self, next: u32) -> bool {
+        let is_over = |limit| self.start.elapsed() >= of_first_samples(limit);
+        self.is_late() && (next > self.begin() || self.settings.time_limit.is_some_and(is_over))
     }
 
     /// True if no tile is to be begun any more.
-    fn stops_at_once(&self) -> bool {
+    pub(super) fn stops_at_once(&self) -> bool {
         self.stop.load(Ordering::Relaxed) || self.failure().is_some()
     }
 
@@ -308,34 +301,24 @@ impl<'a> Run<'a> {
         self.texels.and_then(TileStore::failure)
     }
 
-    /// Adds the samples of a range to every tile, as far as it does not have them; begins none after `pause`.
-    fn pass(
-        &self,
-        workers: &Workers<'_>,
-        tiles: &mut [Tile],
-        samples: Range<u32>,
-        (noise, watch, pause): (Option<f64>, Option<&TileObserver<'_>>, Option<Instant>),
-    ) -> PathStats {
+    /// Adds the samples of a pass to every tile, as far as it does not have them.
+    fn pass(&self, workers: &Workers<'_>, tiles: &mut [Tile], pass: &Pass<'_>) -> PathStats {
         let total = self.samples_total(tiles);
         tiles
             .par_iter_mut()
             .with_max_len(1)
             .map(|tile| {
-                let samples = tile.done.max(samples.start)..samples.end;
-                let pauses = pause.is_some_and(|pause| Instant::now() >= pause);
-                if samples.is_empty() || pauses || self.stops_at_once() {
+                let samples = tile.done.max(pass.samples.start)..pass.samples.end;
+                if samples.is_empty() || pass.is_over() || self.stops_at_once() || self.leaves(tile.done) {
                     return PathStats::default();
                 }
                 let stats = workers.with_one(|worker| self.render_tile(worker, tile, samples.clone()));
                 tile.done = samples.end;
-                if let Some(watch) = watch {
+                if let Some(watch) = pass.watch {
                     watch(&self.film_of(tile));
                 }
-                let rays = stats.camera_rays + stats.bounce_rays + stats.direct.emitter_rays + stats.direct.segments;
                 let done = tile.bounds.area() as u64 * u64::from(samples.end - samples.start);
-                self.samples_done.fetch_add(done, Ordering::Relaxed);
-                self.rays.fetch_add(rays, Ordering::Relaxed);
-                (self.observe)(&self.progress(total, noise));
+                self.note(&stats, done, (total, pass.noise));
                 stats
             })
             .reduce(PathStats::default, |mut a, b| {
@@ -344,30 +327,29 @@ impl<'a> Run<'a> {
             })
     }
 
-    /// Adds the samples of a range to one tile, in batches of whole pixels.
+    /// Counts samples that are done, and tells those who observe it.
+    pub(super) fn note(&self, stats: &PathStats, samples: u64, (total, noise): (u64, Option<f64>)) {
+        let rays = stats.camera_rays + stats.bounce_rays + stats.direct.emitter_rays + stats.direct.segments;
+        self.samples_done.fetch_add(samples, Ordering::Relaxed);
+        self.rays.fetch_add(rays, Ordering::Relaxed);
+        (self.observe)(&self.progress(total, noise));
+    }
+
+    /// Adds the samples of a range to one tile.
     fn render_tile(&self, worker: &mut AnyWorker<'_>, tile: &mut Tile, samples: Range<u32>) -> PathStats {
-        let bounds = tile.bounds;
         let mut ill_conditioned = 0;
-        let Settings { integrator: settings, sampling: SamplingSettings { seed, .. } } = self.job.settings();
-        let (seed, done) = (*seed, samples.start - self.settings.first_sample);
+        let done = samples.start - self.settings.first_sample;
         let start = Instant::now();
-        let begins_block =
-            Estimator::at_vertex(settings, 0).is_progressive() && done > 0 && block_of(done).first == done;
+        let is_progressive = Estimator::at_vertex(&self.job.settings().integrator, 0).is_progressive();
+        let begins_block = is_progressive && done > 0 && block_of(done).first == done;
         if begins_block {
             ill_conditioned = tile.fits.solve();
         }
         let solve = start.elapsed();
         worker.read(tile);
-        let of_pixel = |index: usize| position(&bounds, index as u32);
-        for (pixels, samples) in self.batches(bounds.area(), of_pixel, &samples) {
-            self.camera_samples(&bounds, pixels.clone(), &samples, &mut worker.scratch, &mut worker.samples);
-            let of_pixels = pixels.clone().map(of_pixel).map(|pixel| (pixel, self.samples_of(pixel, &samples)));
-            worker.trace((self.job, &self.camera), &mut tile.fits, (of_pixels, seed));
-            let pixels = pixels.map(|index| (index, self.samples_of(of_pixel(index), &samples)));
-            worker.add(&self.job.world.scene.film, pixels);
-        }
+        self.trace_pixels_of(worker, &mut tile.fits, &tile.bounds, &samples);
         worker.write(tile);
-        self.render_replicas(worker, tile, &samples);
+        self.render_replicas(worker, (&tile.bounds, &mut tile.replicas, &mut tile.fits), &samples);
         tile.fits.pack(&mut worker.packing);
         let mut stats = worker.take_stats();
         if begins_block {
@@ -378,6 +360,25 @@ impl<'a> Run<'a> {
             direct.select += solve;
         }
         stats
+    }
+
+    /// Adds the samples of a pass to the sums of all pixels of some bounds, in batches of whole pixels or turns.
+    pub(super) fn trace_pixels_of(
+        &self,
+        worker: &mut AnyWorker<'_>,
+        fits: &mut Fits,
+        bounds: &PixelBounds,
+        pass: &Range<u32>,
+    ) {
+        let seed = self.job.settings().sampling.seed;
+        let of_pixel = |index: usize| position(bounds, index as u32);
+        for (pixels, samples) in self.batches(bounds.area(), of_pixel, pass) {
+            self.camera_samples(bounds, pixels.clone(), &samples, &mut worker.scratch, &mut worker.samples);
+            let of_pixels = pixels.clone().map(of_pixel).map(|pixel| (pixel, self.samples_of(pixel, &samples)));
+            worker.trace((self.job, &self.camera), fits, (of_pixels, seed));
+            let pixels = pixels.map(|index| (index, self.samples_of(of_pixel(index), &samples)));
+            worker.add(&self.job.world.scene.film, pixels);
+        }
     }
 
     /// Batches of the samples of some pixels in a pass: parts of the pixels, or where these share paths, parts of the pass.
@@ -396,14 +397,19 @@ impl<'a> Run<'a> {
         parts.into_iter().map(|part| (part.start as usize..part.end as usize, pass.clone())).collect()
     }
 
-    /// Adds the samples of a pass to the replicas of a tile.
-    fn render_replicas(&self, worker: &mut AnyWorker<'_>, tile: &mut Tile, pass: &Range<u32>) {
+    /// Adds the samples of a pass to the replicas of a tile, given with its bounds and fits.
+    pub(super) fn render_replicas(
+        &self,
+        worker: &mut AnyWorker<'_>,
+        (bounds, all, fits): (&PixelBounds, &mut [ReplicaAccumulator], &mut Fits),
+        pass: &Range<u32>,
+    ) {
         let seed = pcg4d([self.job.settings().sampling.seed, REPLICA_SEED, 0, 0])[0];
-        let pixels: Vec<[u32; 2]> = tile.replicas.iter().map(|r| position(&tile.bounds, r.pixel)).collect();
+        let pixels: Vec<[u32; 2]> = all.iter().map(|r| position(bounds, r.pixel)).collect();
         if pixels.is_empty() {
             return;
         }
-        let fit = |replica: usize| (tile.bounds.area() + replica) as u32;
+        let fit = |replica: usize| (bounds.area() + replica) as u32;
         for (replicas, pass) in self.batches(pixels.len(), |i| pixels[i], pass) {
             let samples_of = |i: usize| self.samples_of(pixels[i], &pass);
             worker.samples.clear();
@@ -411,10 +417,10 @@ impl<'a> Run<'a> {
             self.camera.samples(of_fits, seed, &mut worker.scratch, &mut worker.samples);
             worker.samples.iter_mut().for_each(|sample| sample.is_replica = true);
             let of_pixels = replicas.clone().map(|i| (pixels[i], samples_of(i)));
-            worker.trace((self.job, &self.camera), &mut tile.fits, (of_pixels, seed));
+            worker.trace((self.job, &self.camera), fits, (of_pixels, seed));
             let mut results = worker.results.iter();
             for i in replicas {
-                results.by_ref().take(samples_of(i).len()).for_each(|result| tile.replicas[i].add(result));
+                results.by_ref().take(samples_of(i).len()).for_each(|result| all[i].add(result));
             }
         }
     }

@@ -1,11 +1,13 @@
 //! Tiles: the pixels that are rendered together, with their exact sums; and which of them a part of an image has.
 
+use super::cell_progress::CellProgress;
 use super::{BATCH_PATHS, RenderSettings};
 use crate::direct::{Estimator, Fits};
 use crate::film::accumulator::PixelAccumulator;
 use crate::film::packed::PackedSums;
 use crate::film::replicas::{ReplicaAccumulator, ReplicaChoice};
 use crate::film::{Film, FilmTile, PixelBounds};
+use crate::integrators::cells::REPLICA_CELL;
 use crate::integrators::{light_paths, reuse};
 use crate::scene::RenderJob;
 use crate::settings::IntegratorKind;
@@ -82,7 +84,11 @@ pub(super) fn empty_layers(count: usize, pixels: usize) -> Vec<Arc<PackedSums>> 
 
 /// Tiles that cover an image, or a part of it.
 #[derive(Debug)]
-pub struct Tiles(pub(super) Vec<Tile>);
+pub struct Tiles {
+    pub(super) tiles: Vec<Tile>,
+    /// Samples that they have beyond those that all of their pixels have.
+    pub(super) cells: CellProgress,
+}
 
 /// Tiles of at most the given size that cover the image, or the share of it.
 pub(super) fn bounds_of_tiles(image: &PixelBounds, size: u32, share: Option<TileShare>) -> Vec<PixelBounds> {
@@ -102,7 +108,7 @@ pub(super) fn replica_choice(job: &RenderJob, render: &RenderSettings) -> Option
     // Pixels with more samples than there are sets of light paths use some of these more than once
     let shares_light = job.pixel_samples.is_some() && light_paths::per_sample(job) > 0.0;
     let is_useful = !settings.sampling.sampler.has_independent_samples() || is_over_pixels || shares_light;
-    let edge = if reuse::edge(job) > 1 { reuse::CELL } else { 1 };
+    let edge = if reuse::edge(job) > 1 { REPLICA_CELL } else { 1 };
     (render.with_replicas && is_useful && !shares_noise).then_some(ReplicaChoice { edge, seed: settings.sampling.seed })
 }
 

@@ -1,11 +1,11 @@
 //! What the threads of a rendering hold: a tracer each, with the memory of a batch.
 
-use super::camera_samples::{CameraSampler, Scratch};
 use super::looks::Looks;
 use super::tiles::Tile;
 use crate::direct::Fits;
 use crate::film::accumulator::PixelAccumulator;
-use crate::film::{FeatureSet, PixelSample};
+use crate::film::{FeatureSet, PixelBounds, PixelSample};
+use crate::integrators::camera_samples::{CameraSampler, Scratch};
 use crate::integrators::path::CameraSample;
 use crate::integrators::{Integrator, PathStats, Tracer};
 use crate::scene::{FilmSettings, RenderJob};
@@ -18,8 +18,10 @@ pub(super) struct Worker<T> {
     pub(super) samples: Vec<CameraSample>,
     pub(super) scratch: Scratch,
     pub(super) results: Vec<PixelSample>,
-    /// The sums of a tile, while samples are added to them.
+    /// The sums of the pixels that are traced, while samples are added to them.
     pub(super) sums: Vec<PixelAccumulator>,
+    /// Those of a tile that they are added to, where a tile is not what is traced together.
+    of_tile: Vec<PixelAccumulator>,
     /// The same of the layers by lights.
     layers: Vec<Vec<PixelAccumulator>>,
     /// Memory to pack them.
@@ -29,8 +31,8 @@ pub(super) struct Worker<T> {
 
 impl<T> Worker<T> {
     pub(super) fn new(tracer: T) -> Self {
-        let (samples, scratch, results, sums, layers, packing, looks) = Default::default();
-        Worker { tracer, samples, scratch, results, sums, layers, packing, looks }
+        let (samples, scratch, results, sums, of_tile, layers, packing, looks) = Default::default();
+        Worker { tracer, samples, scratch, results, sums, of_tile, layers, packing, looks }
     }
 }
 
@@ -44,6 +46,23 @@ impl AnyWorker<'_> {
             sums.resize(area, PixelAccumulator::default());
             packed.read(0..area, sums);
         }
+    }
+
+    /// Begins sums of so many pixels, without layers, that [`Self::add_to`] adds to tiles.
+    pub(super) fn begin(&mut self, pixels: usize) {
+        self.sums.clear();
+        self.sums.resize(pixels, PixelAccumulator::default());
+    }
+
+    /// Adds the sums of the pixels of `bounds` to those of a tile, as far as it has them.
+    pub(super) fn add_to(&mut self, tile: &mut Tile, bounds: &PixelBounds) {
+        let Worker { sums, of_tile, packing, .. } = self;
+        of_tile.resize(tile.bounds.area(), PixelAccumulator::default());
+        tile.sums.read(0..tile.bounds.area(), of_tile);
+        for (to, from) in tile.bounds.common_rows(bounds) {
+            of_tile[to].iter_mut().zip(&sums[from]).for_each(|(sum, more)| sum.merge(more));
+        }
+        tile.set_sums(of_tile, packing);
     }
 
     /// Traces the samples, whose pixels are given in order with the indices of their samples, and their looks; the results have

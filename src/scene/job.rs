@@ -5,7 +5,7 @@ use crate::accel::Hit;
 use crate::bsdfs::MAX_LOBES;
 use crate::geometry::{GeometryId, Shape};
 use crate::lights::{Irradiances, LightChoice, LightSampling};
-use crate::settings::{EstimatorKind, IntegratorSettings, Settings};
+use crate::settings::{IntegratorSettings, Settings};
 use lumiris_numbers::math::Rgb;
 use std::sync::Arc;
 
@@ -126,11 +126,10 @@ impl RenderJob {
         self.lobes == MAX_LOBES
     }
 
-    /// Number of control variates over pixels: groups of lights, then the first of two lobes, but of `ris`. The column of the
-    /// last lobe depends on these.
+    /// Number of control variates over pixels: groups of lights, then the first of two lobes. The column of the last lobe
+    /// depends on these.
     pub fn controls(&self) -> usize {
-        let has_lobe = self.has_two_lobes() && self.settings.integrator.estimator != EstimatorKind::Ris;
-        self.lights.groups.len() + usize::from(has_lobe)
+        self.lights.groups.len() + usize::from(self.has_two_lobes())
     }
 }
 

@@ -74,7 +74,9 @@ mod tests {
                 let ends = [range.min, range.max.min(u64::from(u32::MAX))].map(|n| n.to_string());
                 words.iter().map(ToString::to_string).chain(ends).collect()
             }
-            Kind::Real { words, .. } => words.iter().map(ToString::to_string).chain(["0.5".to_owned()]).collect(),
+            Kind::Real { words, .. } | Kind::Percentage { words } => {
+                words.iter().map(ToString::to_string).chain(["0.5".to_owned()]).collect()
+            }
             Kind::Pair { .. } => vec!["1.5,20".to_owned()],
             Kind::Graded { plain, graded, .. } => {
                 [plain.to_string()].into_iter().chain(graded.iter().map(|name| format!("{name}:0.3"))).collect()

@@ -8,7 +8,7 @@ use super::ris::RisSettings;
 use crate::bsdfs::ProposalDensity;
 use crate::lights::{LightChoice, LightSamplerKind};
 use lumiris_numbers::estimators::mis::Heuristic;
-use lumiris_numbers::estimators::ocv::{Form, MAX_COMPONENTS};
+use lumiris_numbers::estimators::ocv::MAX_COMPONENTS;
 use strum::{EnumString, IntoStaticStr, VariantNames};
 
 /// Light transport.
@@ -20,8 +20,6 @@ pub struct IntegratorSettings {
     pub max_depth: u32,
     /// The bounce from which on paths end by Russian roulette on their throughput; `None`: they go on to `max_depth`.
     pub roulette_depth: Option<u32>,
-    /// What decides by roulette whether a path goes on, and as how many paths.
-    pub roulette: RouletteKind,
     /// Edge of the blocks of pixels that share paths from their second diffuse vertex on; 1: none do. `None`: what `auto`
     /// chooses, or 1.
     pub path_reuse: Option<u32>,
@@ -57,8 +55,8 @@ pub struct IntegratorSettings {
     pub ocv: OcvSettings,
     /// How `optimal-mis` determines its weights.
     pub optimal_mis: OptimalForm,
-    /// Settings of `correlated`.
-    pub correlated: CorrelatedSettings,
+    /// What draws the samples of `correlated`.
+    pub correlated_technique: SamplingTechnique,
     /// Settings of `contributing`.
     pub contributing: ContributingSettings,
     /// Proposals (M) per direction that continues a path, for BSDFs that can only be evaluated; 1 is plain importance
@@ -74,7 +72,6 @@ impl Default for IntegratorSettings {
             kind: IntegratorKind::Path,
             max_depth: 5,
             roulette_depth: Some(4),
-            roulette: RouletteKind::Throughput,
             path_reuse: None,
             light_paths: None,
             light_groups: true,
@@ -90,7 +87,7 @@ impl Default for IntegratorSettings {
             photons: PhotonMapSettings::default(),
             ocv: OcvSettings::default(),
             optimal_mis: OptimalForm::Progressive,
-            correlated: CorrelatedSettings::default(),
+            correlated_technique: SamplingTechnique::Bsdf,
             contributing: ContributingSettings::default(),
             bsdf_proposals: 4,
             bsdf_density: ProposalDensity::Lobes,
@@ -154,7 +151,7 @@ impl IntegratorSettings {
     fn is_like_mis(&self) -> bool {
         match self.estimator {
             EstimatorKind::Auto | EstimatorKind::Mis => true,
-            EstimatorKind::Ocv => self.ocv.form == Form::Pixels,
+            EstimatorKind::Ocv => self.ocv.form == OcvForm::Pixels,
             EstimatorKind::Mc
             | EstimatorKind::Ris
             | EstimatorKind::OptimalMis
@@ -233,19 +230,6 @@ pub enum IntegratorKind {
     PhotonMap,
 }
 
-/// What decides whether a path ends by roulette.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, EnumString, IntoStaticStr, VariantNames)]
-#[strum(serialize_all = "kebab-case")]
-pub enum RouletteKind {
-    /// Its throughput, from `roulette_depth` on.
-    Throughput,
-    /// What it is expected to contribute, relative to its pixel; it may split as well [Vorba and Křivánek 2016].
-    Adjoint,
-    /// The variance and the cost of what lies beyond its vertex, relative to those of the image; it may split as well
-    /// [Rath et al. 2022].
-    Efficiency,
-}
-
 /// Irradiance caching [Ward et al. 1988; Ward and Heckbert 1992; Křivánek et al. 2008].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct IrradianceCacheSettings {
@@ -282,7 +266,7 @@ pub enum Cached {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, EnumString, IntoStaticStr, VariantNames)]
 #[strum(serialize_all = "kebab-case")]
 pub enum EstimatorKind {
-    /// What a pilot finds to be the most efficient; `mis` with usual numbers where the image is too small for a pilot.
+    /// What a rule chooses from what the camera sees: `mis` or `contributing`, with numbers of samples.
     Auto,
     /// Light sampling only (and the specular lobes of BSDFs).
     Mc,
@@ -317,22 +301,22 @@ impl EstimatorKind {
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct OcvSettings {
     /// How the coefficients are determined.
-    pub form: Form,
+    pub form: OcvForm,
     /// Maximum number of components of the mixture: BSDF lobes and groups of lights; `None`: as many as possible.
     pub components: Option<u32>,
-    /// Whether the form over pixels, or that of `ris`, has control variates.
-    pub control_variates: ControlVariates,
 }
 
-/// Whether estimators whose control variates are fitted over pixels have them.
+/// What the coefficients of `ocv` are fitted to; see [`lumiris_numbers::estimators::ocv::Form`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, EnumString, IntoStaticStr, VariantNames)]
 #[strum(serialize_all = "kebab-case")]
-pub enum ControlVariates {
-    /// Where a pilot finds that they gain more than they cost; elsewhere the estimator is `mis`, or `ris` with the target `fgl`.
+pub enum OcvForm {
+    /// The same samples. Biased.
+    Paper,
+    /// Earlier samples of the pixel.
+    Progressive,
+    /// The surrounding pixels.
     #[default]
-    Auto,
-    /// In any image.
-    Always,
+    Pixels,
 }
 
 impl OcvSettings {
@@ -350,31 +334,6 @@ pub enum OptimalForm {
     Direct,
     /// From earlier samples of the pixel.
     Progressive,
-}
-
-/// Combined correlated and importance sampling [Szécsi, Sbert and Szirmay-Kalos 2004].
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct CorrelatedSettings {
-    /// How the weight is determined.
-    pub form: CorrelatedForm,
-    /// What draws the samples.
-    pub technique: SamplingTechnique,
-}
-
-impl Default for CorrelatedSettings {
-    fn default() -> Self {
-        CorrelatedSettings { form: CorrelatedForm::Combined, technique: SamplingTechnique::Bsdf }
-    }
-}
-
-/// How `correlated` finds the weight of its two estimates.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, EnumString, IntoStaticStr, VariantNames)]
-#[strum(serialize_all = "kebab-case")]
-pub enum CorrelatedForm {
-    /// From the samples of the estimate. Biased.
-    Combined,
-    /// From the other half of them.
-    Crossfit,
 }
 
 /// Direct light with separate samples on contributing and non-contributing lights [Keller and Wald 2000, §3].

@@ -10,22 +10,20 @@ pub mod integrator;
 pub mod photon_map;
 pub mod ris;
 pub mod sampling;
+mod summary;
 pub mod table;
 pub mod value;
 
 pub use given::Given;
 pub use integrator::{
-    Cached, ContributingSettings, ControlVariates, CorrelatedForm, CorrelatedSettings, EstimatorKind, IntegratorKind,
-    IntegratorSettings, IrradianceCacheSettings, OcvSettings, OptimalForm, RouletteKind, SampleCounts,
-    SamplingTechnique, bsdf_samples,
+    Cached, ContributingSettings, EstimatorKind, IntegratorKind, IntegratorSettings, IrradianceCacheSettings, OcvForm,
+    OcvSettings, OptimalForm, SampleCounts, SamplingTechnique, bsdf_samples,
 };
 pub use photon_map::{PhotonMapSettings, PhotonStorage, ProgressiveSettings};
-pub use ris::{ProposalPoints, Proposals, RisSettings, StageTimes, Strata, Target};
+pub use ris::{ProposalPoints, Proposals, RisSettings, Strata, Target};
 pub use sampling::{Allocation, SamplingSettings};
 pub use table::Setting;
 pub use value::Value;
-
-use lumiris_numbers::estimators::ocv::Form;
 
 /// Fewest camera samples per pixel of which pilots can tell how many pixels need.
 pub const MIN_ADAPTIVE_SPP: u32 = 8;
@@ -61,7 +59,7 @@ impl Settings {
     pub fn allows_adaptive(&self) -> bool {
         let i = &self.integrator;
         let is_progressive = match i.estimator {
-            EstimatorKind::Ocv => i.ocv.form == Form::Progressive,
+            EstimatorKind::Ocv => i.ocv.form == OcvForm::Progressive,
             EstimatorKind::OptimalMis => i.optimal_mis == OptimalForm::Progressive,
             _ => false,
         };

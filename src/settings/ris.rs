@@ -3,11 +3,9 @@
 use lumiris_numbers::estimators::ris::choice::Costs;
 use strum::{EnumString, IntoStaticStr, VariantNames};
 
-/// Proposals per sample if no times were measured.
-pub const DEFAULT_RATIO: f64 = 8.0;
-/// Maximum number of proposals per sample by times alone: T1 and T2 exclude the fixed cost of a shading point, and more
-/// than eight did not pay off on any scene measured (`docs/measurements/resampling`).
-pub const MAX_RATIO: f64 = 8.0;
+/// What a proposal takes, T1, and a sample, T2, relative to each other. So M/N = T2/T1 = 3 [Talbot 2005, Eq. 4.4], which is the fixed
+/// ratio of the greatest mean efficiency in the scenes measured (`docs/measurements/efficiency`, "how many proposals").
+pub const COSTS: Costs = Costs { t1: 1.0, t2: 3.0 };
 
 /// Resampled importance sampling [Talbot et al. 2005; Talbot 2005].
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -20,8 +18,6 @@ pub struct RisSettings {
     pub points: ProposalPoints,
     /// The target density.
     pub target: Target,
-    /// Times of the stages, for `auto` and `optimal`; measured on this scene if `None`.
-    pub stage_times: Option<StageTimes>,
 }
 
 impl Default for RisSettings {
@@ -31,7 +27,6 @@ impl Default for RisSettings {
             strata: Strata::Systematic,
             points: ProposalPoints::Stratified,
             target: Target::Fgl,
-            stage_times: None,
         }
     }
 }
@@ -41,25 +36,9 @@ impl RisSettings {
     pub fn proposals_for(&self, samples: u32) -> u32 {
         match self.proposals {
             Proposals::Fixed(m) => m,
-            Proposals::Auto | Proposals::Optimal => (f64::from(samples) * self.ratio()).round() as u32,
+            Proposals::Auto | Proposals::Optimal => (f64::from(samples) * COSTS.robust_ratio()).round() as u32,
         }
     }
-
-    /// Proposals for each sample by the times of the stages, M/N = T2/T1 [Talbot 2005, Eq. 4.4], from 1 to
-    /// [`MAX_RATIO`]; [`DEFAULT_RATIO`] without times.
-    pub fn ratio(&self) -> f64 {
-        let by_times = |t: StageTimes| Costs { t1: t.t1, t2: t.t2 }.robust_ratio();
-        self.stage_times.map_or(DEFAULT_RATIO, by_times).clamp(1.0, MAX_RATIO)
-    }
-}
-
-/// Measured cost of the stages of an estimate.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct StageTimes {
-    /// T1: one proposal with its weight (ns).
-    pub t1: f64,
-    /// T2: the visibility of one sample (ns).
-    pub t2: f64,
 }
 
 /// Choice of the number of proposals.
@@ -67,9 +46,9 @@ pub struct StageTimes {
 pub enum Proposals {
     /// This many.
     Fixed(u32),
-    /// By a pilot of the image; M/N = T2/T1 [Talbot 2005, Eq. 4.4] by given times, or if the image is too small.
+    /// Three for each sample ([`COSTS`]).
     Auto,
-    /// Per pixel, from variances and times [Talbot 2005, Eq. 4.3].
+    /// Per pixel, from variances [Talbot 2005, Eq. 4.3].
     Optimal,
 }
 
@@ -103,9 +82,6 @@ pub enum ProposalPoints {
 pub enum Target {
     /// Luminance of f·G·L: everything but visibility.
     Fgl,
-    /// As `fgl`; in surrounding pixels, what the draws have of each group of lights tells what is seen of the group, which is a control
-    /// variate of the pixel.
-    FglControl,
     /// G·V: for surfaces and lights that are more expensive to evaluate than a ray is to trace.
     Gv,
     /// G·V·L: for surfaces that are more expensive to evaluate than a ray is to trace.
@@ -120,7 +96,7 @@ impl Target {
     /// True if proposals are traced before they are resampled.
     pub fn has_visibility(self) -> bool {
         match self {
-            Target::Fgl | Target::FglControl | Target::Visibility | Target::VisibilityControl => false,
+            Target::Fgl | Target::Visibility | Target::VisibilityControl => false,
             Target::Gv | Target::Gvl => true,
         }
     }

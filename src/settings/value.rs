@@ -170,6 +170,11 @@ pub enum Kind {
         /// The words.
         words: &'static [&'static str],
     },
+    /// A positive number, such as 0.02, which may be written as a percentage, 2%; or a word in place of one.
+    Percentage {
+        /// The words.
+        words: &'static [&'static str],
+    },
     /// Two numbers separated by a comma.
     Pair {
         /// The range of both.
@@ -204,6 +209,7 @@ impl Kind {
                 Some(Value::Integer(n.unsigned_abs()))
             }),
             Kind::Real { range, words } => named(words, text).or_else(|| Some(Value::Real(real_in(range, text)?))),
+            Kind::Percentage { words } => named(words, text).or_else(|| Some(Value::Real(part(text)?))),
             Kind::Pair { range, ascends, .. } => text.split_once(',').and_then(|(a, b)| {
                 let pair = [real_in(range, a)?, real_in(range, b)?];
                 (!ascends || pair[0] <= pair[1]).then_some(Value::Pair(pair))
@@ -238,6 +244,7 @@ impl fmt::Display for Kind {
             Kind::Integer { range, words } => write!(f, "a whole number {range}{}", or(words)),
             Kind::Real { range, words } if *range == Interval::POSITIVE => write!(f, "a positive number{}", or(words)),
             Kind::Real { range, words } => write!(f, "a number {range}{}", or(words)),
+            Kind::Percentage { words } => write!(f, "a positive number such as 0.02, or 2%{}", or(words)),
             Kind::Pair { range, ascends, unit } => {
                 let order = if *ascends { ", the smaller one first" } else { "" };
                 write!(f, "two {range} numbers of {unit} separated by a comma{order}")
@@ -268,6 +275,13 @@ fn real_in(range: &Interval, text: &str) -> Option<f32> {
     text.trim().parse().ok().filter(|&x| range.contains(x))
 }
 
+/// A positive number, or as many percent.
+fn part(text: &str) -> Option<f32> {
+    let percent = text.trim().strip_suffix('%');
+    let part = percent.map_or_else(|| text.trim().parse().ok(), |n| Some(n.trim().parse::<f32>().ok()? / 100.0));
+    part.filter(|part| Interval::POSITIVE.contains(*part))
+}
+
 fn bytes(text: &str) -> Option<u64> {
     let (digits, shift) = match text.trim_end_matches(['B', 'b', 'i']) {
         t if t.ends_with(['k', 'K']) => (&t[..t.len() - 1], 10),
@@ -290,6 +304,18 @@ mod tests {
         assert_eq!(Kind::Bytes.parse("1.5GiB"), Ok(Value::Integer(3 << 29)));
         for wrong in ["", "G", "-1", "0", "1e30", "lots"] {
             assert!(Kind::Bytes.parse(wrong).is_err(), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn parts_are_numbers_or_percentages() {
+        let kind = Kind::Percentage { words: &["off"] };
+        for text in ["0.02", "2%", "2 %"] {
+            assert_eq!(kind.parse(text), Ok(Value::Real(0.02)), "{text}");
+        }
+        assert_eq!(kind.parse("off"), Ok(Value::Name("off")));
+        for wrong in ["", "%", "0%", "-2%", "2%%", "inf%"] {
+            assert_eq!(kind.parse(wrong), Err("expected a positive number such as 0.02, or 2%, or off".to_owned()));
         }
     }
 

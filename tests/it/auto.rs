@@ -1,15 +1,15 @@
-//! What `--estimator auto` chooses, and what it leaves as it is.
+//! The rule of `--estimator auto`: what it chooses, what it leaves as it is; and trials.
 
-use lumiris::import::{LoadOptions, load};
+use lumiris::import::cache::FileCache;
+use lumiris::import::{LoadOptions, load, load_text};
 use lumiris::lights::LightSamplerKind;
-use lumiris::render::plan::{Preparation, prepare};
+use lumiris::planning::facts::Facts;
+use lumiris::planning::{Preparation, prepare};
 use lumiris::scene::{AccelKind, RenderJob};
-use lumiris::settings::{Allocation, EstimatorKind, IntegratorKind, IntegratorSettings, RouletteKind, Settings};
+use lumiris::settings::{Allocation, EstimatorKind, IntegratorKind, IntegratorSettings, Settings};
 use lumiris_numbers::samplers::SamplerKind;
 use std::path::Path;
-use std::time::Duration;
 
-/// The gallery, large enough for a pilot, with settings changed.
 fn gallery(kind: IntegratorKind, resolution: [u32; 2], change: impl FnOnce(&mut Settings)) -> RenderJob {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/demo/gallery.pbrt");
     let options = LoadOptions { resolution: Some(resolution), ..LoadOptions::default() };
@@ -20,28 +20,10 @@ fn gallery(kind: IntegratorKind, resolution: [u32; 2], change: impl FnOnce(&mut 
     loaded.job(AccelKind::Embree, None).unwrap()
 }
 
-/// In paths, what an image took before is a part of the time of its samples; and where samples take long, more pixels tell what
-/// is chosen.
-#[test]
-fn what_an_image_takes_before_counts() {
-    // Far more than any time that a machine takes for a sample
-    let of = |kind: IntegratorKind| {
-        let how = Preparation { loading: Duration::from_secs(10_000), ..Preparation::on(None) };
-        prepare(&mut gallery(kind, [256, 144], |_| ()), &how).unwrap().auto.unwrap()
-    };
-    let of_sample = 10_000e9 / f64::from(256 * 144 * 32);
-    let path = of(IntegratorKind::Path);
-    assert!(path.cost[0] > of_sample && path.trials.iter().flatten().all(|t| t.nanoseconds > of_sample), "{path:?}");
-    assert!(path.checked.len() >= 2 && path.checked[0].name == path.trials[1][0].name, "{path:?}");
-    let direct = of(IntegratorKind::Direct);
-    assert!(direct.cost[0] < of_sample && direct.checked.is_empty(), "{direct:?}");
-}
-
-/// Whatever the user gives, the pilot chooses the rest.
+/// Whatever the user gives, the rule chooses the rest.
 #[test]
 fn what_is_given_stays() {
     let both = [IntegratorKind::Direct, IntegratorKind::Path];
-    // Each of these beside others, since a pilot takes a second
     let all: [fn(&mut Settings); 7] = [
         |s| (s.integrator.path_reuse, s.integrator.samples) = (Some(1), Some(1)),
         |s| (s.integrator.path_reuse, s.integrator.light_sampler) = (Some(3), LightSamplerKind::Uniform),
@@ -58,16 +40,119 @@ fn what_is_given_stays() {
             (s.integrator.samples, s.integrator.bsdf_fraction) = (Some(8), Some(0.0));
             (s.integrator.roulette_depth, s.sampling.allocation) = (None, Allocation::Uniform);
         },
-        |s| (s.integrator.roulette, s.integrator.light_sampler) = (RouletteKind::Efficiency, LightSamplerKind::Photons),
+        |s| (s.integrator.light_sampler, s.integrator.infinite_fraction) = (LightSamplerKind::Tree, Some(0.3)),
     ];
     for (kind, (i, change)) in both.into_iter().flat_map(|kind| all.into_iter().enumerate().map(move |c| (kind, c))) {
-        let mut job = gallery(kind, [224, 126], change);
+        let mut job = gallery(kind, [64, 36], change);
         let given = *job.settings();
-        assert!(prepare(&mut job, &Preparation::on(None)).unwrap().auto.is_some());
+        prepare(&mut job, &Preparation::on(None)).unwrap();
         let mut chosen = *job.settings();
         assert_ne!(chosen.integrator.estimator, EstimatorKind::Auto);
         // The same change once more makes no difference
         change(&mut chosen);
         assert_eq!(chosen, *job.settings(), "{kind:?}, change {i} of {given:?}");
     }
+}
+
+/// A grey box around the camera, which the light `inside` lights; without its front and ceiling if it is `open`.
+fn room(is_open: bool, material: &str, inside: &str, depth: u32) -> RenderJob {
+    let wall = |p: &str| format!("Shape \"bilinearmesh\" \"point3 P\" [ {p} ]\n");
+    let mut text = format!(
+        "LookAt 0 0 0.9  0 0 0  0 1 0\nCamera \"perspective\" \"float fov\" 90\n\
+         Film \"rgb\" \"integer xresolution\" 32 \"integer yresolution\" 32\n\
+         Integrator \"path\" \"integer maxdepth\" {depth}\nSampler \"sobol\" \"integer pixelsamples\" 16\n\
+         WorldBegin\n{inside}\nMaterial {material}\n"
+    );
+    text += &wall("-1 -1 -1  1 -1 -1  -1 1 -1  1 1 -1");
+    text += &wall("-1 -1 -1  1 -1 -1  -1 -1 1  1 -1 1");
+    if !is_open {
+        text += &wall("-1 1 -1  1 1 -1  -1 1 1  1 1 1");
+        text += &wall("-1 -1 -1  -1 1 -1  -1 -1 1  -1 1 1");
+        text += &wall("1 -1 -1  1 1 -1  1 -1 1  1 1 1");
+        text += &wall("-1 -1 1  1 -1 1  -1 1 1  1 1 1");
+    }
+    let loaded = load_text(&text, "room", Path::new("."), &LoadOptions::default(), &FileCache::default());
+    let mut job = loaded.map_err(|d| d.to_string()).unwrap().job(AccelKind::Embree, None).unwrap();
+    job.change(|s| s.integrator.estimator = EstimatorKind::Auto);
+    job
+}
+
+const GREY: &str = "\"diffuse\" \"rgb reflectance\" [ 0.5 0.5 0.5 ]";
+const LAMP: &str = "LightSource \"point\" \"rgb I\" [ 1 1 1 ]";
+const SKY: &str = "LightSource \"infinite\" \"rgb L\" [ 1 1 1 ]";
+
+#[test]
+fn facts_are_those_of_the_scene() {
+    let closed = Facts::of(&room(false, GREY, LAMP, 5));
+    assert_eq!((closed.lights, closed.sky, closed.open), (1, 0.0, 0.0));
+    assert!(closed.diffuse_pairs > 0.999, "{closed:?}");
+    let open = Facts::of(&room(true, GREY, SKY, 5));
+    assert_eq!(open.sky, 1.0);
+    // A floor and a wall at a right angle, as long as wide: each has the form factor 0.2 of the other
+    assert!((open.open - 0.8).abs() < 0.03 && (open.diffuse_pairs - 0.2).abs() < 0.03, "{open:?}");
+    let metal = Facts::of(&room(false, "\"conductor\" \"float roughness\" 0.3", LAMP, 5));
+    assert_eq!((metal.diffuse_pairs, metal.open), (0.0, 0.0));
+    // The irradiance of an unoccluded sky is π, and a lamp behind the floor is hidden
+    let hidden = format!("{SKY}\nLightSource \"point\" \"rgb I\" [ 9 9 9 ] \"point3 from\" [ 0 -3 0 ]");
+    let both = Facts::of(&room(true, GREY, &hidden, 5));
+    assert!(both.lights == 2 && both.sky > 0.999, "{both:?}");
+}
+
+#[test]
+fn the_rule_goes_by_facts() {
+    let chosen = |mut job: RenderJob| {
+        prepare(&mut job, &Preparation::on(Some(1))).unwrap();
+        job.settings().summary()
+    };
+    let direct = |mut job: RenderJob| {
+        job.change(|s| s.integrator = s.integrator.of_kind(IntegratorKind::Direct));
+        job
+    };
+    assert_eq!(chosen(direct(room(false, GREY, LAMP, 1))), "direct light: 8 samples (MIS); adaptive sampling");
+    assert_eq!(
+        chosen(room(false, GREY, LAMP, 5)),
+        "direct light: 4 samples (MIS), 3 at later vertices; paths shared by 6 × 6 pixels; adaptive sampling"
+    );
+    assert_eq!(
+        chosen(room(false, GREY, LAMP, 50)),
+        "direct light: 3 samples (MIS), 2 at later vertices; paths shared by 4 × 4 pixels; adaptive sampling"
+    );
+    assert_eq!(
+        chosen(room(true, GREY, SKY, 5)),
+        "direct light: 6 samples (MIS), 3 at later vertices; paths shared by 4 × 4 pixels; adaptive sampling"
+    );
+    assert_eq!(
+        chosen(room(false, "\"conductor\" \"float roughness\" 0.3", LAMP, 5)),
+        "direct light: 8 samples (MIS), 2 at later vertices; adaptive sampling"
+    );
+}
+
+#[test]
+fn contributing_is_taken_where_most_of_many_lights_are_hidden() {
+    let lamps = |y: f32| -> String {
+        let lamp = |i: u32| format!("LightSource \"point\" \"rgb I\" [ 1 1 1 ] \"point3 from\" [ 0.{i} {y} 0 ]\n");
+        (10..28).map(lamp).collect()
+    };
+    let estimator = |lights: &str| {
+        let mut job = room(false, GREY, lights, 5);
+        prepare(&mut job, &Preparation::on(Some(1))).unwrap();
+        (job.settings().integrator.estimator, job.lights.visibility_cache().is_some())
+    };
+    assert_eq!(estimator(&lamps(0.5)), (EstimatorKind::Mis, false), "all are seen");
+    assert_eq!(estimator(&(lamps(3.0) + LAMP)), (EstimatorKind::Contributing, true), "one is seen");
+}
+
+/// What trials take is an improvement on cells that they had not seen, and a plan of its own.
+#[test]
+fn trials_change_settings_only_where_they_gain() {
+    let mut job = gallery(IntegratorKind::Direct, [96, 54], |s| s.integrator.light_sampler = LightSamplerKind::Uniform);
+    let tuned = prepare(&mut job, &Preparation { tunes: true, ..Preparation::on(None) }).unwrap();
+    let tuning = tuned.tuning.unwrap();
+    assert!(tuning.trials.len() > 3 && (tuning.trials[0].efficiency - 1.0).abs() < 1e-9, "{tuning:?}");
+    assert_eq!(tuning.is_taken, tuning.gain.ln() > 1.1_f64.ln().max(1.5 * tuning.error), "{tuning:?}");
+    let mut by_rule =
+        gallery(IntegratorKind::Direct, [96, 54], |s| s.integrator.light_sampler = LightSamplerKind::Uniform);
+    let ruled = prepare(&mut by_rule, &Preparation::on(None)).unwrap();
+    assert!(ruled.tuning.is_none());
+    assert_eq!(tuning.is_taken, tuned.chosen != ruled.chosen, "{tuning:?}");
 }

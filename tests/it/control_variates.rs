@@ -1,12 +1,11 @@
-//! Whether `ocv` has control variates: what its pilot finds.
+//! `ocv` over pixels: it always has its control variates.
 
-use lumiris::film::PixelSums;
 use lumiris::import::{LoadOptions, load};
 use lumiris::lights::LightSamplerKind;
-use lumiris::render::plan::{Preparation, prepare};
+use lumiris::planning::{Preparation, prepare};
 use lumiris::render::{RenderSettings, render};
 use lumiris::scene::{AccelKind, PixelSamples, RenderJob};
-use lumiris::settings::{Allocation, ControlVariates, EstimatorKind, IntegratorKind};
+use lumiris::settings::{Allocation, EstimatorKind, IntegratorKind};
 use lumiris_numbers::estimators::stats::Welford;
 use lumiris_numbers::math::luminance;
 use lumiris_numbers::samplers::SamplerKind;
@@ -42,47 +41,12 @@ Shape "bilinearmesh" "point3 P" [ -9 0 -9  9 0 -9  -9 0 9  9 0 9 ]
     loaded.job(AccelKind::Embree, None).unwrap()
 }
 
-fn means(job: &RenderJob) -> Vec<[f64; 3]> {
-    let settings = RenderSettings { spp: 4, ..RenderSettings::default() };
-    let film = render(job, &settings, &AtomicBool::new(false), &|_| ()).unwrap().film;
-    film.pixels().iter().map(PixelSums::mean).collect()
-}
-
+/// One lamp, of which columns know nothing that the net does not: nothing is gained, and it is `ocv` all the same.
 #[test]
-fn where_nothing_is_gained_the_image_is_that_of_mis_to_the_bit() {
+fn an_estimator_that_is_asked_for_by_name_is_not_another_one() {
     let mut job = floor(1, [192, 128]);
-    let plan = prepare(&mut job, &Preparation::default()).unwrap();
-    assert_eq!(plan.chosen, [("estimator", "mis".to_owned())]);
-    let mut mis = floor(1, [192, 128]);
-    mis.change(|s| s.integrator.estimator = EstimatorKind::Mis);
-    assert_eq!(means(&job), means(&mis));
-}
-
-#[test]
-fn paths_keep_the_number_of_samples_without_control_variates() {
-    let mut job = floor(1, [192, 128]);
-    job.change(|s| s.integrator = s.integrator.of_kind(IntegratorKind::Path));
-    let before = job.settings().integrator.sample_counts();
-    let plan = prepare(&mut job, &Preparation::default()).unwrap();
-    assert_eq!(plan.chosen, [("estimator", "mis".to_owned()), ("samples", before.samples.to_string())]);
-    assert_eq!(job.settings().integrator.sample_counts(), before);
-}
-
-#[test]
-fn control_variates_remain_where_they_gain_and_where_the_image_is_too_small_to_tell() {
-    // Which lamp a sample has is all of the noise, and columns know it
-    let mut job = floor(5, [192, 128]);
-    job.change(|s| s.sampling.sampler = SamplerKind::Independent);
-    let plan = prepare(&mut job, &Preparation::default()).unwrap();
-    assert_eq!(plan.chosen, [("control_variates", "always".to_owned())]);
+    assert_eq!(prepare(&mut job, &Preparation::default()).unwrap().chosen, []);
     assert_eq!(job.settings().integrator.estimator, EstimatorKind::Ocv);
-
-    for (resolution, given) in [([96, 64], ControlVariates::Auto), ([192, 128], ControlVariates::Always)] {
-        let mut job = floor(1, resolution);
-        job.change(|s| s.integrator.ocv.control_variates = given);
-        assert_eq!(prepare(&mut job, &Preparation::default()).unwrap().chosen, []);
-        assert_eq!(job.settings().integrator.estimator, EstimatorKind::Ocv);
-    }
 }
 
 /// Pixels may have different numbers of samples, of which some have looks. Their means are those of `mis`: quarters of the image,
@@ -96,7 +60,6 @@ fn different_numbers_of_samples_change_no_mean() {
         let mut job = floor(5, resolution);
         job.change(|s| {
             s.integrator.estimator = estimator;
-            s.integrator.ocv.control_variates = ControlVariates::Always;
             s.sampling.sampler = SamplerKind::Independent;
         });
         let bounds = job.world.scene.film.bounds;
@@ -138,7 +101,6 @@ fn control_variates_leave_adaptive_numbers() {
         let mut job = floor(5, [96, 64]);
         job.change(|s| {
             s.integrator.estimator = estimator;
-            s.integrator.ocv.control_variates = ControlVariates::Always;
             (s.sampling.sampler, s.sampling.noise) = (SamplerKind::Independent, Some(0.05));
             s.sampling.spp = 64;
         });

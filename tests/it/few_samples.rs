@@ -4,8 +4,7 @@ use crate::path_reuse::{film, mean_of};
 use lumiris::import::{LoadOptions, load};
 use lumiris::render::RenderSettings;
 use lumiris::scene::AccelKind;
-use lumiris::settings::{CorrelatedForm, EstimatorKind, OptimalForm};
-use lumiris_numbers::estimators::ocv::Form;
+use lumiris::settings::{EstimatorKind, OcvForm, OptimalForm};
 use std::path::Path;
 use strum::VariantNames;
 
@@ -17,15 +16,15 @@ fn one_sample_at_a_vertex_is_enough_for_every_estimator() {
     let loaded = load(&path, &options).map_err(|d| d.to_string()).unwrap();
     let mut job = loaded.job(AccelKind::Embree, None).unwrap();
     let mut answers = Vec::new();
-    let kinds = EstimatorKind::VARIANTS.iter().filter(|kind| **kind != "ocv").map(|kind| (*kind, Form::Pixels));
-    // The biased form is left out
-    let forms = [Form::Pixels, Form::Progressive, Form::Crossfit].map(|form| ("ocv", form));
+    // What is biased is left out
+    let is_kept = |kind: &&&str| !["ocv", "correlated"].contains(kind);
+    let kinds = EstimatorKind::VARIANTS.iter().filter(is_kept).map(|kind| (*kind, OcvForm::Pixels));
+    let forms = [OcvForm::Pixels, OcvForm::Progressive].map(|form| ("ocv", form));
     for (kind, form) in kinds.chain(forms) {
         job.change(|s| {
             (s.integrator.estimator, s.integrator.ocv.form) = (kind.parse().unwrap(), form);
             (s.integrator.samples, s.integrator.later_samples) = (Some(1), Some(1));
-            (s.integrator.optimal_mis, s.integrator.correlated.form) =
-                (OptimalForm::Progressive, CorrelatedForm::Crossfit);
+            s.integrator.optimal_mis = OptimalForm::Progressive;
         });
         let images = (0..16).map(|seed| {
             job.change(|s| s.sampling.seed = seed);

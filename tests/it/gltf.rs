@@ -577,6 +577,34 @@ fn animations_move_nodes_and_bend_meshes_at_a_time() {
     assert!(still.contains("no animation"), "{still}");
 }
 
+#[test]
+fn a_camera_that_frames_an_animation_is_the_same_at_all_times_and_sees_all_of_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.glb");
+    std::fs::write(&path, animated("")).unwrap();
+    let at = |time| {
+        let options = LoadOptions { time: Some(time), resolution: Some([64, 64]), ..LoadOptions::default() };
+        load(&path, &options).map_err(|report| report.to_string()).unwrap().scene
+    };
+    let view = |time| {
+        let scene = at(time);
+        let corners = [[0.0, 0.0], [64.0, 0.0], [0.0, 64.0], [64.0, 64.0]];
+        let rays = corners.map(|[x, y]| scene.camera.ray(Vec2::new(x, y), [0.5; 2], 0.5).ray);
+        (scene.origin, rays.map(|ray| (ray.o, ray.d)))
+    };
+    let first = view(1.0);
+    for time in [0.0, 1.7, 2.0, 3.0, 9.0] {
+        assert_eq!(view(time), first, "at {time} s");
+        // What is seen lies between the rays of the corners
+        let (_, [(o, a), (_, b), (_, c), (_, d)]) = first;
+        let bounds = at(time).geometry.world_bounds();
+        for p in [bounds.min, bounds.max] {
+            let inside = [(a, b), (b, d), (d, c), (c, a)].map(|(u, v)| u.cross(v).dot(p - o).signum());
+            assert!(inside.iter().all(|side| *side == inside[0]), "{p} at {time} s");
+        }
+    }
+}
+
 /// A box 2 wide, with glass that bends nothing and absorbs, seen from outside in white surroundings.
 fn glass(volume: &str) -> Vec<u8> {
     glass_of(1.0, &format!(r#""KHR_materials_volume":{{{volume}}}"#))

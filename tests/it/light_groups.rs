@@ -7,7 +7,7 @@ use lumiris::integrators::light_layers;
 use lumiris::render::output::{Aov, channels};
 use lumiris::render::{RenderSettings, render};
 use lumiris::scene::{AccelKind, PixelSamples, RenderJob};
-use lumiris::settings::{EstimatorKind, IntegratorKind, RouletteKind, Target};
+use lumiris::settings::{EstimatorKind, IntegratorKind, Target};
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
@@ -77,24 +77,20 @@ fn film(job: &RenderJob, spp: u32) -> Film {
 }
 
 /// Estimators with layers: vertices in columns and in stages, BSDF samples that are the next segment and others.
-const METHODS: [(IntegratorKind, EstimatorKind, u32, RouletteKind); 8] = [
-    (IntegratorKind::Direct, EstimatorKind::Mc, 2, RouletteKind::Throughput),
-    (IntegratorKind::Direct, EstimatorKind::Mis, 4, RouletteKind::Throughput),
-    (IntegratorKind::Path, EstimatorKind::Mis, 2, RouletteKind::Throughput),
-    (IntegratorKind::Path, EstimatorKind::Mis, 1, RouletteKind::Throughput),
-    (IntegratorKind::Path, EstimatorKind::Mis, 2, RouletteKind::Efficiency),
-    (IntegratorKind::Path, EstimatorKind::Ris, 2, RouletteKind::Throughput),
-    (IntegratorKind::Direct, EstimatorKind::Contributing, 4, RouletteKind::Throughput),
-    (IntegratorKind::Path, EstimatorKind::Auto, 4, RouletteKind::Throughput),
+const METHODS: [(IntegratorKind, EstimatorKind, u32); 7] = [
+    (IntegratorKind::Direct, EstimatorKind::Mc, 2),
+    (IntegratorKind::Direct, EstimatorKind::Mis, 4),
+    (IntegratorKind::Path, EstimatorKind::Mis, 2),
+    (IntegratorKind::Path, EstimatorKind::Mis, 1),
+    (IntegratorKind::Path, EstimatorKind::Ris, 2),
+    (IntegratorKind::Direct, EstimatorKind::Contributing, 4),
+    (IntegratorKind::Path, EstimatorKind::Auto, 4),
 ];
 
-fn choose(
-    job: &mut RenderJob,
-    (kind, estimator, samples, roulette): (IntegratorKind, EstimatorKind, u32, RouletteKind),
-) {
+fn choose(job: &mut RenderJob, (kind, estimator, samples): (IntegratorKind, EstimatorKind, u32)) {
     job.change(|s| {
         let i = &mut s.integrator;
-        (i.kind, i.estimator, i.samples, i.roulette) = (kind, estimator, Some(samples), roulette);
+        (i.kind, i.estimator, i.samples) = (kind, estimator, Some(samples));
     });
 }
 

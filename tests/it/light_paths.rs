@@ -8,7 +8,7 @@ use lumiris::import::{LoadOptions, load_text};
 use lumiris::integrators::light_paths::{obstacle, per_sample};
 use lumiris::render::RenderSettings;
 use lumiris::scene::{AccelKind, PixelSamples, RenderJob};
-use lumiris::settings::{EstimatorKind, IntegratorKind, RouletteKind};
+use lumiris::settings::{EstimatorKind, IntegratorKind};
 use std::path::Path;
 
 /// A ball of glass, a ball of metal that is a little rough, and a sheet of glass, on a floor, before a wall; lamps, one of
@@ -240,7 +240,6 @@ fn images_that_light_paths_cannot_help_are_those_without() {
     let mut job = SCENE.job(1.0, [8, 6]);
     assert!(per_sample(&job) == 1.0);
     for change in [
-        |job: &mut RenderJob| job.change(|s| s.integrator.roulette = RouletteKind::Efficiency),
         |job: &mut RenderJob| job.change(|s| s.integrator.kind = IntegratorKind::Direct),
         |job: &mut RenderJob| job.change(|s| s.integrator.estimator = EstimatorKind::Ris),
         |job: &mut RenderJob| job.change(|s| s.integrator.max_depth = 2),

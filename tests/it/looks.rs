@@ -7,10 +7,10 @@ use lumiris::film::Film;
 use lumiris::import::cache::FileCache;
 use lumiris::import::{LoadOptions, load_text};
 use lumiris::integrators::{light_paths, reuse};
-use lumiris::render::plan::{Preparation, prepare};
+use lumiris::planning::{Preparation, prepare};
 use lumiris::render::{RenderSettings, render};
 use lumiris::scene::{AccelKind, PixelSamples, RenderJob};
-use lumiris::settings::{Allocation, EstimatorKind, IntegratorKind, RouletteKind};
+use lumiris::settings::{Allocation, EstimatorKind, IntegratorKind};
 use lumiris_numbers::estimators::stats::Welford;
 use lumiris_numbers::math::luminance;
 use std::path::Path;
@@ -94,9 +94,6 @@ fn looks_change_no_mean() {
     let shared: Change = |job| {
         job.change(|s| (s.integrator.kind, s.integrator.path_reuse) = (IntegratorKind::Path, Some(3)));
     };
-    let guided: Change = |job| {
-        job.change(|s| (s.integrator.kind, s.integrator.roulette) = (IntegratorKind::Path, RouletteKind::Efficiency));
-    };
     let caustics: Change = |job| {
         job.change(|s| (s.integrator.kind, s.integrator.light_paths) = (IntegratorKind::Path, Some(0.5)));
     };
@@ -117,14 +114,13 @@ fn looks_change_no_mean() {
         job(&[&sensor, LAMP, SURFACES])
     };
     let in_mist = || job(&[MIST, CAMERA, LAMP, SURFACES, CLOUD]);
-    let cases: [(&str, &dyn Fn() -> RenderJob, EstimatorKind, Change); 11] = [
+    let cases: [(&str, &dyn Fn() -> RenderJob, EstimatorKind, Change); 10] = [
         ("a lens and motion, direct, mis", &moving, Mis, direct),
         ("direct, mis", &in_air, Mis, direct),
         ("direct, ris", &in_air, Ris, direct),
         ("direct, contributing", &in_air, Contributing, direct),
         ("paths, mis", &in_air, Mis, path),
         ("shared paths", &in_air, Mis, shared),
-        ("roulette by efficiency", &in_air, Mis, guided),
         ("light paths", &in_air, Mis, caustics),
         ("paths in mist, mis", &in_mist, Mis, path),
         ("paths in mist, ris", &in_mist, Ris, path),

@@ -5,15 +5,17 @@ use crate::same_light::assert_same_light;
 use lumiris::film::{Film, PixelSums};
 use lumiris::import::{LoadOptions, load};
 use lumiris::lights::LightSamplerKind;
-use lumiris::render::plan::{Preparation, prepare};
-use lumiris::render::{RenderError, RenderSettings, render};
+use lumiris::planning::{PlanError, Preparation, prepare};
+use lumiris::render::{RenderSettings, render};
 use lumiris::scene::{AccelKind, PixelSamples, RenderJob};
 use lumiris::settings::{Allocation, EstimatorKind, IntegratorKind, Settings};
 use lumiris_numbers::estimators::stats::{Welford, z_test};
 use lumiris_numbers::math::luminance;
+use std::collections::BTreeMap;
 use std::path::Path;
+use std::sync::Mutex;
 use std::sync::atomic::AtomicBool;
-use std::time::Duration;
+use std::time::Instant;
 
 fn gallery(change: impl FnOnce(&mut Settings)) -> RenderJob {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/demo/gallery.pbrt");
@@ -231,29 +233,44 @@ fn numbers_of_samples_add_no_bias() {
 }
 
 #[test]
-fn pilots_are_made_for_the_samples_that_there_is_time_for_and_end_when_they_are_stopped() {
-    let job = || {
+fn pilots_end_when_they_are_stopped_and_are_given_up_at_their_deadline() {
+    let job = |noise: Option<f32>| {
         gallery(|s| {
             s.integrator.estimator = EstimatorKind::Auto;
-            s.sampling.spp = 100_000;
+            (s.sampling.spp, s.sampling.noise) = (100_000, noise);
         })
     };
-    let in_time = |limit: f64, spp: Option<u32>| {
-        let mut job = job();
-        job.change(|s| s.sampling.pilot_spp = spp);
-        let time_limit = Some(Duration::from_secs_f64(limit));
-        let plan = prepare(&mut job, &Preparation { time_limit, ..Preparation::on(Some(1)) }).unwrap();
-        let chosen = plan.chosen.iter().find(|(key, _)| *key == "pilot_spp").map(|(_, value)| value.clone());
-        (job.settings().sampling.pilot_spp, chosen)
-    };
-    let (spp, chosen) = in_time(0.05, None);
-    assert!(spp.is_some_and(|spp| spp < 10_000), "{spp:?}");
-    assert_eq!(chosen, spp.map(|spp| spp.to_string()), "it becomes a setting, on which images depend");
-    assert_eq!(in_time(0.05, Some(20)), (Some(20), None), "what is set stays");
+    for noise in [None, Some(0.01)] {
+        let (stop, deadline) = (AtomicBool::new(true), Some(Instant::now()));
+        let how = Preparation { stop: &stop, deadline, ..Preparation::on(Some(1)) };
+        let error = prepare(&mut job(noise), &how).unwrap_err();
+        assert!(matches!(error, PlanError::Stopped), "{error}");
 
-    let stop = AtomicBool::new(true);
-    let error = prepare(&mut job(), &Preparation { stop: &stop, ..Preparation::on(Some(1)) }).unwrap_err();
-    assert!(matches!(error, RenderError::Stopped), "{error}");
+        let mut job = job(noise);
+        let plan = prepare(&mut job, &Preparation { deadline, ..Preparation::on(Some(1)) }).unwrap();
+        let settings = job.settings();
+        assert_eq!((plan.warnings.len(), job.pixel_samples.is_none()), (1, true));
+        assert_eq!((settings.sampling.allocation, settings.sampling.noise), (Allocation::Uniform, None));
+        // It becomes a setting, on which the image depends
+        let chosen = |key: &str| plan.chosen.iter().find(|(k, _)| *k == key).map(|(_, value)| value.as_str());
+        assert_eq!((chosen("estimator"), chosen("allocation")), (Some("mis"), Some("uniform")));
+    }
+}
+
+#[test]
+fn pilots_say_what_they_do_and_how_much_of_it_is_done() {
+    let told = Mutex::new(BTreeMap::<&str, Vec<f64>>::new());
+    let observe = |name: &'static str, done: Option<f64>| told.lock().unwrap().entry(name).or_default().extend(done);
+    let mut job = gallery(|s| {
+        s.integrator.estimator = EstimatorKind::Auto;
+        s.sampling.spp = 4096;
+    });
+    prepare(&mut job, &Preparation { observe: &observe, ..Preparation::on(Some(1)) }).unwrap();
+    let told = told.into_inner().unwrap();
+    let name = "measuring where the noise is";
+    let done = told.get(name).unwrap_or_else(|| panic!("{name}: {:?}", told.keys()));
+    assert!(done.is_sorted() && done.iter().all(|done| (0.0..=1.0).contains(done)), "{name}: {done:?}");
+    assert!(done.first().is_some_and(|first| *first < 0.2) && done.last().is_some_and(|last| *last > 0.7), "{done:?}");
 }
 
 #[test]

@@ -5,8 +5,7 @@ use crate::media::job;
 use lumiris::film::PixelSums;
 use lumiris::render::{RenderSettings, render};
 use lumiris::scene::{AccelKind, RenderJob};
-use lumiris::settings::{Cached, ControlVariates, EstimatorKind, IntegratorKind, Settings};
-use lumiris_numbers::estimators::ocv::Form;
+use lumiris::settings::{Cached, EstimatorKind, IntegratorKind, OcvForm, Settings};
 use lumiris_numbers::math::{Affine3A, Quat, Vec3};
 use std::fmt::Write;
 use std::sync::atomic::AtomicBool;
@@ -114,9 +113,8 @@ fn estimators() -> Vec<(String, Change)> {
             let change = move |s: &mut Settings| {
                 (s.integrator.estimator, s.integrator.samples) = (kind, samples);
                 s.integrator.max_depth = depth;
-                s.integrator.ocv.control_variates = ControlVariates::Always;
                 if depth == 3 {
-                    s.integrator.ocv.form = Form::Pixels;
+                    s.integrator.ocv.form = OcvForm::Pixels;
                 }
             };
             all.push((format!("{kind:?} {samples:?}, depth {depth}"), Box::new(change)));

@@ -3,10 +3,10 @@
 use lumiris::film::Film;
 use lumiris::import::cache::FileCache;
 use lumiris::import::{LoadOptions, load, load_text};
-use lumiris::render::plan::{Preparation, prepare};
+use lumiris::planning::{Preparation, prepare};
 use lumiris::render::{RenderSettings, render};
 use lumiris::scene::{AccelKind, RenderJob};
-use lumiris::settings::{Allocation, ControlVariates, EstimatorKind, IntegratorKind, RouletteKind, Settings};
+use lumiris::settings::{Allocation, EstimatorKind, IntegratorKind, Settings};
 use lumiris_numbers::samplers::SamplerKind;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
@@ -32,13 +32,12 @@ struct Mode {
 }
 
 /// Those in which a variance is more or less than s²/N.
-const MODES: [Mode; 8] = [
+const MODES: [Mode; 7] = [
     Mode { name: "mis", change: |_| () },
     Mode { name: "sobol", change: |s| s.sampling.sampler = SamplerKind::Sobol },
     Mode { name: "shared paths", change: |s| s.integrator.path_reuse = Some(4) },
     Mode { name: "adaptive, looks", change: |s| s.sampling.allocation = Allocation::Adaptive },
     Mode { name: "ocv over pixels", change: over_pixels },
-    Mode { name: "roulette and splitting", change: |s| s.integrator.roulette = RouletteKind::Efficiency },
     Mode { name: "light paths", change: |s| s.integrator.light_paths = Some(1.0) },
     Mode { name: "adaptive, shared, light paths", change: all_together },
 ];
@@ -46,7 +45,6 @@ const MODES: [Mode; 8] = [
 fn over_pixels(s: &mut Settings) {
     s.integrator.estimator = EstimatorKind::Ocv;
     (s.integrator.samples, s.integrator.bsdf_fraction) = (Some(2), Some(0.5));
-    s.integrator.ocv.control_variates = ControlVariates::Always;
 }
 
 fn all_together(s: &mut Settings) {
@@ -202,7 +200,7 @@ AttributeBegin Translate 0.4 -0.6 0.2 Shape "sphere" "float radius" 0.4 Attribut
 "#;
 
 /// The edge of the lamp, of few pixels, has most of the variance: with 24 seeds, the ratio has a standard error of 7 to 10 %,
-/// 19 % where numbers are adaptive, and 30 % with roulette and splitting. Of 3 standard errors, a right one fails with a probability of 0.003, and with 10 % a factor
+/// 19 % where numbers are adaptive. Of 3 standard errors, a right one fails with a probability of 0.003, and with 10 % a factor
 /// of 1.8 is found with one of 0.9. Blocks have errors of 10 %.
 #[test]
 fn variances_are_those_between_seeds_in_every_mode() {

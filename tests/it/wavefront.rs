@@ -1,12 +1,12 @@
 //! Vertices side by side are the vertices one by one: the same random numbers give the same radiance.
 
 use lumiris::direct::Fits;
-use lumiris::film::{FeatureSet, PixelSample};
+use lumiris::film::PixelSample;
 use lumiris::import::{LoadOptions, load};
+use lumiris::integrators::PathTracer;
 use lumiris::integrators::path::CameraSample;
-use lumiris::integrators::{GuidedIntegrator, PathTracer};
 use lumiris::scene::{AccelKind, RenderJob};
-use lumiris::settings::{EstimatorKind, IntegratorKind, RouletteKind};
+use lumiris::settings::{EstimatorKind, IntegratorKind};
 use lumiris_numbers::math::Vec2;
 use lumiris_numbers::samplers::{SampleStream, SamplerKind};
 use std::path::Path;
@@ -51,12 +51,9 @@ fn camera_samples(job: &RenderJob) -> Vec<CameraSample> {
 /// Traces side by side, or by the stages of direct light, which list what samples contribute.
 fn traced(job: &RenderJob, samples: &[CameraSample], side_by_side: bool) -> Vec<PixelSample> {
     let mut out = Vec::new();
-    let is_guided = job.settings().integrator.roulette != RouletteKind::Throughput;
-    let guided = is_guided.then(|| GuidedIntegrator::new(job));
-    let mut tracer = guided.as_ref().map_or_else(PathTracer::default, |guided| guided.path_tracer(FeatureSet::All));
-    let settings = guided.as_ref().map_or(&job.settings().integrator, GuidedIntegrator::settings);
+    let mut tracer = PathTracer::default();
     tracer.outcomes = (!side_by_side).then(Vec::new);
-    tracer.trace(job, settings, samples, &mut Fits::default(), &mut out);
+    tracer.trace(job, &job.settings().integrator, samples, &mut Fits::default(), &mut out);
     out
 }
 
@@ -74,7 +71,7 @@ fn assert_same_radiance_of(job: &RenderJob, scene: &str, part: f64) {
     let samples = camera_samples(job);
     let (a, b) = (traced(job, &samples, true), traced(job, &samples, false));
     let i = &job.settings().integrator;
-    let what = format!("{scene} {:?} {:?} {:?} {}", i.kind, i.estimator, i.roulette, samples[0].sample_counts.samples);
+    let what = format!("{scene} {:?} {:?} {}", i.kind, i.estimator, samples[0].sample_counts.samples);
     let mut lit = 0;
     let mut different = 0;
     for (a, b) in a.iter().zip(&b) {
@@ -108,16 +105,5 @@ fn paths_go_the_same_ways() {
         assert_same_radiance(scene, IntegratorKind::Path, (EstimatorKind::Mc, 2, 0.0), 0.96);
         // Only in columns is a lone BSDF sample of a first vertex that of the path
         assert_same_radiance(scene, IntegratorKind::Path, (EstimatorKind::Mis, 4, 0.5), 0.96);
-    }
-}
-
-#[test]
-fn paths_end_and_split_the_same_ways() {
-    for scene in SCENES {
-        for (estimator, samples) in [(EstimatorKind::Mc, 2), (EstimatorKind::Mis, 4)] {
-            let mut job = job(scene, IntegratorKind::Path, estimator, samples, 0.5);
-            job.change(|s| s.integrator.roulette = RouletteKind::Efficiency);
-            assert_same_radiance_of(&job, scene, 0.96);
-        }
     }
 }

@@ -30,7 +30,7 @@ use crate::direct::shadow_segments::Segments;
 use crate::direct::t1::{T1, choice_by_sampler};
 use crate::lights::{LightId, LightSample};
 use crate::scene::{EmitterHit, EmitterScratch, RenderJob};
-use crate::settings::{CorrelatedForm, SamplingTechnique};
+use crate::settings::SamplingTechnique;
 use lumiris_numbers::estimators::correlated::{self, SUMS};
 use lumiris_numbers::math::ray::offset_origin;
 use lumiris_numbers::math::{Ray, Rgb, Vec3};
@@ -47,8 +47,6 @@ pub const DELTA_DIVISOR: u32 = 4;
 pub struct Correlated {
     /// Samples (N).
     pub samples: u32,
-    /// How the weight of the two estimates is determined.
-    pub form: CorrelatedForm,
     /// What draws the samples.
     pub technique: SamplingTechnique,
 }
@@ -201,9 +199,8 @@ impl Correlated {
         candidates.weigh(Candidate::own_factor);
     }
 
-    /// `out[i]` belongs to `points[i]`, or to both halves of a point, `points[2i]` and `points[2i + 1]`, where the form
-    /// has halves.
-    pub(super) fn resolve(&self, candidates: &Candidates, segments: &Segments, b: &mut Buffers, out: &mut [Rgb]) {
+    /// `out[i]` belongs to `points[i]`.
+    pub(super) fn resolve(candidates: &Candidates, segments: &Segments, b: &mut Buffers, out: &mut [Rgb]) {
         let are_free = segments.are_free(&candidates.contributions);
         let traced = candidates.records.iter().zip(&candidates.contributions).zip(are_free);
         for (((c, contribution), is_free), control) in traced.zip(&b.controls) {
@@ -216,21 +213,8 @@ impl Correlated {
                 None => estimate.outside += value,
             }
         }
-        for (i, out) in out.iter_mut().enumerate() {
-            *out = match self.form {
-                CorrelatedForm::Combined => {
-                    let e = &b.estimates[i];
-                    Rgb::from_array(correlated::combined(&e.sums)) + e.outside
-                }
-                CorrelatedForm::Crossfit => {
-                    // What is outside has the weights of the halves too: where one of them is a single sample, nothing
-                    // is outside of that
-                    let [a, b] = [&b.estimates[2 * i], &b.estimates[2 * i + 1]];
-                    let [n, m] = [a, b].map(|e| e.plan.n as f32);
-                    let outside = (a.outside * n + b.outside * m) / (n + m).max(1.0);
-                    Rgb::from_array(correlated::crossfit([&a.sums, &b.sums])) + outside
-                }
-            };
+        for (out, e) in out.iter_mut().zip(&b.estimates) {
+            *out = Rgb::from_array(correlated::combined(&e.sums)) + e.outside;
         }
     }
 }

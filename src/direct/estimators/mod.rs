@@ -25,13 +25,10 @@ use super::point::ShadingPoint;
 use super::shadow_segments::Segments;
 use super::t1::{BsdfBuffers, T1};
 use crate::scene::RenderJob;
-use crate::settings::{
-    CorrelatedForm, CorrelatedSettings, EstimatorKind, IntegratorSettings, OptimalForm, RisSettings, SampleCounts,
-    Target,
-};
+use crate::settings::{EstimatorKind, IntegratorSettings, OcvForm, OptimalForm, SampleCounts};
 use contributing::Contributing;
 use correlated::Correlated;
-use lumiris_numbers::estimators::ocv::{Form, NormalEquations};
+use lumiris_numbers::estimators::ocv::NormalEquations;
 use lumiris_numbers::math::Rgb;
 use mc::Mc;
 use mis::Mis;
@@ -79,15 +76,12 @@ impl Estimator {
 
     /// The settings with an estimator that is not fitted, of as many samples as the path vertex `vertex` has: that of later vertices,
     /// and of pilots. Progressive estimators are fitted to the first vertices of a pixel, which are close together; at later ones,
-    /// which lie anywhere, `mis` is used, or `ris` without what was fitted.
+    /// which lie anywhere, `mis` is used.
     #[must_use]
     pub fn without_fits(settings: &IntegratorSettings, vertex: u32) -> IntegratorSettings {
         let estimator = Self::new(settings, 0);
         if !estimator.is_progressive() && !estimator.is_over_pixels() {
             return *settings;
-        }
-        if let Estimator::Ris(_) = estimator {
-            return IntegratorSettings { ris: RisSettings { target: Target::Fgl, ..settings.ris }, ..*settings };
         }
         let samples = Some(settings.sample_counts_at(vertex).samples);
         IntegratorSettings { estimator: EstimatorKind::Mis, samples, ..*settings }
@@ -106,8 +100,7 @@ impl Estimator {
                 Estimator::OptimalMis(OptimalMis { mis: Mis::at_vertex(settings, vertex), form: settings.optimal_mis })
             }
             EstimatorKind::Correlated => {
-                let CorrelatedSettings { form, technique } = settings.correlated;
-                Estimator::Correlated(Correlated { samples, form, technique })
+                Estimator::Correlated(Correlated { samples, technique: settings.correlated_technique })
             }
             EstimatorKind::Contributing => {
                 let noncontributing_samples = settings.contributing.noncontributing_samples();
@@ -137,7 +130,7 @@ impl Estimator {
     /// True if an estimate uses coefficients fitted to earlier samples of its pixel.
     pub fn is_progressive(&self) -> bool {
         match self {
-            Estimator::Ocv(ocv) => ocv.form == Form::Progressive,
+            Estimator::Ocv(ocv) => ocv.form == OcvForm::Progressive,
             Estimator::OptimalMis(optimal) => optimal.form == OptimalForm::Progressive,
             _ => false,
         }
@@ -146,17 +139,7 @@ impl Estimator {
     /// True if the estimates of a pixel are corrected by what was fitted to other pixels.
     pub fn is_over_pixels(&self) -> bool {
         match self {
-            Estimator::Ocv(ocv) => ocv.form == Form::Pixels,
-            Estimator::Ris(ris) => ris.has_fitted_control(),
-            _ => false,
-        }
-    }
-
-    /// True if an estimate consists of two independent halves.
-    pub fn has_halves(&self) -> bool {
-        match self {
-            Estimator::Ocv(ocv) => ocv.form == Form::Crossfit,
-            Estimator::Correlated(correlated) => correlated.form == CorrelatedForm::Crossfit,
+            Estimator::Ocv(ocv) => ocv.form == OcvForm::Pixels,
             _ => false,
         }
     }
@@ -186,7 +169,7 @@ impl Estimator {
             Estimator::Mc(mc) => mc.propose(t1),
             Estimator::Mis(mis) => mis.propose(t1),
             Estimator::Ris(ris) => ris.propose_and_draw(t1, &mut batch.ris),
-            Estimator::Ocv(Ocv { mis, form: Form::Pixels }) => {
+            Estimator::Ocv(Ocv { mis, form: OcvForm::Pixels }) => {
                 batch.components.propose_together(t1, |point| mis.allocation(point));
             }
             Estimator::Ocv(Ocv { mis, .. }) | Estimator::OptimalMis(OptimalMis { mis, .. }) => {
@@ -227,7 +210,6 @@ impl Estimator {
             Estimator::Ris(_) => {
                 segments.resolve(out);
                 out.iter_mut().zip(&ris.known).for_each(|(out, &known)| *out += known);
-                ris.set_controls(job, points, out, fits);
             }
             Estimator::Ocv(ocv) => {
                 ocv.resolve(job, points, (candidates, segments, components), fits, out);
@@ -237,7 +219,7 @@ impl Estimator {
                 optimal.resolve(job, points, (candidates, segments, components), fits, out);
                 candidates.stats.solve += start.elapsed();
             }
-            Estimator::Correlated(c) => c.resolve(candidates, segments, correlated, out),
+            Estimator::Correlated(_) => Correlated::resolve(candidates, segments, correlated, out),
         }
     }
 }

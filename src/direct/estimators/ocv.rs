@@ -11,6 +11,7 @@ use crate::direct::fits::Fits;
 use crate::direct::point::ShadingPoint;
 use crate::direct::shadow_segments::Segments;
 use crate::scene::RenderJob;
+use crate::settings::OcvForm;
 use lumiris_numbers::estimators::ocv::{Form, MAX_COMPONENTS, NormalEquations};
 use lumiris_numbers::math::Rgb;
 
@@ -20,12 +21,11 @@ pub struct Ocv {
     /// The samples.
     pub mis: Mis,
     /// How the coefficients are determined.
-    pub form: Form,
+    pub form: OcvForm,
 }
 
 impl Ocv {
-    /// `out[i]` belongs to `points[i]`, or to both halves of a point, `points[2i]` and `points[2i + 1]`, where the form
-    /// has halves.
+    /// `out[i]` belongs to `points[i]`.
     pub(super) fn resolve(
         &self,
         job: &RenderJob,
@@ -36,13 +36,13 @@ impl Ocv {
     ) {
         let equations = components.sum(job, candidates, segments);
         let Components { mixtures, sums, beta, .. } = components;
-        let (form, len, width) = (self.form, equations.len(), equations.coefficients());
+        let (form, len, width) = (numeric(self.form), equations.len(), equations.coefficients());
         for (mixture, sums) in mixtures.iter().zip(sums.chunks_mut(len)) {
             form.finish(equations, sums, &mixture.integrals);
         }
 
-        // β of the forms that fit it to these samples
-        if !matches!(form, Form::Progressive | Form::Pixels) {
+        // β of the form that fits it to these samples
+        if self.form == OcvForm::Paper {
             let systems = sums.len() / len;
             beta.clear();
             beta.resize(systems * width, 0.0);
@@ -50,15 +50,14 @@ impl Ocv {
             candidates.stats.ill_conditioned += equations.solve(form.system(), sums, beta) as u64;
         }
 
-        let rows = form.rows();
-        for (i, (out, sums)) in out.iter_mut().zip(sums.chunks(rows * len)).enumerate() {
-            let integrals = &mixtures[i * rows].integrals;
-            let estimate = match form {
-                Form::Progressive => match fits.beta(points[i].fit) {
+        for (i, (out, sums)) in out.iter_mut().zip(sums.chunks(len)).enumerate() {
+            let integrals = &mixtures[i].integrals;
+            let estimate = match self.form {
+                OcvForm::Progressive => match fits.beta(points[i].fit) {
                     Some(beta) => form.estimate(equations, sums, beta, integrals),
                     None => equations.mean(sums),
                 },
-                Form::Pixels => {
+                OcvForm::Pixels => {
                     let (value, mut controls) = (equations.mean(sums), means_of_columns(equations, sums));
                     // Groups, then the first lobe
                     controls[..equations.components()].rotate_left(job.lobes());
@@ -66,15 +65,22 @@ impl Ocv {
                     fits.set_controls(points[i].sample, value, &controls[..job.controls()]);
                     value
                 }
-                Form::Paper | Form::Regression | Form::Crossfit => {
-                    form.estimate(equations, sums, &beta[i * rows * width..][..rows * width], integrals)
-                }
+                OcvForm::Paper => form.estimate(equations, sums, &beta[i * width..][..width], integrals),
             };
-            if form == Form::Progressive {
+            if self.form == OcvForm::Progressive {
                 fits.add(points[i].fit, sums);
             }
             *out = Rgb::from_array(estimate);
         }
+    }
+}
+
+/// The form as the numerics call it.
+fn numeric(form: OcvForm) -> Form {
+    match form {
+        OcvForm::Paper => Form::Paper,
+        OcvForm::Progressive => Form::Progressive,
+        OcvForm::Pixels => Form::Pixels,
     }
 }
 

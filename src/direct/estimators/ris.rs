@@ -13,27 +13,20 @@
 //! proposals, is added without a ray, and samples are drawn where V̂ is in doubt, for the difference
 //! ([`lumiris_numbers::estimators::ris::control`]).
 //!
-//! With the target `fgl-control`, what is seen of each group of lights is fitted to the surrounding pixels: the control variates
-//! of a pixel are, for each group, its part of q̂·r of the draws less its part of that of all proposals ([`OfGroups`]), so that what
-//! chance gives to one group and takes from another is taken back. Later vertices of a path have the target `fgl`.
-//!
 //! Targets with visibility reverse the order: proposals are traced, and N of the visible ones are shaded; light samples
 //! do not need the BSDF before that.
 
 use crate::bsdfs::Bsdf;
 use crate::direct::candidates::{Candidate, Candidates, SampleAllocation};
 use crate::direct::domain;
-use crate::direct::fits::Fits;
 use crate::direct::light_samples::unshadowed_candidate;
 use crate::direct::point::ShadingPoint;
 use crate::direct::proposal_columns::{PointProposals, ProposalColumns, Techniques};
 use crate::direct::shadow_segments::Segments;
 use crate::direct::t1::T1;
-use crate::lights::LightGroups;
 use crate::scene::RenderJob;
 use crate::settings::{IntegratorSettings, ProposalPoints, RisSettings, SampleCounts, Strata, Target};
 use lumiris_numbers::estimators::mis::Heuristic;
-use lumiris_numbers::estimators::ris::control::OfGroups;
 use lumiris_numbers::estimators::ris::{Draw, strata, stratified, systematic, with_replacement};
 use lumiris_numbers::math::Rgb;
 use lumiris_numbers::math::hash::{pcg4d, unit_f32};
@@ -72,11 +65,6 @@ impl Ris {
         self.target == Target::VisibilityControl
     }
 
-    /// True if what is seen of groups of lights is fitted to the surrounding pixels.
-    pub fn has_fitted_control(&self) -> bool {
-        self.target == Target::FglControl
-    }
-
     /// How the proposals of a point are weighted.
     fn techniques(&self, point: &ShadingPoint<'_>) -> Techniques {
         let SampleAllocation { n_light, n_bsdf, .. } = allocation(point);
@@ -92,7 +80,6 @@ impl Ris {
         let bsdf_samples = std::mem::replace(&mut candidates.records, std::mem::take(&mut b.bsdf_samples));
         candidates.records.clear();
         b.known.clear();
-        b.of_groups.clear();
 
         let mut rest = Chunk { first: 0, points, bsdf: &bsdf_samples };
         while !rest.points.is_empty() {
@@ -102,7 +89,7 @@ impl Ris {
                 candidates.stats.segments += b.probe(job, &chunk);
             }
             let proposed = Instant::now();
-            self.draw_chunk(&job.lights.groups, &chunk, b, candidates);
+            self.draw_chunk(&chunk, b, candidates);
             candidates.stats.t1_light += proposed - start;
             candidates.stats.select += proposed.elapsed();
         }
@@ -133,17 +120,13 @@ impl Ris {
     }
 
     /// Select: draws the samples of the points of a chunk.
-    fn draw_chunk(&self, groups: &LightGroups, chunk: &Chunk<'_>, b: &mut Buffers, candidates: &mut Candidates) {
+    fn draw_chunk(&self, chunk: &Chunk<'_>, b: &mut Buffers, candidates: &mut Candidates) {
         let mut bsdf = chunk.bsdf;
         for (i, point) in chunk.points.iter().enumerate() {
             let range = b.proposals.points()[i];
             self.draw(point, range, b.numbers[i][1], b);
             let (own, rest) = bsdf.split_at(range.end - range.bsdf_start);
             bsdf = rest;
-            if self.has_fitted_control() {
-                let of_groups = b.of_groups_at(groups, range, own);
-                b.of_groups.push(of_groups);
-            }
             let mut known = self.has_control().then(|| b.proposals.known(range, own));
             for draw in &b.draws {
                 let place = range.start + draw.index as usize;
@@ -246,44 +229,12 @@ pub(super) struct Buffers {
     probes: Segments,
     /// Per point, what is known of its light without visibility, if that is a control variate.
     pub(super) known: Vec<Rgb>,
-    /// Per point, the control variates by groups of lights, if there are any.
-    of_groups: Vec<OfGroups>,
     /// Per point of the chunk, the numbers for the places of proposals and for the draws: well distributed over the
     /// samples of a pixel.
     numbers: Vec<[f32; 2]>,
 }
 
 impl Buffers {
-    /// The control variates of a point by the draws from its proposals, of which `bsdf` are those by BSDF sampling.
-    fn of_groups_at(&self, groups: &LightGroups, range: PointProposals, bsdf: &[Candidate]) -> OfGroups {
-        let proposals = &self.proposals;
-        let group_of = |place: usize| {
-            let by_bsdf = place.checked_sub(range.bsdf_start).map(|i| &bsdf[i]);
-            groups.group_of(proposals.light_of(place, by_bsdf))
-        };
-        let mut of_groups = OfGroups::default();
-        for place in (range.start..range.end).filter(|&place| proposals.weight[place] > 0.0) {
-            if let Some(group) = group_of(place) {
-                of_groups.propose(group, proposals.weight[place]);
-            }
-        }
-        for draw in &self.draws {
-            let place = range.start + draw.index as usize;
-            if let Some(group) = group_of(place) {
-                of_groups.draw(group, proposals.weight[place] * draw.scale);
-            }
-        }
-        of_groups
-    }
-
-    /// Resolve: gives the estimates of the points, and their control variates, to the fits over pixels.
-    pub(super) fn set_controls(&self, job: &RenderJob, points: &[ShadingPoint<'_>], out: &[Rgb], fits: &mut Fits) {
-        for ((point, of_groups), estimate) in points.iter().zip(&self.of_groups).zip(out) {
-            let value = job.world.scene.film.balanced(*estimate).to_array();
-            fits.set_controls(point.sample, value, &of_groups.parts()[..job.controls()]);
-        }
-    }
-
     /// Traces all proposals and sets the weights of those that are not visible to 0. Returns the number of segments.
     fn probe(&mut self, job: &RenderJob, chunk: &Chunk<'_>) -> u64 {
         self.probes.clear();

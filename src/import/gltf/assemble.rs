@@ -3,6 +3,7 @@
 use super::Messages;
 use super::animation::changes;
 use super::choice::{Names, chosen, name_of, shown};
+use super::extent;
 use super::materials::{Look, Materials};
 use super::meshes::{Primitive, primitive};
 use super::nodes::{Node, instances, middle, nodes};
@@ -87,10 +88,14 @@ impl<'a> Assembly<'a> {
         let (placed, camera_names) = cameras(self.document, &nodes, messages);
         choices.cameras = shown(&camera_names);
         let found = chosen_camera(self.options, (&placed, &camera_names), messages);
-        self.origin = near_origin(match &found {
-            Some((node, _)) => node.world_from_node.translation,
-            None => middle(self.document, &nodes)?,
-        });
+        // Frames of an animation are framed alike
+        let is_framed_as_a_whole = found.is_none() && self.options.time.is_some();
+        let framed = if is_framed_as_a_whole { extent::of_animations(self.document, &scene, messages)? } else { None };
+        self.origin = match (&found, &framed) {
+            (Some((node, _)), _) => near_origin(node.world_from_node.translation),
+            (None, Some((_, origin))) => *origin,
+            (None, None) => near_origin(middle(self.document, &nodes)?),
+        };
         if let Err(error) = self.add_meshes(&nodes, files, messages) {
             messages.error(&error);
         }
@@ -101,7 +106,8 @@ impl<'a> Assembly<'a> {
         }
         let index = found.as_ref().and_then(|(node, _)| placed.iter().position(|(other, _)| other.index == node.index));
         choices.camera = index.filter(|&i| i > 0);
-        let (camera, film) = camera(self.options, found, (&bounds, self.origin));
+        let (camera, film) =
+            camera(self.options, found, (framed.as_ref().map_or(&bounds, |(bounds, _)| bounds), self.origin));
         if let Some(path) = &self.options.environment {
             self.lights.extend(environment(path, files, messages));
         } else if self.lights.is_empty() && self.emitters.is_empty() {

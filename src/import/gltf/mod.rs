@@ -2,12 +2,13 @@
 //! beside it, [`LightUnits`] says. Single-sided surfaces are rendered from both sides.
 //!
 //! Reading order: [`choice`], [`textures`], [`materials`], [`animation`], [`nodes`], [`vertices`], [`pose`],
-//! [`meshes`], [`view`],
+//! [`meshes`], [`extent`], [`view`],
 //! [`assemble`].
 
 mod animation;
 mod assemble;
 mod choice;
+mod extent;
 mod materials;
 mod meshes;
 mod nodes;

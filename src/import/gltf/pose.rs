@@ -99,6 +99,16 @@ impl Pose {
         Ok(Pose { weights, skin })
     }
 
+    /// Weights of the morph targets.
+    pub(super) fn weights(&self) -> &[f32] {
+        &self.weights
+    }
+
+    /// The world that is rendered from mesh by each joint, if there are joints.
+    pub(super) fn joints(&self) -> Option<&[Affine3A]> {
+        self.skin.as_ref().map(|(_, joints)| &**joints)
+    }
+
     /// What tells it from other poses of the mesh.
     pub(super) fn key(&self) -> PoseKey {
         (self.weights.iter().map(|w| w.to_bits()).collect(), self.skin.as_ref().map(|(skin, _)| *skin))

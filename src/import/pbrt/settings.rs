@@ -2,7 +2,7 @@
 
 use super::checks::unknown;
 use super::descriptions::Pending;
-use crate::settings::table::{Directive, rows};
+use crate::settings::table::{Directive, Removed, rows};
 use crate::settings::value::{Integers, Interval, Kind, Value};
 use crate::settings::{IntegratorKind, ProgressiveSettings, Setting, Settings};
 use lumiris_formats::diagnostic::Diagnostics;
@@ -122,6 +122,10 @@ fn parameters(directive: Directive, s: &mut Settings, p: &ParamSet, d: &mut Diag
             placed.extend(written.map(|name| (row, value, p.span_of(name))));
         }
     }
+    for removed in Removed::of(directive).filter(|removed| p.type_of(removed.parameter).is_some()) {
+        p.ignore(removed.parameter);
+        d.warning(p.span_of(removed.parameter), removed.note(removed.parameter));
+    }
     placed
 }
 
@@ -142,7 +146,9 @@ fn read(row: &Setting, current: &Settings, p: &ParamSet, d: &mut Diagnostics) ->
             let name = named(key, &read, p, d)?;
             Some(Value::Name(synonyms.iter().find(|(synonym, _)| *synonym == name).map_or(name, |&(_, name)| name)))
         }
-        Kind::Integer { words, .. } | Kind::Real { words, .. } if is_text && !words.is_empty() => {
+        Kind::Integer { words, .. } | Kind::Real { words, .. } | Kind::Percentage { words }
+            if is_text && !words.is_empty() =>
+        {
             named(key, words, p, d).map(Value::Name)
         }
         // Negative numbers stand for the bits of large ones
@@ -151,6 +157,7 @@ fn read(row: &Setting, current: &Settings, p: &ParamSet, d: &mut Diagnostics) ->
         }
         Kind::Integer { range, .. } => whole(key, &range, p, d).map(Value::Integer),
         Kind::Real { range, .. } => within(key, &range, p, d).map(Value::Real),
+        Kind::Percentage { .. } => within(key, &Interval::POSITIVE, p, d).map(Value::Real),
         Kind::Pair { .. } => pair(row, current, p, d),
         Kind::Graded { plain, graded, range, default } => {
             let grade = spelling(row, 1, p).and_then(|key| within(key, &range, p, d)).unwrap_or(default);
@@ -235,8 +242,8 @@ mod tests {
     use crate::import::{LoadOptions, load};
     use crate::lights::LightSamplerKind;
     use crate::settings::{
-        Cached, CorrelatedForm, EstimatorKind, IntegratorSettings, IrradianceCacheSettings, PhotonMapSettings,
-        PhotonStorage, ProposalPoints, Proposals, SampleCounts, SamplingTechnique, Strata, Target,
+        Cached, EstimatorKind, IntegratorSettings, IrradianceCacheSettings, PhotonMapSettings, PhotonStorage,
+        ProposalPoints, Proposals, SampleCounts, SamplingTechnique, Strata, Target,
     };
     use lumiris_numbers::estimators::mis::Heuristic;
 
@@ -319,6 +326,19 @@ mod tests {
     }
 
     #[test]
+    fn settings_that_no_longer_exist_are_ignored_with_their_place() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("scene.pbrt");
+        let text = "Integrator \"path\"\n  \"string roulette\" \"efficiency\" \"integer maxdepth\" 3\nWorldBegin\nShape \"sphere\"\n";
+        std::fs::write(&path, text).unwrap();
+        let loaded = load(&path, &LoadOptions::default()).map_err(|report| report.to_string()).unwrap();
+        assert_eq!(loaded.settings.integrator, IntegratorSettings { max_depth: 3, ..Default::default() });
+        let warnings = loaded.warnings.to_string();
+        assert!(warnings.contains("scene.pbrt:2:3"), "{warnings}");
+        assert!(warnings.contains("the setting `roulette` no longer exists and is ignored"), "{warnings}");
+    }
+
+    #[test]
     fn wrong_settings_of_the_irradiance_cache_are_errors() {
         for (parameter, message) in [
             ("\"string cached\" \"most\"", "one of indirect, all"),
@@ -337,17 +357,11 @@ mod tests {
     fn settings_of_correlated_sampling_are_read() {
         let s = settings("Integrator \"path\" \"string estimator\" \"correlated\"").unwrap();
         assert_eq!(s.estimator, EstimatorKind::Correlated);
-        assert_eq!((s.correlated.form, s.correlated.technique), (CorrelatedForm::Combined, SamplingTechnique::Bsdf));
-        let s =
-            settings("Integrator \"path\" \"string correlated\" \"crossfit\" \"string technique\" \"light\"").unwrap();
-        assert_eq!((s.correlated.form, s.correlated.technique), (CorrelatedForm::Crossfit, SamplingTechnique::Light));
-        for (parameter, message) in [
-            ("\"string correlated\" \"half\"", "one of combined, crossfit"),
-            ("\"string technique\" \"both\"", "one of bsdf, light"),
-        ] {
-            let report = settings(&format!("Integrator \"path\" {parameter}")).unwrap_err();
-            assert!(report.contains(message), "{parameter}: {report}");
-        }
+        assert_eq!(s.correlated_technique, SamplingTechnique::Bsdf);
+        let s = settings("Integrator \"path\" \"string technique\" \"light\"").unwrap();
+        assert_eq!(s.correlated_technique, SamplingTechnique::Light);
+        let report = settings("Integrator \"path\" \"string technique\" \"both\"").unwrap_err();
+        assert!(report.contains("one of bsdf, light"), "{report}");
     }
 
     #[test]
@@ -379,7 +393,7 @@ mod tests {
             ("\"string proposals\" \"many\"", "one of auto, optimal"),
             ("\"integer proposals\" 0", "proposals must be from 1 to 4096, not 0"),
             ("\"string strata\" \"some\"", "one of none, proposals, weights, systematic"),
-            ("\"string target\" \"l\"", "one of fgl, fgl-control, gv, gvl"),
+            ("\"string target\" \"l\"", "one of fgl, gv, gvl"),
             ("\"string estimator\" \"rys\"", "one of auto, mc, mis, ris, ocv, optimal-mis, correlated"),
         ] {
             let report = settings(&format!("Integrator \"path\" {parameter}")).unwrap_err();

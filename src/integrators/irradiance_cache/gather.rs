@@ -170,9 +170,7 @@ impl Gatherer {
                 // E = π L of a white surface
                 sum.e += l * (PI / passes as f32);
             }
-            // Both halves of a crossfit are estimates
-            let halves = 1 + u32::from(estimator.has_halves());
-            self.add_gradients(job, wanted, halves, PI / (passes * halves) as f32, &mut sums);
+            self.add_gradients(job, wanted, PI / passes as f32, &mut sums);
         }
         for sum in sums.iter_mut().filter(|s| !s.is_finite()) {
             *sum = Irradiance { e: if sum.e.is_finite() { sum.e } else { Rgb::BLACK }, ..Irradiance::default() };
@@ -180,15 +178,8 @@ impl Gatherer {
         sums
     }
 
-    /// Adds the gradients of the samples of the last estimates, `estimates` per point, times `scale`.
-    fn add_gradients(
-        &mut self,
-        job: &RenderJob,
-        wanted: &[RecordRequest],
-        estimates: u32,
-        scale: f32,
-        sums: &mut [Irradiance],
-    ) {
+    /// Adds the gradients of the samples of the last estimates, one per point, times `scale`.
+    fn add_gradients(&mut self, job: &RenderJob, wanted: &[RecordRequest], scale: f32, sums: &mut [Irradiance]) {
         // Normals of the emitters at the ends of segments
         let segments = self.direct.segments();
         self.rays.clear();
@@ -197,7 +188,7 @@ impl Gatherer {
             if is_free {
                 let segment = segments.get(i);
                 self.rays.push(&Ray { t_max: f32::INFINITY, ..segment });
-                free.push(((point / estimates) as usize, l * scale, segment.t_max.is_finite()));
+                free.push((point as usize, l * scale, segment.t_max.is_finite()));
             }
         }
         job.world.intersect_emitters(&self.rays, &mut self.hits, &mut self.emitters);

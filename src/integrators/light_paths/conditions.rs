@@ -4,7 +4,7 @@ use crate::direct::Estimator;
 use crate::integrators::light_layers;
 use crate::lights::Light;
 use crate::scene::RenderJob;
-use crate::settings::{IntegratorKind, IntegratorSettings, RouletteKind};
+use crate::settings::{IntegratorKind, IntegratorSettings};
 
 /// Why light paths cannot help to render this image.
 pub fn obstacle(job: &RenderJob) -> Option<&'static str> {
@@ -21,7 +21,6 @@ pub fn obstacle_of(job: &RenderJob, settings: &IntegratorSettings) -> Option<&'s
     let reasons = [
         (settings.kind != IntegratorKind::Path, "only the integrator path has camera paths to share with them"),
         (settings.depth() < 3, "paths of less than three bounces leave nothing to them"),
-        (settings.roulette != RouletteKind::Throughput, "camera paths split"),
         (!extends_by_sample(settings), "they share light with mis of one BSDF sample only"),
         (!has_area_lights, "there are no area lights"),
         (!scene.camera.projects(), "only a perspective camera knows where it sees a point"),

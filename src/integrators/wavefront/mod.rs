@@ -37,13 +37,12 @@ use crate::geometry::Shape;
 use crate::lights::{GlossyLobe, LightSampling};
 use crate::materials::SurfaceBsdf;
 use crate::scene::{RenderJob, SurfaceInteraction};
-use crate::settings::IntegratorSettings;
+use crate::settings::{IntegratorSettings, OcvForm};
 use lumiris_lanes::columns::padded;
 use lumiris_lanes::lane::LANES;
 use lumiris_lanes::level;
 use lumiris_lanes::vertex as kernels;
 use lumiris_numbers::estimators::mis::Heuristic;
-use lumiris_numbers::estimators::ocv::Form;
 use lumiris_numbers::math::ray::offset_origin;
 use lumiris_numbers::math::{Rgb, Vec3};
 use lumiris_numbers::samplers::SampleStream;
@@ -86,7 +85,7 @@ impl Estimate {
                 let by_path = continues && mis.has_one_bsdf_sample(n);
                 (Counts { light: n - bsdf, bsdf, by_path }, mis.heuristic)
             }
-            Estimator::Ocv(Ocv { mis, form: Form::Pixels }) if mis.samples >= 2 => {
+            Estimator::Ocv(Ocv { mis, form: OcvForm::Pixels }) if mis.samples >= 2 => {
                 let (n, bsdf) = (mis.samples, mis.bsdf_samples(mis.samples));
                 (Counts { light: n - bsdf, bsdf, by_path: false }, mis.heuristic)
             }

@@ -7,7 +7,7 @@
 use super::file::write_tiles;
 use super::header::FilmHeader;
 use super::partial::Partial;
-use crate::render::tiles::Tile;
+use crate::render::tiles::Tiles;
 use std::io;
 use std::path::PathBuf;
 use std::thread::JoinHandle;
@@ -66,9 +66,9 @@ impl Checkpoints {
     }
 
     /// Stores the sums so far, unless the disk is still busy with the ones before, or there are none yet.
-    pub(in crate::render) fn store(&mut self, tiles: &[Tile]) {
+    pub(in crate::render) fn store(&mut self, tiles: &Tiles) {
         let start = Instant::now();
-        if tiles.iter().all(|t| t.done <= self.header.samples.start) {
+        if tiles.cells.is_empty() && tiles.tiles.iter().all(|t| t.done <= self.header.samples.start) {
             self.due = start + self.interval.max(SHORTEST);
             return;
         }
@@ -83,14 +83,14 @@ impl Checkpoints {
     }
 
     /// Stores the sums in the end, and waits for the disk.
-    pub(in crate::render) fn finish(&mut self, tiles: &[Tile]) {
+    pub(in crate::render) fn finish(&mut self, tiles: &Tiles) {
         self.await_disk();
         self.write(tiles);
         self.await_disk();
     }
 
-    fn write(&mut self, tiles: &[Tile]) {
-        self.header.is_finished = tiles.iter().all(|t| t.done >= self.header.samples.end);
+    fn write(&mut self, tiles: &Tiles) {
+        self.header.is_finished = tiles.tiles.iter().all(|t| t.done >= self.header.samples.end);
         match Partial::write(&self.path, |file| write_tiles(file, &self.header, tiles)) {
             Ok(partial) => {
                 let to_disk = move || partial.end();

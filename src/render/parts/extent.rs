@@ -1,10 +1,8 @@
 //! Which samples of which pixels are asked for.
 
 use super::stored::Stored;
-use crate::film::PixelBounds;
-use crate::render::plan::follows_from_times;
-use crate::render::{RenderSettings, TileShare, depends_on_earlier_samples};
-use crate::settings::{EstimatorKind, Settings};
+use crate::render::{RenderSettings, SHARED, TileShare, depends_on_earlier_samples};
+use crate::settings::{Allocation, EstimatorKind, IntegratorKind, Settings};
 
 /// A part of an image; the whole of it by default.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -28,6 +26,14 @@ impl From<&str> for ExtentError {
     fn from(text: &str) -> Self {
         ExtentError(text.to_owned())
     }
+}
+
+/// True if pixels share paths by these settings, or `auto` may choose that.
+fn may_share_paths(settings: &Settings) -> bool {
+    let Settings { integrator, sampling, .. } = settings;
+    let is_open = integrator.estimator == EstimatorKind::Auto && sampling.allocation == Allocation::Auto;
+    let is_shared = integrator.path_reuse.map_or(is_open, |edge| edge > 1);
+    is_shared && integrator.kind == IntegratorKind::Path
 }
 
 impl Extent {
@@ -55,34 +61,23 @@ impl Extent {
         Ok(())
     }
 
+    /// Rejects settings by which an image cannot be divided, if it is to be.
+    pub fn check_settings(&self, settings: &Settings) -> Result<(), ExtentError> {
+        if self.is_partial() { self.check_division(settings) } else { Ok(()) }
+    }
+
     /// Rejects settings by which an image cannot be divided.
     pub fn check_division(&self, settings: &Settings) -> Result<(), ExtentError> {
         if settings.sampling.noise.is_some() {
             return Err("parts of an image cannot be limited by --noise: give a number of samples, --spp".into());
         }
+        if self.part.is_some() && self.is_by_tiles && may_share_paths(settings) {
+            return Err(SHARED.into());
+        }
         let is_by_samples = !self.is_by_tiles || self.has_range();
         if is_by_samples && depends_on_earlier_samples(settings) {
             let reason = "with a progressive estimator, samples depend on earlier ones of their pixel";
             return Err(ExtentError(format!("{reason}: divide the image with --part-by tiles")));
-        }
-        Ok(())
-    }
-
-    /// Rejects settings by which the image of a scene cannot be rendered in parts. Before a plan is made.
-    pub fn check_settings(&self, settings: &Settings, bounds: &PixelBounds, scene: &str) -> Result<(), ExtentError> {
-        if !self.is_partial() {
-            return Ok(());
-        }
-        self.check_division(settings)?;
-        if follows_from_times(settings, bounds) {
-            let instead = match settings.integrator.estimator {
-                EstimatorKind::Ris => "give a number of --proposals",
-                _ => "name an estimator, such as `--estimator mis`",
-            };
-            return Err(ExtentError(format!(
-                "what these settings leave open follows from measured times, and must be the same for all parts: make one plan \
-                 with `lumiris plan {scene} … -o plan.json`, and render all parts with `--plan plan.json`; or {instead}"
-            )));
         }
         Ok(())
     }
@@ -128,7 +123,7 @@ impl Extent {
         (settings.skip, settings.spp, settings.share) = before;
         // The samples of a part follow from those of the whole image, which --spp names
         if let Some(more) = more.filter(|n| !self.is_partial() && *n != header.samples.end) {
-            let done = stored.tiles.iter().map(|t| t.done).max().unwrap_or(0);
+            let done = stored.tiles.iter().map(|t| t.done).chain(stored.cells.end()).max().unwrap_or(0);
             if header.samples.start > 0 || more < done {
                 let path = stored.path.display();
                 return Err(ExtentError(format!(

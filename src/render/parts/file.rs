@@ -1,6 +1,6 @@
 //! Files of sums: eight bytes and a version, then chunks. A chunk is a letter, the number of its bytes, these bytes, and
-//! the CRC-32 of all that. `H` is the header as text, `T` holds tiles, and `E`, which is last, says how many chunks of
-//! tiles there are. All numbers are little-endian.
+//! the CRC-32 of all that. `H` is the header as text, `T` holds tiles, `C` says how far cells are where pixels share paths, and
+//! `E`, which is last, says how many chunks of tiles there are. All numbers are little-endian.
 
 use super::error::PartError;
 use super::header::FilmHeader;
@@ -8,6 +8,7 @@ use super::partial::Partial;
 use super::stored_tile::{self, StoredTile};
 use crate::film::PixelBounds;
 use crate::film::encoding::{Decoder, Encoder};
+use crate::render::cell_progress::CellProgress;
 use crate::render::tiles::{SHARE_TILE, Tile, Tiles};
 use rayon::prelude::*;
 use std::fs::File;
@@ -17,10 +18,11 @@ use std::path::{Path, PathBuf};
 /// What files begin with.
 const MAGIC: &[u8; 8] = b"LUMIFILM";
 /// Version of the format.
-const VERSION: u32 = 3;
+const VERSION: u32 = 4;
 /// Letters of chunks.
 const HEADER: u8 = b'H';
 const TILES: u8 = b'T';
+const CELLS: u8 = b'C';
 const END: u8 = b'E';
 /// Pixels of a chunk of tiles, about.
 const CHUNK_PIXELS: usize = 1 << 14;
@@ -29,12 +31,13 @@ const CHUNKS_AT_ONCE: usize = 16;
 
 /// Writes a file of sums under a name beside `path`, which is then renamed: `path` is never half of a file.
 pub fn write_film(path: &Path, header: &FilmHeader, tiles: &Tiles) -> Result<(), PartError> {
-    let written = Partial::write(path, |file| write_tiles(file, header, &tiles.0)).and_then(Partial::end);
+    let written = Partial::write(path, |file| write_tiles(file, header, tiles)).and_then(Partial::end);
     written.map_err(|error| PartError::io(path, error))
 }
 
 /// Writes a file of sums.
-pub(super) fn write_tiles(file: &mut File, header: &FilmHeader, tiles: &[Tile]) -> io::Result<()> {
+pub(super) fn write_tiles(file: &mut File, header: &FilmHeader, tiles: &Tiles) -> io::Result<()> {
+    let Tiles { tiles, cells } = tiles;
     file.write_all(MAGIC)?;
     file.write_all(&VERSION.to_le_bytes())?;
     write_chunk(file, HEADER, header.text().as_bytes())?;
@@ -44,6 +47,11 @@ pub(super) fn write_tiles(file: &mut File, header: &FilmHeader, tiles: &[Tile]) 
     for chunks in chunks.chunks(CHUNKS_AT_ONCE) {
         let encoded: Vec<Vec<u8>> = chunks.par_iter().map(|tiles| chunk_of(tiles)).collect();
         encoded.iter().try_for_each(|bytes| write_chunk(file, TILES, bytes))?;
+    }
+    if !cells.is_empty() {
+        let mut encoder = Encoder::default();
+        cells.write(&mut encoder);
+        write_chunk(file, CELLS, &encoder.bytes)?;
     }
     write_chunk(file, END, &(chunks.len() as u64).to_le_bytes())?;
     file.flush()
@@ -85,6 +93,8 @@ pub struct FilmReader {
     left: u64,
     header: FilmHeader,
     chunks: u64,
+    /// How far cells are, where that is stored.
+    cells: CellProgress,
     /// Pixels that were read.
     pixels: PixelSet,
 }
@@ -114,8 +124,8 @@ impl FilmReader {
         let header = std::str::from_utf8(&bytes).ok().filter(|_| letter == HEADER).and_then(FilmHeader::parse);
         let header = header.ok_or_else(|| PartError::damaged(path, "its header means nothing"))?;
         let left = left - (bytes.len() as u64 + CHUNK_OVERHEAD);
-        let pixels = PixelSet::default();
-        Ok(FilmReader { path: path.to_owned(), file, left, header, chunks: 0, pixels })
+        let (cells, pixels) = Default::default();
+        Ok(FilmReader { path: path.to_owned(), file, left, header, chunks: 0, cells, pixels })
     }
 
     /// The header.
@@ -146,6 +156,11 @@ impl FilmReader {
                 }
                 Ok(Some(tiles))
             }
+            CELLS => {
+                let cells = CellProgress::read(&mut Decoder::new(&bytes));
+                self.cells = cells.ok_or_else(|| damaged("its cells mean nothing"))?;
+                Ok(Some(Vec::new()))
+            }
             END if bytes == self.chunks.to_le_bytes() && self.left == 0 => {
                 let is_whole = self.pixels.count == pixels_of(&self.header);
                 is_whole.then_some(None).ok_or_else(|| damaged("it does not have the pixels that its header says"))
@@ -155,8 +170,13 @@ impl FilmReader {
         }
     }
 
+    /// How far cells are, when all tiles were read.
+    pub fn cells(self) -> CellProgress {
+        self.cells
+    }
+
     /// All tiles.
-    pub fn all_tiles(mut self) -> Result<Vec<StoredTile>, PartError> {
+    pub fn all_tiles(&mut self) -> Result<Vec<StoredTile>, PartError> {
         let mut all = Vec::new();
         while let Some(tiles) = self.tiles()? {
             all.extend(tiles);
@@ -278,21 +298,22 @@ mod tests {
     }
 
     /// What is wrong with a file of these tiles, all of whose checksums are right.
-    fn fault(share: Option<TileShare>, tiles: &[Tile]) -> Option<String> {
+    fn fault(share: Option<TileShare>, tiles: Vec<Tile>) -> Option<String> {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.part");
-        write_tiles(&mut File::create(&path).unwrap(), &header(share), tiles).unwrap();
+        let tiles = Tiles { tiles, cells: CellProgress::default() };
+        write_tiles(&mut File::create(&path).unwrap(), &header(share), &tiles).unwrap();
         FilmReader::open(&path).unwrap().all_tiles().err().map(|error| error.to_string())
     }
 
     #[test]
     fn tiles_that_are_not_those_of_the_header_are_damage() {
         let whole = || -> Vec<Tile> { IMAGE.tiles(7).into_iter().map(|bounds| tile(bounds, 8)).collect() };
-        assert_eq!(fault(None, &whole()), None);
-        assert!(fault(None, &whole()[1..]).unwrap().contains("does not have the pixels"));
+        assert_eq!(fault(None, whole()), None);
+        assert!(fault(None, whole().split_off(1)).unwrap().contains("does not have the pixels"));
         let mut tiles = whole();
         tiles[1] = tile(tiles[0].bounds, 8);
-        assert!(fault(None, &tiles).unwrap().contains("a pixel twice"));
+        assert!(fault(None, tiles).unwrap().contains("a pixel twice"));
         for (k, wrong) in [
             tile(PixelBounds { x1: 44, ..IMAGE }, 8),
             tile(PixelBounds { x0: 43, x1: 3, ..IMAGE }, 8),
@@ -302,16 +323,16 @@ mod tests {
         .into_iter()
         .enumerate()
         {
-            assert!(fault(None, &[wrong]).unwrap().contains("its tiles mean nothing"), "{k}");
+            assert!(fault(None, vec![wrong]).unwrap().contains("its tiles mean nothing"), "{k}");
         }
 
         let share = TileShare { index: 1, count: 3 };
         let ours = || -> Vec<Tile> { share.tiles(&IMAGE).map(|bounds| tile(bounds, 4)).collect() };
-        assert_eq!(fault(Some(share), &ours()), None);
+        assert_eq!(fault(Some(share), ours()), None);
         let mut tiles = ours();
         tiles[0].bounds = IMAGE.tiles(SHARE_TILE)[0];
-        assert!(fault(Some(share), &tiles).unwrap().contains("of another part"));
+        assert!(fault(Some(share), tiles).unwrap().contains("of another part"));
         // More parts than tiles: some have none
-        assert_eq!(fault(Some(TileShare { index: 6, count: 7 }), &[]), None);
+        assert_eq!(fault(Some(TileShare { index: 6, count: 7 }), Vec::new()), None);
     }
 }

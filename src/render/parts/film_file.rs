@@ -3,11 +3,12 @@
 use super::checkpoint::Checkpoints;
 use super::error::PartError;
 use super::file::write_film;
-use super::header::FilmHeader;
-use super::notes::{Asked, PLAN_NOTE, SECONDS};
+use super::header::{FilmHeader, PLAN_NOTE};
+use super::notes::{Asked, SECONDS};
 use super::stored::Stored;
 use super::stored_tile::StoredTile;
 use crate::import::fingerprint::SceneFiles;
+use crate::render::cell_progress::CellProgress;
 use crate::render::{Continuation, RenderSettings, Rendering};
 use crate::scene::RenderJob;
 use std::path::{Path, PathBuf};
@@ -31,6 +32,7 @@ pub struct FilmFile {
     header: FilmHeader,
     checkpoints: Option<Checkpoints>,
     stored: Option<Vec<StoredTile>>,
+    cells: CellProgress,
     keeps_sums: bool,
 }
 
@@ -56,14 +58,16 @@ impl FilmFile {
         }
         let checkpoints =
             storage.checkpoint.map(|(path, interval)| Checkpoints::new(path, interval, header.clone(), warn));
-        let stored = storage.stored.map(|s| s.tiles);
-        Ok(FilmFile { header, checkpoints, stored, keeps_sums: storage.keeps_sums })
+        let (stored, cells) = storage.stored.map(|s| (s.tiles, s.cells)).unzip();
+        let cells = cells.unwrap_or_default();
+        Ok(FilmFile { header, checkpoints, stored, cells, keeps_sums: storage.keeps_sums })
     }
 
     /// What the rendering goes on from.
     pub fn continuation(&mut self) -> Continuation<'_> {
-        let (stored, checkpoints) = (self.stored.take(), self.checkpoints.as_mut());
-        Continuation { stored, checkpoints, keeps_sums: self.keeps_sums, ..Continuation::default() }
+        let (stored, cells) = (self.stored.take(), std::mem::take(&mut self.cells));
+        let checkpoints = self.checkpoints.as_mut();
+        Continuation { stored, cells, checkpoints, keeps_sums: self.keeps_sums, ..Continuation::default() }
     }
 
     /// Notes how the rendering ended.

@@ -10,6 +10,9 @@ use crate::scene::RenderJob;
 use std::ops::Range;
 use std::str::FromStr;
 
+/// Note of what was chosen for the image by measurements.
+pub const PLAN_NOTE: &str = "plan";
+
 /// Texts by name.
 type Entries = Vec<(String, String)>;
 

@@ -5,8 +5,8 @@
 
 use super::error::PartError;
 use super::file::FilmReader;
-use super::header::FilmHeader;
-use super::notes::{PLAN_NOTE, SCENE_NOTE, SECONDS, asked_aovs, has_features};
+use super::header::{FilmHeader, PLAN_NOTE};
+use super::notes::{SCENE_NOTE, SECONDS, asked_aovs, has_features};
 use super::stored_tile::StoredTile;
 use crate::direct::Fits;
 use crate::film::accumulator::PixelAccumulator;

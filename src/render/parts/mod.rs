@@ -23,7 +23,7 @@ pub use error::PartError;
 pub use extent::{Extent, ExtentError};
 pub use file::{FilmReader, write_film};
 pub use film_file::{FilmFile, Storage};
-pub use header::FilmHeader;
+pub use header::{FilmHeader, PLAN_NOTE};
 pub use merge::{Merged, merge};
 pub use notes::{Asked, CameraMatrices};
 pub use stored::Stored;

@@ -2,7 +2,7 @@
 //! is continued and merged.
 
 use super::error::PartError;
-use super::header::FilmHeader;
+use super::header::{FilmHeader, PLAN_NOTE};
 use super::stored::Stored;
 use crate::cameras::Camera;
 use crate::import::LoadOptions;
@@ -16,8 +16,6 @@ use std::str::FromStr;
 const AOV: &str = "aov";
 /// Note of the path of the scene.
 pub(super) const SCENE_NOTE: &str = "scene";
-/// Note of the plan that was made for it.
-pub(super) const PLAN_NOTE: &str = "plan";
 /// Note of the time that it took.
 pub(super) const SECONDS: &str = "seconds";
 /// Notes of the matrices of the camera.

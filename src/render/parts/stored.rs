@@ -4,6 +4,7 @@ use super::error::PartError;
 use super::file::FilmReader;
 use super::header::FilmHeader;
 use super::stored_tile::StoredTile;
+use crate::render::cell_progress::CellProgress;
 use crate::settings::Settings;
 use crate::settings::table::rows;
 use std::path::{Path, PathBuf};
@@ -17,6 +18,8 @@ pub struct Stored {
     pub header: FilmHeader,
     /// Its sums.
     pub tiles: Vec<StoredTile>,
+    /// How far its cells are, where pixels share paths.
+    pub cells: CellProgress,
 }
 
 impl Stored {
@@ -26,9 +29,10 @@ impl Stored {
         if checkpoint == Some(path) && !path.exists() {
             return Ok(None);
         }
-        let reader = FilmReader::open(path)?;
+        let mut reader = FilmReader::open(path)?;
         let header = reader.header().clone();
-        Ok(Some(Stored { path: path.to_owned(), header, tiles: reader.all_tiles()? }))
+        let tiles = reader.all_tiles()?;
+        Ok(Some(Stored { path: path.to_owned(), header, tiles, cells: reader.cells() }))
     }
 
     /// Applies its settings, in the order of the table. What it does not have does not apply.

@@ -61,6 +61,7 @@ pub(super) const IRRADIANCE_CACHE: Group = Group {
         },
         Setting {
             flag: "cache-passes",
+            is_option: false,
             value_name: "N",
             parameters: &["cachepasses"],
             key: "cache_passes",

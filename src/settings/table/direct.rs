@@ -1,14 +1,13 @@
 //! How direct light is estimated.
 
-use super::{Applies, Group, MAX_SAMPLES, Setting, choice, integer};
+use super::{Applies, Group, MAX_SAMPLES, RESEARCH, Setting, choice, integer};
 use crate::settings::EstimatorKind::{Auto, Contributing, Correlated, Mis, Ocv, OptimalMis, Ris};
 use crate::settings::value::{Integers, Interval, Kind, Value};
 use crate::settings::{
-    ControlVariates, CorrelatedForm, EstimatorKind, OptimalForm, ProposalPoints, Proposals, SamplingTechnique,
-    StageTimes, Strata, Target,
+    EstimatorKind, OcvForm, OptimalForm, ProposalPoints, Proposals, SamplingTechnique, Strata, Target,
 };
 use lumiris_numbers::estimators::mis::Heuristic;
-use lumiris_numbers::estimators::ocv::{Form, MAX_COMPONENTS};
+use lumiris_numbers::estimators::ocv::MAX_COMPONENTS;
 use strum::VariantNames;
 
 /// Samples of an estimate.
@@ -23,7 +22,7 @@ pub(super) const DIRECT: Group = Group {
             parameters: &["estimator"],
             key: "estimator",
             kind: choice(EstimatorKind::VARIANTS),
-            help: "Estimator of direct light at path vertices, or `auto`: what a pilot finds to be the most efficient",
+            help: "Estimator of direct light at path vertices, or `auto`: what a rule chooses from what the camera sees",
             get: |s| Some(Value::Name(s.integrator.estimator.into())),
             set: |s, v| v.named().map(|kind| s.integrator.estimator = kind),
             ..Setting::BASE
@@ -35,7 +34,7 @@ pub(super) const DIRECT: Group = Group {
             key: "samples",
             kind: Kind::Integer { range: SAMPLES, words: &["auto"] },
             help: "Samples per estimate (N): shadow rays per shading point, or `auto` for the estimator's default",
-            default: "auto: what --estimator auto finds; 2 for mc, and for mis with more than one bounce; otherwise 4; ris halves \
+            default: "auto: what --estimator auto chooses; 2 for mc, and for mis with more than one bounce; otherwise 4; ris halves \
                       it at every bounce",
             get: |s| Some(s.integrator.samples.map_or(Value::Name("auto"), |n| Value::Integer(n.into()))),
             resolved: Some(|s| Some(Value::Integer(s.integrator.sample_counts().samples.into()))),
@@ -90,47 +89,12 @@ pub(super) const DIRECT: Group = Group {
             set: |s, v| v.real().map(|fraction| s.integrator.bsdf_fraction = Some(fraction)),
             ..Setting::BASE
         },
-        Setting {
-            flag: "noncontributing-samples",
-            aliases: &["rest-samples"],
-            value_name: "N",
-            parameters: &["noncontributingsamples"],
-            old_parameters: &[("noncontributingsamples", "restsamples")],
-            key: "noncontributing_samples",
-            kind: integer(0, MAX_SAMPLES),
-            help: "Samples of contributing on non-contributing lights, in addition to --samples on the contributing \
-                   ones; 0 leaves these lights out, which is biased",
-            default: "2; auto measures what is best",
-            applies: Applies::Estimators(&[Contributing]),
-            get: |s| s.integrator.contributing.noncontributing_samples.map(|n| Value::Integer(n.into())),
-            resolved: Some(|s| Some(Value::Integer(s.integrator.contributing.noncontributing_samples().into()))),
-            set: |s, v| v.count().map(|n| s.integrator.contributing.noncontributing_samples = Some(n)),
-            ..Setting::BASE
-        },
-        Setting {
-            flag: "contributing-bsdf-samples",
-            value_name: "N",
-            parameters: &["contributingbsdfsamples"],
-            key: "contributing_bsdf_samples",
-            kind: integer(0, MAX_SAMPLES),
-            help: "BSDF samples of contributing on surfaces that are not diffuse, combined with its light samples by \
-                   --heuristic; 0 takes light samples alone, as --noncontributing-samples 0 does",
-            default: "1",
-            applies: Applies::If(
-                |s| s.integrator.estimator == Contributing && !s.integrator.leaves_lights_out(),
-                "the estimator contributing with samples on non-contributing lights",
-            ),
-            get: |s| s.integrator.contributing.bsdf_samples.map(|n| Value::Integer(n.into())),
-            resolved: Some(|s| Some(Value::Integer(s.integrator.contributing.bsdf_samples().into()))),
-            set: |s, v| v.count().map(|n| s.integrator.contributing.bsdf_samples = Some(n)),
-            ..Setting::BASE
-        },
     ],
 };
 
 /// Resampling.
 pub(super) const RIS: Group = Group {
-    title: "Resampling (--estimator ris)",
+    title: RESEARCH,
     rows: &[
         Setting {
             flag: "proposals",
@@ -138,8 +102,8 @@ pub(super) const RIS: Group = Group {
             parameters: &["proposals"],
             key: "proposals",
             kind: Kind::Integer { range: SAMPLES, words: &["auto", "optimal"] },
-            help: "Proposals per estimate (M): a number, `auto` (by a pilot; of a small image by the measured times of \
-                   the stages) or `optimal` (per pixel, from times and variances)",
+            help: "Proposals per estimate (M): a number, `auto` (three for each sample) or `optimal` (per pixel, from variances \
+                   that a pilot finds)",
             applies: Applies::Estimators(&[Ris]),
             get: |s| {
                 Some(match s.integrator.ris.proposals {
@@ -168,6 +132,7 @@ pub(super) const RIS: Group = Group {
         },
         Setting {
             flag: "strata",
+            is_option: false,
             parameters: &["strata"],
             key: "strata",
             kind: choice(Strata::VARIANTS),
@@ -180,6 +145,7 @@ pub(super) const RIS: Group = Group {
         },
         Setting {
             flag: "proposal-points",
+            is_option: false,
             parameters: &["proposalpoints"],
             key: "proposal_points",
             kind: choice(ProposalPoints::VARIANTS),
@@ -194,73 +160,72 @@ pub(super) const RIS: Group = Group {
             parameters: &["target"],
             key: "target",
             kind: choice(Target::VARIANTS),
-            help: "Target density of resampling: f*G*L, also with what surrounding pixels see of groups of lights as \
-                   control variates (fgl-control); with visibility V, where shading is more expensive than tracing rays; f*G*L with V estimated by the visibility cache (visibility), which may be a \
+            help: "Target density of resampling: f*G*L; with visibility V, where shading is more expensive than tracing rays; f*G*L with V estimated by the visibility cache (visibility), which may be a \
                    control variate as well (visibility-control)",
             applies: Applies::Estimators(&[Ris]),
             get: |s| Some(Value::Name(s.integrator.ris.target.into())),
             set: |s, v| v.named().map(|target| s.integrator.ris.target = target),
             ..Setting::BASE
         },
-        Setting {
-            flag: "stage-times",
-            value_name: "T1,T2",
-            parameters: &["stagetimes"],
-            key: "stage_times",
-            kind: Kind::Pair { range: Interval::POSITIVE, ascends: false, unit: "nanoseconds" },
-            help: "Times of a proposal and of a sample (ns), from which `auto` and `optimal` choose",
-            default: "measured on the scene",
-            applies: Applies::Estimators(&[Ris]),
-            get: |s| s.integrator.ris.stage_times.map(|t| Value::Pair([t.t1 as f32, t.t2 as f32])),
-            set: |s, v| {
-                // As written, and not as the nearest f32 has it
-                let [t1, t2] = v.pair()?.map(|t| t.to_string().parse().ok());
-                s.integrator.ris.stage_times = Some(StageTimes { t1: t1?, t2: t2? });
-                Some(())
-            },
-            ..Setting::BASE
-        },
     ],
 };
 
-/// Control variates and optimal weights.
+/// Contributing lights, control variates and optimal weights.
 pub(super) const CONTROL_VARIATES: Group = Group {
-    title: "Control variates (--estimator ocv, optimal-mis, correlated)",
+    title: RESEARCH,
     rows: &[
+        Setting {
+            flag: "noncontributing-samples",
+            aliases: &["rest-samples"],
+            value_name: "N",
+            parameters: &["noncontributingsamples"],
+            old_parameters: &[("noncontributingsamples", "restsamples")],
+            key: "noncontributing_samples",
+            kind: integer(0, MAX_SAMPLES),
+            help: "Samples of contributing on non-contributing lights, in addition to --samples on the contributing \
+                   ones; 0 leaves these lights out, which is biased",
+            default: "2; auto measures what is best",
+            applies: Applies::Estimators(&[Contributing]),
+            get: |s| s.integrator.contributing.noncontributing_samples.map(|n| Value::Integer(n.into())),
+            resolved: Some(|s| Some(Value::Integer(s.integrator.contributing.noncontributing_samples().into()))),
+            set: |s, v| v.count().map(|n| s.integrator.contributing.noncontributing_samples = Some(n)),
+            ..Setting::BASE
+        },
+        Setting {
+            flag: "contributing-bsdf-samples",
+            is_option: false,
+            value_name: "N",
+            parameters: &["contributingbsdfsamples"],
+            key: "contributing_bsdf_samples",
+            kind: integer(0, MAX_SAMPLES),
+            help: "BSDF samples of contributing on surfaces that are not diffuse, combined with its light samples by \
+                   --heuristic; 0 takes light samples alone, as --noncontributing-samples 0 does",
+            default: "1",
+            applies: Applies::If(
+                |s| s.integrator.estimator == Contributing && !s.integrator.leaves_lights_out(),
+                "the estimator contributing with samples on non-contributing lights",
+            ),
+            get: |s| s.integrator.contributing.bsdf_samples.map(|n| Value::Integer(n.into())),
+            resolved: Some(|s| Some(Value::Integer(s.integrator.contributing.bsdf_samples().into()))),
+            set: |s, v| v.count().map(|n| s.integrator.contributing.bsdf_samples = Some(n)),
+            ..Setting::BASE
+        },
         Setting {
             flag: "ocv",
             value_name: "FORM",
             parameters: &["ocv"],
             key: "ocv",
-            kind: choice(Form::VARIANTS),
+            kind: choice(OcvForm::VARIANTS),
             help: "What ocv fits the coefficients of its control variates to: the surrounding pixels, earlier samples of \
-                   the pixel, the other half of the samples, or (biased) the same samples",
+                   the pixel, or (biased) the same samples",
             applies: Applies::Estimators(&[Ocv]),
             get: |s| Some(Value::Name(s.integrator.ocv.form.into())),
             set: |s, v| v.named().map(|form| s.integrator.ocv.form = form),
             ..Setting::BASE
         },
         Setting {
-            flag: "control-variates",
-            parameters: &["controlvariates"],
-            key: "control_variates",
-            kind: choice(ControlVariates::VARIANTS),
-            help: "Control variates over pixels, of ocv and of ris with the target fgl-control: in any image, or where a \
-                   pilot finds that they gain more than they cost; elsewhere the image is that of mis, or of fgl",
-            applies: Applies::If(
-                |s| match s.integrator.estimator {
-                    Ocv => s.integrator.ocv.form == Form::Pixels,
-                    Ris => s.integrator.ris.target == Target::FglControl,
-                    _ => false,
-                },
-                "the estimator ocv with the form pixels, and ris with the target fgl-control",
-            ),
-            get: |s| Some(Value::Name(s.integrator.ocv.control_variates.into())),
-            set: |s, v| v.named().map(|kind| s.integrator.ocv.control_variates = kind),
-            ..Setting::BASE
-        },
-        Setting {
             flag: "components",
+            is_option: false,
             value_name: "M",
             parameters: &["components"],
             key: "components",
@@ -287,27 +252,15 @@ pub(super) const CONTROL_VARIATES: Group = Group {
             ..Setting::BASE
         },
         Setting {
-            flag: "correlated",
-            value_name: "FORM",
-            parameters: &["correlated"],
-            key: "correlated",
-            kind: choice(CorrelatedForm::VARIANTS),
-            help: "How correlated weights its two estimates: from the same samples (biased), or from the other half \
-                   of them",
-            applies: Applies::Estimators(&[Correlated]),
-            get: |s| Some(Value::Name(s.integrator.correlated.form.into())),
-            set: |s, v| v.named().map(|form| s.integrator.correlated.form = form),
-            ..Setting::BASE
-        },
-        Setting {
             flag: "technique",
+            is_option: false,
             parameters: &["technique"],
             key: "technique",
             kind: choice(SamplingTechnique::VARIANTS),
             help: "Sampling technique of correlated",
             applies: Applies::Estimators(&[Correlated]),
-            get: |s| Some(Value::Name(s.integrator.correlated.technique.into())),
-            set: |s, v| v.named().map(|technique| s.integrator.correlated.technique = technique),
+            get: |s| Some(Value::Name(s.integrator.correlated_technique.into())),
+            set: |s, v| v.named().map(|technique| s.integrator.correlated_technique = technique),
             ..Setting::BASE
         },
     ],

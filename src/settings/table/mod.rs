@@ -5,7 +5,10 @@
 mod cache;
 mod direct;
 mod photons;
+mod removed;
 mod transport;
+
+pub use removed::Removed;
 
 use super::value::{Integers, Kind, Value};
 use super::{EstimatorKind, IntegratorKind, Settings};
@@ -37,6 +40,8 @@ pub struct Setting {
     pub default: &'static str,
     /// Images that it affects.
     pub applies: Applies,
+    /// False if only scene files and Python have it, and the command line has no option for it.
+    pub is_option: bool,
     /// False if it cannot affect an image, but only prevent it from being rendered.
     pub is_recorded: bool,
     /// The value; `None` where it is the renderer's choice and there is no word for that.
@@ -97,6 +102,9 @@ impl Applies {
     }
 }
 
+/// Title of the groups that serve research.
+pub const RESEARCH: &str = "Research";
+
 /// Settings under one heading.
 #[derive(Clone, Copy, Debug)]
 pub struct Group {
@@ -149,6 +157,7 @@ impl Setting {
         help: "",
         default: "",
         applies: Applies::Always,
+        is_option: true,
         is_recorded: true,
         get: |_| None,
         resolved: None,
@@ -200,6 +209,8 @@ mod tests {
             assert!(all.copied().all(|name| parameters.insert((row.directive as u8, name))), "{}", row.flag);
             assert!(row.old_parameters.iter().all(|(name, _)| row.parameters.contains(name)), "{}", row.flag);
             assert!(!row.key.is_empty() && keys.insert(row.key), "{}", row.flag);
+            assert!(Removed::of_key(row.key).is_none(), "{}", row.flag);
+            assert!(Removed::of(row.directive).all(|old| !row.parameters.contains(&old.parameter)), "{}", row.flag);
         }
     }
 

@@ -24,6 +24,7 @@ pub(super) const PHOTONS: Group = Group {
         },
         Setting {
             flag: "caustic-ratio",
+            is_option: false,
             value_name: "Q",
             parameters: &["causticratio"],
             key: "caustic_ratio",
@@ -68,6 +69,7 @@ pub(super) const PHOTONS: Group = Group {
         },
         Setting {
             flag: "nearest",
+            is_option: false,
             value_name: "K",
             parameters: &["nearest"],
             key: "nearest",
@@ -92,6 +94,7 @@ pub(super) const PHOTONS: Group = Group {
         },
         Setting {
             flag: "gather-guide",
+            is_option: false,
             value_name: "FRACTION",
             parameters: &["gatherguide"],
             key: "gather_guide",
@@ -125,6 +128,7 @@ pub(super) const PHOTONS: Group = Group {
         },
         Setting {
             flag: "photon-radius",
+            is_option: false,
             value_name: "METRES",
             parameters: &["radius"],
             key: "photon_radius",
@@ -141,6 +145,7 @@ pub(super) const PHOTONS: Group = Group {
         },
         Setting {
             flag: "visibility-photons",
+            is_option: false,
             aliases: &["light-photons"],
             value_name: "N",
             parameters: &["visibilityphotons"],
@@ -160,6 +165,7 @@ pub(super) const PHOTONS: Group = Group {
         },
         Setting {
             flag: "photon-paths",
+            is_option: false,
             value_name: "N",
             parameters: &["photonpaths"],
             key: "photon_paths",
@@ -173,6 +179,7 @@ pub(super) const PHOTONS: Group = Group {
         },
         Setting {
             flag: "memory",
+            is_option: false,
             value_name: "BYTES",
             parameters: &["memory"],
             key: "memory",

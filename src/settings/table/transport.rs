@@ -4,7 +4,7 @@ use super::{Applies, Directive, Group, MAX_SAMPLES, MAX_U32, Setting, choice, in
 use crate::bsdfs::ProposalDensity;
 use crate::lights::LightSamplerKind;
 use crate::settings::value::{Integers, Interval, Kind, Value};
-use crate::settings::{Allocation, IntegratorKind, RouletteKind};
+use crate::settings::{Allocation, IntegratorKind};
 use lumiris_numbers::samplers::SamplerKind;
 use strum::VariantNames;
 
@@ -62,19 +62,6 @@ pub(super) const TRANSPORT: Group = Group {
             ..Setting::BASE
         },
         Setting {
-            flag: "roulette",
-            parameters: &["roulette"],
-            key: "roulette",
-            kind: choice(RouletteKind::VARIANTS),
-            help: "What decides whether a path ends by Russian roulette: its throughput, what it is expected to \
-                   contribute to its pixel, or the variance and the cost of what lies ahead; by the latter two, paths \
-                   split as well, and pilot paths are traced first",
-            applies: PATHS,
-            get: |s| Some(Value::Name(s.integrator.roulette.into())),
-            set: |s, v| v.named().map(|kind| s.integrator.roulette = kind),
-            ..Setting::BASE
-        },
-        Setting {
             flag: "path-reuse",
             value_name: "E",
             parameters: &["pathreuse"],
@@ -82,7 +69,7 @@ pub(super) const TRANSPORT: Group = Group {
             kind: Kind::Integer { range: Integers { min: 1, max: 16 }, words: &["auto"] },
             help: "Blocks of E × E pixels share what their paths find from the second diffuse vertex on, by E² − 1 shadow rays \
                    more for each path: less noise, which is correlated within a block; 1: none do",
-            default: "auto: what --estimator auto finds to be the most efficient, 3 in images too small for that; 1 with others",
+            default: "auto: what --estimator auto chooses; 1 with others",
             applies: PATHS,
             get: |s| Some(s.integrator.path_reuse.map_or(Value::Name("auto"), |n| Value::Integer(n.into()))),
             resolved: Some(|s| Some(Value::Integer(s.integrator.path_reuse.unwrap_or(1).into()))),
@@ -100,7 +87,7 @@ pub(super) const TRANSPORT: Group = Group {
             kind: Kind::Real { range: Interval::closed(0.0, 64.0), words: &["auto"] },
             help: "Light paths per camera sample that bring the light of emitting surfaces over metal and glass to diffuse \
                    surfaces (caustics), which camera paths find by chance only; both share it; 0: none",
-            default: "auto: what --estimator auto finds to be the most efficient, or else 0",
+            default: "auto: what --estimator auto chooses, or else 0",
             applies: Applies::Integrators(&[IntegratorKind::Path]),
             get: |s| Some(s.integrator.light_paths.map_or(Value::Name("auto"), Value::Real)),
             resolved: Some(|s| Some(Value::Real(s.integrator.light_paths.unwrap_or(0.0)))),
@@ -152,6 +139,7 @@ pub(super) const TRANSPORT: Group = Group {
         },
         Setting {
             flag: "bsdf-proposals",
+            is_option: false,
             value_name: "M",
             parameters: &["bsdfproposals"],
             key: "bsdf_proposals",
@@ -163,6 +151,7 @@ pub(super) const TRANSPORT: Group = Group {
         },
         Setting {
             flag: "bsdf-density",
+            is_option: false,
             parameters: &["bsdfdensity"],
             key: "bsdf_density",
             kind: choice(ProposalDensity::VARIANTS),
@@ -221,9 +210,9 @@ pub(super) const SAMPLING: Group = Group {
             directive: Directive::Sampler,
             parameters: &["noise"],
             key: "noise",
-            kind: Kind::Real { range: Interval::POSITIVE, words: &["off"] },
+            kind: Kind::Percentage { words: &["off"] },
             help: "Standard error that every block of 16 x 16 pixels is to have, relative to its mean luminance plus 0.01, \
-                   such as 0.02. A pilot finds how many samples that takes; --spp is the maximum, 4096 if it is not given \
+                   such as 2% or 0.02. A pilot finds how many samples that takes; --spp is the maximum, 4096 if it is not given \
                    as an option. For the integrators direct and path",
             default: "off",
             get: |s| Some(s.sampling.noise.map_or(Value::Name("off"), Value::Real)),
@@ -235,6 +224,7 @@ pub(super) const SAMPLING: Group = Group {
         },
         Setting {
             flag: "footprint-spp",
+            is_option: false,
             value_name: "K",
             directive: Directive::Sampler,
             parameters: &["footprintspp"],
@@ -250,6 +240,7 @@ pub(super) const SAMPLING: Group = Group {
         },
         Setting {
             flag: "pilot-spp",
+            is_option: false,
             value_name: "K",
             directive: Directive::Sampler,
             parameters: &["pilotspp"],
@@ -257,7 +248,7 @@ pub(super) const SAMPLING: Group = Group {
             kind: integer(1, MAX_U32),
             help: "Camera samples per pixel that pilots are made for, if that is less than --spp: pilots take a part of their \
                    time",
-            default: "--spp; with --time as many as there is time for",
+            default: "--spp; with --time 64, or fewer where the time is short for the pixels",
             get: |s| s.sampling.pilot_spp.map(|n| Value::Integer(n.into())),
             set: |s, v| v.count().map(|n| s.sampling.pilot_spp = Some(n)),
             ..Setting::BASE

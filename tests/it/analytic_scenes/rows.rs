@@ -5,11 +5,10 @@ use lumiris::import::{LoadOptions, load};
 use lumiris::lights::LightSamplerKind;
 use lumiris::scene::{AccelKind, RenderJob};
 use lumiris::settings::{
-    Cached, ControlVariates, CorrelatedForm, CorrelatedSettings, EstimatorKind, IntegratorKind, OcvSettings,
-    OptimalForm, ProposalPoints, Proposals, SamplingTechnique, Strata, Target,
+    Cached, EstimatorKind, IntegratorKind, OcvForm, OcvSettings, OptimalForm, ProposalPoints, Proposals,
+    SamplingTechnique, Strata, Target,
 };
 use lumiris_numbers::estimators::mis::Heuristic;
-use lumiris_numbers::estimators::ocv::Form;
 use lumiris_numbers::samplers::SamplerKind;
 use std::fmt;
 use std::path::Path;
@@ -25,7 +24,7 @@ pub(super) struct Configuration {
     /// Of `ocv`.
     pub ocv: OcvSettings,
     pub optimal_mis: OptimalForm,
-    pub correlated: CorrelatedSettings,
+    pub correlated_technique: SamplingTechnique,
     pub bsdf_fraction: f32,
     /// Probability of choosing an infinite light; `None` where it follows from the lights.
     pub infinite_fraction: Option<f32>,
@@ -52,9 +51,9 @@ pub(super) const BASE: Configuration = Configuration {
     estimator: EstimatorKind::Mis,
     heuristic: Heuristic::Power,
     samples: 2,
-    ocv: OcvSettings { form: Form::Progressive, components: None, control_variates: ControlVariates::Always },
+    ocv: OcvSettings { form: OcvForm::Progressive, components: None },
     optimal_mis: OptimalForm::Progressive,
-    correlated: CorrelatedSettings { form: CorrelatedForm::Combined, technique: SamplingTechnique::Bsdf },
+    correlated_technique: SamplingTechnique::Bsdf,
     bsdf_fraction: 0.5,
     infinite_fraction: None,
     proposals: 16,
@@ -87,7 +86,6 @@ fn path_configurations() -> Vec<Configuration> {
     let ris = Configuration { estimator: EstimatorKind::Ris, heuristic: Heuristic::Balance, ..base };
     all.extend(ris_configurations(&ris));
     all.extend(component_configurations(&Configuration { estimator: EstimatorKind::Ocv, ..base }));
-    all.extend(correlated_configurations(&Configuration { estimator: EstimatorKind::Correlated, ..base }));
     all
 }
 
@@ -128,10 +126,9 @@ fn weight_configurations() -> Vec<Configuration> {
     let of = |estimator| Configuration { estimator, samples: 4, ..mis };
     let ocv = of(EstimatorKind::Ocv);
     let with_form = |form| Configuration { ocv: OcvSettings { form, ..ocv.ocv }, ..ocv };
-    let (crossfit, pixels) = (with_form(Form::Crossfit), with_form(Form::Pixels));
+    let pixels = with_form(OcvForm::Pixels);
     let optimal = of(EstimatorKind::OptimalMis);
     let ris = of(EstimatorKind::Ris);
-    let control = Configuration { target: Target::FglControl, ..ris };
     let contributing = Configuration { visibility_cache: CacheContents::Right, ..of(EstimatorKind::Contributing) };
 
     let mut all = Vec::new();
@@ -139,14 +136,14 @@ fn weight_configurations() -> Vec<Configuration> {
         all.extend([1, 2, 5].map(|samples| Configuration { heuristic, samples, ..pixels }));
         all.push(Configuration { heuristic, samples: 4, bsdf_fraction: 0.25, ..mis });
         all.push(Configuration { heuristic, sampler: SamplerKind::Independent, ..pixels });
-        all.extend([ris, control, contributing].map(|c| Configuration { heuristic, proposals: 12, ..c }));
+        all.extend([ris, contributing].map(|c| Configuration { heuristic, proposals: 12, ..c }));
     }
     for bsdf_fraction in [0.25, 0.75] {
-        all.extend([crossfit, pixels, optimal].map(|c| Configuration { bsdf_fraction, ..c }));
+        all.extend([pixels, optimal].map(|c| Configuration { bsdf_fraction, ..c }));
     }
     for fraction in [0.2, 0.9] {
         let with_fraction = |c| Configuration { infinite_fraction: Some(fraction), ..c };
-        all.extend([mis, ocv, crossfit, pixels, optimal, ris, control].map(with_fraction));
+        all.extend([mis, ocv, pixels, optimal, ris].map(with_fraction));
     }
     all
 }
@@ -179,16 +176,11 @@ fn visibility_cache_configurations() -> Vec<Configuration> {
         ..ris
     });
     let control = Configuration { target: Target::VisibilityControl, ..ris };
-    let fitted = Configuration { target: Target::FglControl, ..ris };
-    all.extend([1, 4].map(|samples| Configuration { samples, ..fitted }));
-    all.push(Configuration { strata: Strata::None, sampler: SamplerKind::Independent, ..fitted });
     all.extend([Absent, Right, Wrong].map(|visibility_cache| Configuration { visibility_cache, ..control }));
     all.push(Configuration { visibility_cache: Wrong, strata: Strata::None, ..control });
     let ocv = Configuration { estimator: EstimatorKind::Ocv, samples: 5, light_sampler, ..*base };
     all.extend([Right, Wrong].map(|visibility_cache| Configuration { visibility_cache, ..ocv }));
     all.push(Configuration { visibility_cache: Right, estimator: EstimatorKind::OptimalMis, samples: 8, ..ocv });
-    let correlated = CorrelatedSettings { form: CorrelatedForm::Crossfit, technique: SamplingTechnique::Light };
-    all.push(Configuration { estimator: EstimatorKind::Correlated, correlated, visibility_cache: Right, ..ocv });
     let contributing = Configuration { estimator: EstimatorKind::Contributing, ..*base };
     all.extend([Absent, Empty, Right, Wrong].map(|visibility_cache| Configuration {
         visibility_cache,
@@ -206,32 +198,11 @@ fn visibility_cache_configurations() -> Vec<Configuration> {
     all
 }
 
-/// `correlated` in its unbiased form.
-fn correlated_configurations(base: &Configuration) -> Vec<Configuration> {
-    let of = |technique| Configuration {
-        correlated: CorrelatedSettings { form: CorrelatedForm::Crossfit, technique },
-        ..*base
-    };
-    let (bsdf, light) = (of(SamplingTechnique::Bsdf), of(SamplingTechnique::Light));
-    let mut all = [1, 2, 3, 4, 16].map(|samples| Configuration { samples, ..bsdf }).to_vec();
-    all.extend([1, 2, 5, 16].map(|samples| Configuration { samples, ..light }));
-    all.extend([LightSamplerKind::Uniform, LightSamplerKind::Power].map(|light_sampler| Configuration {
-        samples: 5,
-        light_sampler,
-        ..light
-    }));
-    all.push(Configuration { samples: 4, sampler: SamplerKind::Independent, ..bsdf });
-    all.push(Configuration { samples: 4, accel: AccelKind::Bvh, ..bsdf });
-    all
-}
-
 /// `ocv` and `optimal-mis` in their unbiased forms.
 fn component_configurations(base: &Configuration) -> Vec<Configuration> {
     let base = *base;
     let mut all = [1, 2, 3, 16].map(|samples| Configuration { samples, ..base }).to_vec();
-    let crossfit = OcvSettings { form: Form::Crossfit, ..base.ocv };
-    all.extend([2, 5, 16].map(|samples| Configuration { samples, ocv: crossfit, ..base }));
-    let pixels = OcvSettings { form: Form::Pixels, ..base.ocv };
+    let pixels = OcvSettings { form: OcvForm::Pixels, ..base.ocv };
     all.extend([1, 2, 5].map(|samples| Configuration { samples, ocv: pixels, ..base }));
     all.push(Configuration { samples: 4, ocv: pixels, sampler: SamplerKind::Independent, ..base });
     all.extend([2, 8].map(|samples| Configuration { samples, estimator: EstimatorKind::OptimalMis, ..base }));
@@ -331,7 +302,7 @@ impl Configuration {
                 }
             }
             EstimatorKind::Correlated => {
-                write!(f, " {} {}", name(self.correlated.form), name(self.correlated.technique))?;
+                write!(f, " {}", name(self.correlated_technique))?;
             }
             EstimatorKind::Contributing => {
                 write!(f, " rest={}", self.noncontributing_samples)?;
@@ -358,7 +329,7 @@ pub(super) fn job(path: &Path, c: &Configuration, edge: u32) -> RenderJob {
     settings.samples = Some(c.samples);
     settings.ocv = c.ocv;
     settings.optimal_mis = c.optimal_mis;
-    settings.correlated = c.correlated;
+    settings.correlated_technique = c.correlated_technique;
     settings.bsdf_fraction = Some(c.bsdf_fraction);
     settings.infinite_fraction = c.infinite_fraction;
     settings.ris.proposals = Proposals::Fixed(c.proposals);

@@ -7,7 +7,7 @@
 
 use lumiris::film::Film;
 use lumiris::import::{LoadOptions, load};
-use lumiris::render::plan::{Preparation, prepare};
+use lumiris::planning::{Preparation, prepare};
 use lumiris::render::{RenderSettings, render};
 use lumiris::scene::AccelKind;
 use std::fmt::Write;
@@ -25,7 +25,7 @@ const SCENES: [(&str, &str, [u32; 2]); 5] = [
 ];
 
 /// Integrators: a name and the directive, as in a scene file.
-const INTEGRATORS: [(&str, &str); 25] = [
+const INTEGRATORS: [(&str, &str); 22] = [
     ("direct mc", r#""direct" "string estimator" "mc" "integer samples" 2"#),
     ("direct mis", r#""direct" "string estimator" "mis""#),
     (
@@ -51,13 +51,13 @@ const INTEGRATORS: [(&str, &str); 25] = [
            "string proposalpoints" "independent" "string target" "gvl""#,
     ),
     ("direct ocv progressive", r#""direct" "string estimator" "ocv" "integer samples" 4 "string ocv" "progressive""#),
-    ("direct ocv crossfit", r#""direct" "string estimator" "ocv" "integer samples" 8 "string ocv" "crossfit""#),
-    ("direct ocv regression", r#""direct" "string estimator" "ocv" "integer samples" 8 "string ocv" "regression""#),
+    ("irradiance-cache", r#""irradiance-cache" "integer maxdepth" 3 "integer cachesamples" 64"#),
+    ("photon-map", r#""photon-map" "integer maxdepth" 4 "integer photons" 2000 "integer gather" 8"#),
     ("direct ocv paper", r#""direct" "string estimator" "ocv" "integer samples" 8 "string ocv" "paper""#),
     ("direct optimal-mis", r#""direct" "string estimator" "optimal-mis" "integer samples" 4"#),
     ("direct optimal-mis direct", r#""direct" "string estimator" "optimal-mis" "string optimalmis" "direct""#),
     ("direct correlated", r#""direct" "string estimator" "correlated""#),
-    ("direct correlated crossfit", r#""direct" "string estimator" "correlated" "string correlated" "crossfit""#),
+    ("photon-map progressive", r#""photon-map" "integer maxdepth" 4 "integer photons" 500 "float radius" 0.2"#),
     (
         "direct contributing",
         r#""direct" "string estimator" "contributing" "string lightsampler" "photons" "integer visibilityphotons" 3000"#,
@@ -70,9 +70,6 @@ const INTEGRATORS: [(&str, &str); 25] = [
     ("path mis", r#""path" "integer maxdepth" 5 "string estimator" "mis""#),
     ("path ris", r#""path" "integer maxdepth" 4 "string estimator" "ris" "integer proposals" 16"#),
     ("path ocv", r#""path" "integer maxdepth" 3 "string estimator" "ocv""#),
-    ("irradiance-cache", r#""irradiance-cache" "integer maxdepth" 3 "integer cachesamples" 64"#),
-    ("photon-map", r#""photon-map" "integer maxdepth" 4 "integer photons" 2000 "integer gather" 8"#),
-    ("photon-map progressive", r#""photon-map" "integer maxdepth" 4 "integer photons" 500 "float radius" 0.2"#),
     ("direct ocv pixels", r#""direct" "string estimator" "ocv" "integer samples" 4"#),
 ];
 

@@ -18,7 +18,12 @@ const CRATES: &[(&str, &str, &[&str])] = &[
     ("crates/formats", "lumiris_formats", &["lumiris_numbers"]),
     (".", "lumiris", &["lumiris_numbers", "lumiris_lanes", "lumiris_formats"]),
     ("crates/lab", "lumiris_lab", &["lumiris_numbers", "lumiris_lanes", "lumiris_formats", "lumiris"]),
-    ("crates/cli", "lumiris_cli", &["lumiris_numbers", "lumiris_lanes", "lumiris_formats", "lumiris", "lumiris_lab"]),
+    ("crates/bench", "lumiris_bench", &["lumiris_numbers", "lumiris_lanes", "lumiris_formats", "lumiris"]),
+    (
+        "crates/cli",
+        "lumiris_cli",
+        &["lumiris_numbers", "lumiris_lanes", "lumiris_formats", "lumiris", "lumiris_lab", "lumiris_bench"],
+    ),
     ("python", "_lumiris", &["lumiris_numbers", "lumiris_formats", "lumiris"]),
     ("crates/test-support", "lumiris_test_support", &["lumiris_numbers"]),
 ];
@@ -32,6 +37,7 @@ const LAYERS: &[&[&str]] = &[
     &["scene"],
     &["import", "direct", "photons"],
     &["integrators"],
+    &["planning"],
     &["render"],
 ];
 

@@ -2,7 +2,7 @@
 
 use super::denoise_args::DenoiseArgs;
 use super::exr::ExrArgs;
-use super::frame_list::{FrameList, parse_frames};
+use super::frame_list::{FrameList, FrameOf, parse_frames};
 use super::look::LookArgs;
 use super::memory::{MemoryLimit, parse_limit};
 use super::named::named;
@@ -10,8 +10,8 @@ use super::output_options::OutputOptions;
 use super::part_args::{LONGEST, PartArgs};
 use super::settings_args::SettingsArgs;
 use super::watch_args::WatchArgs;
-use clap::Args;
-use clap::builder::{PossibleValuesParser, TypedValueParser};
+use clap::builder::{BoolishValueParser, PossibleValuesParser, TypedValueParser};
+use clap::{Arg, ArgAction, Args};
 use lumiris::import::LoadOptions;
 use lumiris::import::gltf::LightUnits;
 use lumiris::render::output::Aov;
@@ -61,6 +61,9 @@ pub(super) struct SceneArgs {
     /// Time (s) at which the animations of a glTF scene are seen [default: without animations]
     #[arg(long, value_name = "SECONDS", value_parser = parse_time_in_scene)]
     pub time_in_scene: Option<f32>,
+    /// What the scene has of a sequence, if it is a frame of one.
+    #[arg(skip)]
+    pub frame: Option<FrameOf>,
     /// Memory that the textures of the scene may take, such as 2GB, or `off`: what does not fit is read by tiles from a
     /// temporary file (in TMPDIR). The image is the same to the bit [default: off]
     #[arg(long, value_name = "SIZE", value_parser = parse_limit)]
@@ -104,6 +107,40 @@ impl SceneArgs {
     }
 }
 
+/// Options of `render` that `-h` shows, beside itself.
+const IN_SHORT_HELP: [&str; 24] = [
+    "output",
+    "quiet",
+    "threads",
+    "plan",
+    "resolution",
+    "crop",
+    "camera",
+    "environment",
+    "frames",
+    "time",
+    "aov",
+    "integrator",
+    "max-depth",
+    "spp",
+    "noise",
+    "seed",
+    "estimator",
+    "samples",
+    "exposure",
+    "view-transform",
+    "denoise",
+    "view",
+    "checkpoint",
+    "resume",
+];
+
+/// Leaves all others to `--help`.
+pub(super) fn in_short_help(option: Arg) -> Arg {
+    let is_hidden = option.get_long().is_some_and(|name| !IN_SHORT_HELP.contains(&name));
+    option.hide_short_help(is_hidden)
+}
+
 /// `lumiris render`
 #[derive(Args, Clone, Debug)]
 pub(super) struct RenderArgs {
@@ -124,13 +161,23 @@ pub(super) struct RenderArgs {
     /// With --frames of a glTF scene without ####: frames per second; frame n is the scene at the time n/F
     #[arg(long, value_name = "F", default_value_t = 24.0, value_parser = parse_fps, requires = "frames")]
     pub fps: f32,
+    /// With --frames: whether each frame has a seed of its own, which follows from --seed and its number, and stands in its
+    /// metadata
+    #[arg(
+        long, value_name = "on|off", default_value = "on", action = ArgAction::Set, value_parser = BoolishValueParser::new(),
+        requires = "frames"
+    )]
+    pub seed_per_frame: bool,
     /// With --frames: leave out those whose images are there, and were not cut short by Ctrl-C
     #[arg(long, requires = "frames")]
     pub skip_existing: bool,
-    /// Stop after the first pass that ends later than this many seconds from when the scene is loaded, pilots included, if not all
-    /// samples per pixel are done before
+    /// Render for this many seconds from the start of the program (with --frames: of each frame), loading and pilots included, or
+    /// until --spp, if it is given, is reached before
     #[arg(long, value_name = "SECONDS", value_parser = parse_seconds)]
     pub time: Option<f64>,
+    /// Try settings before, and take what is a tenth more efficient than the rule's: for long renders. `lumiris plan` stores it
+    #[arg(long, hide_short_help = true, conflicts_with_all = ["plan", "part", "samples_from", "samples_to"])]
+    pub tune: bool,
     /// AOVs: additional channels of EXR files, or `none`, which saves the time for them [default: all, and ratio with
     /// --proposals optimal]
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = aov())]

@@ -11,8 +11,8 @@ use clap::Args;
 use lumiris::import::cache::FileCache;
 use lumiris::integrators::through_media;
 use lumiris::lights::LightSamplerKind;
-use lumiris::render::efficiency::{Case, Efficiency, Row, first_look, measure_efficiency};
 use lumiris::settings::{EstimatorKind, IntegratorKind, Settings};
+use lumiris_bench::efficiency::{Case, Efficiency, Row, first_look, measure_efficiency};
 use lumiris_formats::output::write_text;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
@@ -145,7 +145,7 @@ pub(super) fn efficiency(scene_args: &SceneArgs, own: &EfficiencyArgs, json: Opt
     for path in std::iter::once(&scene_args.scene).chain(&own.more_scenes) {
         let mut scene = scene_args.clone();
         scene.scene.clone_from(path);
-        let (mut job, Setup { files, .. }) = load_job_of(&scene, &FileCache::default(), None)?;
+        let (mut job, Setup { files, .. }) = load_job_of(&scene, &FileCache::default(), None, None)?;
         let mut base = *job.settings();
         // Cases with other numbers of samples are of the same textures
         base.sampling.footprint_spp = Some(base.sampling.footprint_spp());

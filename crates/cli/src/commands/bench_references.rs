@@ -8,10 +8,10 @@ use lumiris::imaging::ColorChannels;
 use lumiris::imaging::oiio::{Part, ReadLimits, read_colors, write_image};
 use lumiris::import::fingerprint::SceneFiles;
 use lumiris::render::RenderSettings;
-use lumiris::render::efficiency::{Colors, reference_image, reference_settings};
 use lumiris::render::output::metadata;
 use lumiris::scene::RenderJob;
 use lumiris::settings::Settings;
+use lumiris_bench::efficiency::{Colors, reference_image, reference_settings};
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::path::Path;
 

@@ -56,6 +56,12 @@ pub(super) fn run(args: &DenoiseFileArgs) -> anyhow::Result<ExitCode> {
     drop_earlier_result(&mut parts);
     let layer = image_of(&parts).map_err(|reason| anyhow!("{}: {reason}", args.input.display()))?;
     let main = layer.part;
+    if shares_paths(&parts) {
+        progress::say(&format!(
+            "warning: {}: pixels share paths, and noise that they have in common is taken for detail: render with --path-reuse 1",
+            args.input.display()
+        ));
+    }
     let image = noisy_image(&parts, &layer, |text| progress::say(&format!("{}: {text}", args.input.display())));
     let denoised = Denoised::new(&denoiser, image)?;
 
@@ -172,6 +178,12 @@ fn with_layer(mut parts: Vec<FilePart>, image: &ColorLayer, denoised: &Denoised)
     let entries = denoised.metadata().into_iter().map(|(key, value)| (key, MetaValue::Text(value)));
     parts[0].metadata.extend(entries);
     parts
+}
+
+/// True if pixels have noise in common.
+fn shares_paths(parts: &[FilePart]) -> bool {
+    let edge = texts(parts).into_iter().find(|(name, _)| name == "lumiris:path_reuse");
+    edge.is_some_and(|(_, edge)| edge.parse::<u32>().is_ok_and(|edge| edge > 1))
 }
 
 /// What the file says of its settings.

@@ -17,11 +17,11 @@ use super::progress;
 use super::settings::load_scene;
 use super::typed_options::AsTyped;
 use anyhow::{Context, bail};
+use clap::builder::BoolishValueParser;
 use clap::{Args, FromArgMatches, Subcommand};
 use lumiris::import::Loaded;
 use lumiris::import::cache::FileCache;
 use lumiris::render::output::Aov;
-use lumiris::render::plan::follows_from_times;
 use lumiris::settings::{Allocation, EstimatorKind};
 use lumiris_formats::output::write_text;
 use std::fs;
@@ -53,6 +53,9 @@ struct SlurmArgs {
     /// With --frames of a glTF scene without ####: frames per second [default: 24]
     #[arg(long, value_name = "F", value_parser = parse_fps, requires = "frames")]
     fps: Option<f32>,
+    /// With --frames: whether each frame has a seed of its own [default: on]
+    #[arg(long, value_name = "on|off", value_parser = BoolishValueParser::new(), requires = "frames")]
+    seed_per_frame: Option<bool>,
     /// Number of parts of an image, each of which is a task of an array job [default with --frames: 1]
     #[arg(
         long = "parts", value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000),
@@ -172,17 +175,15 @@ fn check(args: &SlurmArgs) -> anyhow::Result<(RenderArgs, bool)> {
     if is_standard_input(&render.scene.scene) {
         return Err(UsageError("the tasks of a farm read the scene each: it must be a file".to_owned()).into());
     }
-    let Loaded { scene, settings, .. } = load_scene(&render.scene, &FileCache::default(), None)?;
-    let is_measured = follows_from_times(&settings, &scene.film.bounds);
-    let needs_plan = is_measured && render.scene.plan.is_none();
+    let Loaded { settings, .. } = load_scene(&render.scene, &FileCache::default(), None, None)?;
+    // Trials pay where many machines render
+    let is_auto = settings.integrator.estimator == EstimatorKind::Auto;
+    let needs_plan = is_auto && render.scene.plan.is_none();
     parts::check_division(&render, &settings)?;
-    if !needs_plan {
-        parts::check_settings(&render, &settings, &scene.film.bounds)?;
-    }
     // With other estimators and allocations, what a pilot finds decides how many samples there are
     let is_uniform = match settings.sampling.allocation {
         Allocation::Uniform => true,
-        Allocation::Auto => settings.integrator.estimator != EstimatorKind::Auto || !is_measured,
+        Allocation::Auto => !is_auto,
         Allocation::Adaptive => false,
     };
     let (spp, count) = (settings.sampling.spp, args.count());
@@ -214,6 +215,7 @@ fn part_options(args: &SlurmArgs, plan: Option<String>) -> Vec<String> {
     });
     words.extend(names);
     words.extend(args.fps.map(|fps| format!("--fps={fps}")));
+    words.extend(args.seed_per_frame.map(|is_on| format!("--seed-per-frame={}", if is_on { "on" } else { "off" })));
     words.push(format!("--part-by={}", <&str>::from(args.part_by)));
     words
 }

@@ -1,9 +1,30 @@
 //! Numbers of frames, and file names that hold one.
 
+use super::plan_file::PlanFile;
+use lumiris_numbers::math::hash::pcg4d;
 use std::path::{Path, PathBuf};
 
 /// Maximum number of frames of one run.
 const MAX_FRAMES: u32 = 1_000_000;
+
+/// Combined with a seed and the number of a frame to give the seed of the frame.
+const FRAME_SEED: u32 = 0x66_72_61_6d;
+
+/// What a frame has of its sequence.
+#[derive(Clone, Debug)]
+pub(super) struct FrameOf {
+    /// Its number, if its seed follows from that.
+    pub seed_by: Option<u32>,
+    /// What was chosen for the first frame, and so for all.
+    pub plan: Option<PlanFile>,
+}
+
+impl FrameOf {
+    /// The seed of the frame, by that of the sequence.
+    pub(super) fn seed(&self, seed: u32) -> u32 {
+        self.seed_by.map_or(seed, |number| pcg4d([seed, number, FRAME_SEED, 0])[0])
+    }
+}
 
 /// Numbers of frames in the order in which they are rendered, each once.
 #[derive(Clone, Debug, PartialEq, Eq)]

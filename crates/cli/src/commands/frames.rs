@@ -1,20 +1,23 @@
 //! `lumiris render --frames`: the frames of an animation, one after the other.
 //!
-//! What frames share is read once (see [`FileCache`]). A frame that fails does not stop the others; a table at the end
+//! What is chosen for the first frame is the choice for all, so that they do not flicker. What frames share is read once (see [`FileCache`]). A frame that fails does not stop the others; a table at the end
 //! says what became of each.
 
 use super::UsageError;
 use super::args::RenderArgs;
-use super::frame_list::{FrameList, has_number, numbered};
+use super::frame_list::{FrameList, FrameOf, has_number, numbered};
+use super::interrupt::is_stopped;
 use super::interrupt::{self, INTERRUPTED};
 use super::pictures::are_complete;
+use super::plan_file::PlanFile;
 use super::progress;
-use super::render::{Rendered, Session, check, is_stop, is_stopped, render_one, write_stats};
+use super::render::{Rendered, Session, check, is_stop, render_one, write_stats};
 use lumiris::import::cache::{FileCache, FileCounts};
 use lumiris::import::is_gltf;
 use serde_json::json;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
+use std::time::Instant;
 
 /// What became of a frame.
 enum Outcome {
@@ -39,7 +42,7 @@ pub(super) fn run(args: &RenderArgs, list: &FrameList) -> anyhow::Result<ExitCod
     check(args)?;
     let _orderly = interrupt::orderly();
     let session = Session::start(args, FileCache::keeping())?;
-    let mut frames = Vec::with_capacity(list.0.len());
+    let (mut frames, mut plan) = (Vec::with_capacity(list.0.len()), None);
     for (index, &number) in list.0.iter().enumerate() {
         let outcome = if is_stopped() {
             Outcome::NotRendered
@@ -47,7 +50,12 @@ pub(super) fn run(args: &RenderArgs, list: &FrameList) -> anyhow::Result<ExitCod
             if !args.quiet {
                 progress::say(&format!("frame {number} ({} of {})", index + 1, list.0.len()));
             }
-            render_frame(&of_frame(args, number), &session)
+            let mut args = of_frame(args, number);
+            let frame = args.scene.frame.as_mut();
+            frame.into_iter().for_each(|frame| frame.plan.clone_from(&plan));
+            let outcome = render_frame(&args, &session);
+            plan = plan.or_else(|| plan_of(&outcome, &args));
+            outcome
         };
         let files = session.files.end_scene();
         frames.push(Frame { number, outcome, files });
@@ -105,15 +113,26 @@ fn of_frame(args: &RenderArgs, frame: u32) -> RenderArgs {
     let checkpoint = args.parts.checkpoint.as_mut().map(|(path, _)| path);
     let names = [&mut args.scene.scene].into_iter().chain(&mut args.output);
     names.chain(checkpoint).chain(&mut args.parts.resume).for_each(|path| *path = numbered(path, frame));
+    args.scene.frame = Some(FrameOf { seed_by: Some(frame).filter(|_| args.seed_per_frame), plan: None });
     (args.frames, args.stats) = (None, None);
     args
+}
+
+/// What was chosen for a frame, where its settings left something open.
+fn plan_of(outcome: &Outcome, args: &RenderArgs) -> Option<PlanFile> {
+    let plan = match outcome {
+        Outcome::Done(rendered) | Outcome::Failed(_, Some(rendered)) => Some(rendered.plan.clone()),
+        Outcome::Skipped => args.output.iter().find_map(|path| PlanFile::of_image(path)),
+        Outcome::Failed(_, None) | Outcome::NotRendered => None,
+    };
+    plan.filter(|plan| !plan.settings.is_empty())
 }
 
 fn render_frame(args: &RenderArgs, session: &Session) -> Outcome {
     if args.skip_existing && are_complete(&args.output) {
         return Outcome::Skipped;
     }
-    match render_one(args, session) {
+    match render_one(args, session, Instant::now()) {
         Ok(rendered) if rendered.misplaced.is_empty() => Outcome::Done(rendered),
         Ok(rendered) => Outcome::Failed(rendered.misplaced.join("; "), Some(rendered)),
         Err(error) if is_stop(&error) => Outcome::NotRendered,

@@ -91,6 +91,12 @@ fn abandon() {
 
 /// Ends the program here and now, while other threads work on what their destructors must not take from them.
 fn end(_: &MutexGuard<'_, Activity>) -> ! {
+    progress::clear();
     remove_temporary();
     exit(INTERRUPTED.into())
+}
+
+/// True once Ctrl-C was pressed.
+pub(super) fn is_stopped() -> bool {
+    stop().load(Ordering::Relaxed)
 }

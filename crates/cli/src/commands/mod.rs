@@ -34,17 +34,20 @@ mod plan;
 mod plan_file;
 mod progress;
 mod render;
+mod report;
 mod reproduce;
 mod rescue;
 mod settings;
 mod settings_args;
 mod shell;
+mod trials;
 mod typed_options;
 mod watch_args;
 
 use clap::{CommandFactory, Parser, Subcommand};
 use std::io::{self, Write};
 use std::process::ExitCode;
+use std::time::Instant;
 
 /// Offline CPU renderer for lighting integrals that are hard to sample.
 #[derive(Debug, Parser)]
@@ -57,6 +60,7 @@ struct Cli {
 #[derive(Debug, Subcommand)]
 enum Command {
     /// Render a scene
+    #[command(mut_args(args::in_short_help))]
     Render(Box<args::RenderArgs>),
     /// Measure what the settings of a scene leave open, and store the choices for render --plan
     Plan(plan::PlanArgs),
@@ -92,6 +96,7 @@ struct UsageError(String);
 
 /// Parses the command line, runs the command, and returns the exit code.
 pub(crate) fn run() -> ExitCode {
+    let start = Instant::now();
     let cli = match Cli::try_parse() {
         Ok(cli) => cli,
         Err(error) => return code_of(answer(&error)),
@@ -99,7 +104,7 @@ pub(crate) fn run() -> ExitCode {
     let result = interrupt::watch().and_then(|()| match &cli.command {
         Command::Render(args) => match &args.frames {
             Some(list) => frames::run(args, list),
-            None => render::run(args),
+            None => render::run(args, start),
         },
         Command::Plan(args) => plan::run(args),
         Command::Merge(args) => merge::run(args),

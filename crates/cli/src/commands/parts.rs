@@ -5,7 +5,6 @@ use super::args::RenderArgs;
 use super::part_args::{PartArgs, is_part};
 use super::plan_file::PlanFile;
 use super::progress;
-use lumiris::film::PixelBounds;
 use lumiris::import::fingerprint::SceneFiles;
 use lumiris::render::RenderSettings;
 use lumiris::render::parts::{Asked, Checkpoints, Extent, ExtentError, FilmFile, Storage, Stored};
@@ -52,9 +51,9 @@ pub(super) fn check_division(args: &RenderArgs, settings: &Settings) -> Result<(
     Ok(extent(&args.parts).check_division(settings)?)
 }
 
-/// Rejects settings by which an image cannot be rendered in parts. Before a plan is made.
-pub(super) fn check_settings(args: &RenderArgs, settings: &Settings, bounds: &PixelBounds) -> Result<(), UsageError> {
-    Ok(extent(&args.parts).check_settings(settings, bounds, &args.scene.scene.display().to_string())?)
+/// The same if it is to be divided.
+pub(super) fn check_settings(args: &RenderArgs, settings: &Settings) -> Result<(), UsageError> {
+    Ok(extent(&args.parts).check_settings(settings)?)
 }
 
 /// What a rendering goes on from, if it does.

@@ -6,7 +6,7 @@ use super::denoise_args::{self, DENOISED, Denoised};
 use super::exr::{ExrArgs, ExrImage, ExrLayer};
 use super::look::{Displayed, LookArgs};
 use super::part_args::{extension, is_part};
-use super::plan_file::PlanFile;
+use super::plan_file::{PLAN_KEY, PlanFile};
 use super::progress;
 use super::rescue::write_or_rescue;
 use lumiris::film::Film;
@@ -276,7 +276,7 @@ impl Made<'_> {
         add("lumiris:scene", args.scene.scene.display().to_string());
         add("lumiris:accel", <&str>::from(args.scene.accel).to_owned());
         if !self.plan.settings.is_empty() {
-            add("lumiris:plan", self.plan.text()?);
+            add(PLAN_KEY, self.plan.text()?);
         }
         if self.is_interrupted {
             add(INTERRUPTED_KEY, "true".to_owned());

@@ -1,18 +1,25 @@
 //! Plans as files: the choices that followed from measurements.
 
-use anyhow::Context;
-use lumiris::render::plan::Plan;
+use super::progress;
+use anyhow::{Context, bail};
+use lumiris::imaging::oiio::read_metadata;
+use lumiris::planning::Plan;
 use lumiris::scene::RenderJob;
+use lumiris::settings::Settings;
+use lumiris::settings::table::{Removed, rows};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::collections::BTreeMap;
 use std::fs::read_to_string;
 use std::path::Path;
 
+/// Metadata of an image that hold its plan.
+pub(super) const PLAN_KEY: &str = "lumiris:plan";
+
 /// Columns, rows and samples per pixel.
 fn image_of(job: &RenderJob) -> [u32; 3] {
     let bounds = job.world.scene.film.bounds;
-    [bounds.width(), bounds.height(), job.settings().sampling.spp]
+    [bounds.width(), bounds.height(), job.settings().sampling.pilot_spp()]
 }
 
 /// A plan as it is stored.
@@ -27,9 +34,9 @@ pub(super) struct PlanFile {
     image: Option<[u32; 3]>,
     /// The settings that were chosen, by their names in metadata.
     pub(super) settings: BTreeMap<String, String>,
-    /// What the choice of the estimator follows from; `null` without `--estimator auto`.
+    /// What trials found; `null` without them.
     #[serde(default)]
-    pub(super) auto: Value,
+    pub(super) tuning: Value,
 }
 
 impl PlanFile {
@@ -38,13 +45,34 @@ impl PlanFile {
         serde_json::from_str(&text).with_context(|| format!("{} is no plan", path.display()))
     }
 
+    /// The plan of an image, as its metadata have it.
+    pub(super) fn of_image(path: &Path) -> Option<Self> {
+        serde_json::from_str(read_metadata(path).ok()?.get(PLAN_KEY)?).ok()
+    }
+
+    /// Applies its choices. Messages call it `name`.
+    pub(super) fn apply(&self, name: &str, settings: &mut Settings) -> anyhow::Result<()> {
+        for (key, value) in &self.settings {
+            if let Some(removed) = Removed::of_key(key) {
+                progress::say(&format!("warning: {name}: {}", removed.note(key)));
+                continue;
+            }
+            let row = rows().find(|row| row.key == key);
+            let row = row.with_context(|| format!("{name}: there is no setting `{key}`"))?;
+            if let Err(expected) = row.set_text(settings, value) {
+                bail!("{name}: `{key}`: {expected}, but found `{value}`");
+            }
+        }
+        Ok(())
+    }
+
     pub(super) fn new(scene: &Path, job: &RenderJob, plan: &Plan) -> anyhow::Result<Self> {
         Ok(PlanFile {
             version: env!("CARGO_PKG_VERSION").to_owned(),
             scene: scene.display().to_string(),
             image: Some(image_of(job)),
             settings: plan.chosen.iter().map(|(key, value)| ((*key).to_owned(), value.clone())).collect(),
-            auto: serde_json::to_value(&plan.auto)?,
+            tuning: serde_json::to_value(&plan.tuning)?,
         })
     }
 

@@ -7,11 +7,16 @@ use lumiris::film::noise::Noise;
 use lumiris::render::Progress;
 use std::collections::BTreeSet;
 use std::io::{self, Write};
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
 
 /// Prints a line to standard error; that nobody reads it is no reason to lose a rendering.
 pub(super) fn say(text: &str) {
-    let _ = writeln!(std::io::stderr().lock(), "{text}");
+    let print = || drop(writeln!(std::io::stderr().lock(), "{text}"));
+    match &*line() {
+        Some(line) => line.bar.suspend(print),
+        None => print(),
+    }
 }
 
 /// Prints a line to standard error, unless it has been printed before, as for another frame.
@@ -52,30 +57,162 @@ pub(super) fn noise(noise: &Noise) -> String {
     format!("noise {}{share}", percent(median))
 }
 
-/// A progress bar of a rendering: progress, time left, rays per second, noise.
-pub(super) struct Bar(ProgressBar);
+/// The line of what is under way; there is one at most.
+static LINE: Mutex<Option<Line>> = Mutex::new(None);
+
+fn line() -> MutexGuard<'static, Option<Line>> {
+    LINE.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// A line that tells what is under way, how much of it is done, and how long the rest takes.
+struct Line {
+    bar: ProgressBar,
+    /// What is under way, and since when.
+    stage: (String, Instant),
+    clock: Clock,
+}
+
+/// When the work began, and what time it may take.
+#[derive(Clone, Copy)]
+pub(super) struct Clock {
+    /// The beginning.
+    pub start: Instant,
+    /// The time, if there is a limit.
+    pub limit: Option<Duration>,
+}
+
+impl Clock {
+    /// What is left of the time.
+    pub(super) fn left(&self) -> Option<Duration> {
+        Some(self.limit?.saturating_sub(self.start.elapsed()))
+    }
+}
+
+impl Line {
+    /// Begins a stage unless it is under way.
+    fn begin(&mut self, name: &str) {
+        if self.stage.0 != name {
+            self.stage = (name.to_owned(), Instant::now());
+            self.bar.reset_elapsed();
+            self.bar.set_message(String::new());
+            self.set_style("{spinner} {prefix}  {elapsed}");
+            self.bar.set_prefix(name.to_owned());
+            self.bar.tick();
+        }
+    }
+
+    fn set_style(&self, template: &str) {
+        self.bar.set_style(ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar()));
+    }
+
+    /// Shows how much of the stage is done.
+    fn show(&mut self, done: f64, text: &str) {
+        let elapsed = self.stage.1.elapsed();
+        if self.bar.message().is_empty() {
+            self.set_style("{bar:30} {percent:>3} %  {prefix}{msg}");
+            self.bar.set_length(BAR_LENGTH);
+        }
+        let left = left(elapsed, done).into_iter().chain(self.clock.left()).min();
+        let left = left.map_or(String::new(), |left| format!("  {} left", span(left)));
+        self.bar.set_position((done * BAR_LENGTH as f64) as u64);
+        self.bar.set_message(format!("  {}{left}{text}", span(elapsed)));
+    }
+}
+
+/// Positions of a bar.
+const BAR_LENGTH: u64 = 1000;
+/// Time between two images of a line of which nothing else is known than that it goes on.
+const TICK: Duration = Duration::from_millis(125);
+/// Part of some work, and the time for it, from which on the time for the rest is known.
+const KNOWN: (f64, Duration) = (0.02, Duration::from_secs(2));
+
+/// Time for the rest of some work at the mean speed so far, if that is known.
+fn left(elapsed: Duration, done: f64) -> Option<Duration> {
+    let is_known = done > 0.0 && (done >= KNOWN.0 || elapsed >= KNOWN.1);
+    let rest = || Duration::try_from_secs_f64(elapsed.as_secs_f64() * (1.0 / done - 1.0).max(0.0)).ok();
+    is_known.then(rest).flatten()
+}
+
+/// A time as text: "12 s", "3 min" or "2 h 10 min".
+fn span(time: Duration) -> String {
+    let seconds = time.as_secs_f64().round() as u64;
+    let minutes = (seconds + 30) / 60;
+    match (seconds, minutes) {
+        (..100, _) => format!("{seconds} s"),
+        (_, ..100) => format!("{minutes} min"),
+        _ => format!("{} h {} min", minutes / 60, minutes % 60),
+    }
+}
+
+/// Begins a stage of the work, or tells how much of it is done. Nothing is seen of it unless there is a [`Bar`].
+pub(super) fn stage(name: &str, done: Option<f64>) {
+    if let Some(line) = &mut *line() {
+        line.begin(name);
+        if let Some(done) = done {
+            line.show(done, "");
+        }
+    }
+}
+
+/// Takes the line away, as before the program ends.
+pub(super) fn clear() {
+    if let Some(line) = &*line() {
+        line.bar.finish_and_clear();
+    }
+}
+
+/// The line is there while this is.
+pub(super) struct Bar(());
 
 impl Bar {
-    /// A bar, or nothing visible if `quiet`.
-    pub(super) fn new(quiet: bool) -> Self {
+    /// Shows the line, unless `quiet` or where nobody sees it.
+    pub(super) fn new(quiet: bool, clock: Clock) -> Self {
         let target = if quiet { ProgressDrawTarget::hidden() } else { ProgressDrawTarget::stderr_with_hz(8) };
-        let bar = ProgressBar::with_draw_target(Some(0), target);
-        let style = ProgressStyle::with_template("{bar:30} {percent:>3} %  {elapsed} + {eta} left  {msg}");
-        bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
-        Bar(bar)
+        let bar = ProgressBar::with_draw_target(None, target);
+        bar.enable_steady_tick(TICK);
+        *line() = Some(Line { bar, stage: (String::new(), clock.start), clock });
+        Bar(())
     }
 
-    /// Shows the progress of a rendering.
+    /// Shows the progress of a rendering: what is done of its samples, or of its time if that is more.
     pub(super) fn update(&self, progress: &Progress) {
-        self.0.set_length(progress.samples_total);
-        self.0.set_position(progress.samples_done);
+        let Some(line) = &mut *line() else { return };
+        line.begin("rendering");
+        let of_samples = progress.samples_done as f64 / progress.samples_total.max(1) as f64;
+        let of_time = line.clock.limit.map(|limit| line.clock.start.elapsed().as_secs_f64() / limit.as_secs_f64());
+        let done = of_samples.max(of_time.unwrap_or(0.0)).min(1.0);
         let rate = progress.rays as f64 / progress.elapsed.as_secs_f64().max(1e-9) * 1e-6;
         let noise = progress.noise.filter(|n| n.is_finite()).map(|n| format!("  noise {}", percent(n)));
-        self.0.set_message(format!("{rate:.2} Mrays/s{}", noise.unwrap_or_default()));
+        line.show(done, &format!("  {rate:.2} Mrays/s{}", noise.unwrap_or_default()));
+    }
+}
+
+impl Drop for Bar {
+    fn drop(&mut self) {
+        clear();
+        *line() = None;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn times_are_words_that_are_read_at_once() {
+        let texts =
+            [0.4, 12.3, 99.4, 100.0, 200.0, 5970.0, 7800.0, 200_000.0].map(|s| span(Duration::from_secs_f64(s)));
+        let expected = ["0 s", "12 s", "99 s", "2 min", "3 min", "1 h 40 min", "2 h 10 min", "55 h 33 min"];
+        assert_eq!(texts, expected);
     }
 
-    /// Removes the bar.
-    pub(super) fn finish(&self) {
-        self.0.finish_and_clear();
+    #[test]
+    fn the_time_that_is_left_follows_from_the_work_that_is_done() {
+        let seconds = Duration::from_secs_f64;
+        assert_eq!(left(seconds(0.5), 0.019), None, "too little is done to tell");
+        assert_eq!(left(seconds(5.0), 0.0), None);
+        assert_eq!(left(seconds(0.5), 0.02), Some(seconds(24.5)));
+        assert_eq!(left(seconds(2.0), 0.001), Some(seconds(1998.0)));
+        assert_eq!(left(seconds(9.0), 1.0), Some(seconds(0.0)));
     }
 }

@@ -9,31 +9,33 @@ use super::part_args::is_part;
 use super::parts;
 use super::pictures::{Made, Written, check_outputs, is_exr, is_output, write_pictures};
 use super::plan_file::PlanFile;
-use super::progress::{self, Bar};
+use super::progress::{self, Bar, Clock};
+use super::report::{Times, report};
 use super::rescue::write_or_rescue;
 use super::settings::{Setup, SetupTimes, load_job_of, plan, render_settings};
-use crate::watch::{self, Watch};
+use super::trials::expect_trials;
+use crate::watch::{self, Canvas, Watch};
 use anyhow::{Context, bail};
-use lumiris::film::{Film, Summary};
+use lumiris::film::Film;
 use lumiris::imaging::oidn::Denoiser;
 use lumiris::imaging::tiles::TileCounts;
 use lumiris::import::cache::FileCache;
 use lumiris::integrators::photon_map::MapStats;
 use lumiris::integrators::{LightPathStats, light_layers};
+use lumiris::planning::preparation::pilot_deadline;
+use lumiris::planning::{Preparation, has_pilot};
 use lumiris::render::cryptomatte::cryptomattes;
 use lumiris::render::memory::{Wanted, predict};
 use lumiris::render::output::{self, Aov};
-use lumiris::render::parts::FilmFile;
-use lumiris::render::plan::Preparation;
-use lumiris::render::processor_time;
+use lumiris::render::parts::{FilmFile, PLAN_NOTE};
 use lumiris::render::{CacheReport, Continuation, Progress, RenderError, RenderSettings, Rendering, TileShare, go_on};
 use lumiris::scene::RenderJob;
+use lumiris::settings::{IntegratorKind, IntegratorSettings};
 use lumiris_formats::output::{check_writable, write_text};
 use serde_json::json;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
-use std::sync::atomic::Ordering;
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 /// What the renderings of one run of the program have in common.
@@ -50,20 +52,23 @@ pub(super) struct Session {
 pub(super) struct Rendered {
     /// Statistics.
     pub stats: serde_json::Value,
-    /// Wall-clock time of the rendering, with that of pilots (s).
+    /// Wall-clock time of it all (s).
     pub seconds: f64,
     /// Mean relative standard error of the pixels.
     pub noise: f64,
+    /// What was chosen for it by measurements.
+    pub plan: PlanFile,
     /// True if every pixel has all its samples.
     pub complete: bool,
     /// Why files could not be written where they should be, and where they are instead.
     pub misplaced: Vec<String>,
 }
 
-pub(super) fn run(args: &RenderArgs) -> anyhow::Result<ExitCode> {
+/// `start` is when the program began.
+pub(super) fn run(args: &RenderArgs, start: Instant) -> anyhow::Result<ExitCode> {
     let _orderly = interrupt::orderly();
     let session = Session::start(args, FileCache::default())?;
-    let mut rendered = match render_one(args, &session) {
+    let mut rendered = match render_one(args, &session, start) {
         Err(error) if is_stop(&error) => {
             progress::say(&format!("{error}: nothing is written"));
             return Ok(ExitCode::from(INTERRUPTED));
@@ -76,7 +81,7 @@ pub(super) fn run(args: &RenderArgs) -> anyhow::Result<ExitCode> {
     if !rendered.misplaced.is_empty() {
         bail!(rendered.misplaced.join("\nlumiris: "));
     }
-    Ok(if is_stopped() { ExitCode::from(INTERRUPTED) } else { ExitCode::SUCCESS })
+    Ok(if interrupt::is_stopped() { ExitCode::from(INTERRUPTED) } else { ExitCode::SUCCESS })
 }
 
 /// True if a rendering was stopped before it had anything to write.
@@ -101,13 +106,8 @@ impl Session {
     }
 }
 
-/// True once Ctrl-C was pressed.
-pub(super) fn is_stopped() -> bool {
-    interrupt::stop().load(Ordering::Relaxed)
-}
-
-/// Renders a picture and writes it. What could not be written is no error here, but part of the result.
-pub(super) fn render_one(args: &RenderArgs, session: &Session) -> anyhow::Result<Rendered> {
+/// Renders a picture and writes it; its time began with `start`. What could not be written is no error here, but part of the result.
+pub(super) fn render_one(args: &RenderArgs, session: &Session, start: Instant) -> anyhow::Result<Rendered> {
     let preparing = interrupt::during(format!("preparing {}", args.scene.name()));
     check_outputs(&args.output)?;
     let stored = parts::stored(&args.parts)?;
@@ -115,23 +115,41 @@ pub(super) fn render_one(args: &RenderArgs, session: &Session) -> anyhow::Result
     stored.as_ref().map_or(Ok(()), |stored| parts::complete(&mut args, stored))?;
     let args = &args;
     let asked = check(args)?;
-    let before = processor_time::of_process();
-    let (mut job, Setup { times: setup, files, given }) = load_job_of(&args.scene, &session.files, stored.as_ref())?;
-    let loading = processor_time::of_process().saturating_sub(before);
-    parts::check_settings(args, job.settings(), &job.world.scene.film.bounds)?;
+    let clock = Clock { start, limit: args.time.map(Duration::from_secs_f64) };
+    let bar = Bar::new(args.quiet, clock);
+    let (mut job, Setup { times: setup, files, given }) =
+        load_job_of(&args.scene, &session.files, stored.as_ref(), clock.limit)?;
+    parts::check_settings(args, job.settings())?;
     check_memory(args, &job, asked.as_deref())?;
-    let asks_for_ratio = asked.as_ref().is_some_and(|list| list.contains(&Aov::Ratio));
     if args.denoise.denoise && job.settings().integrator.path_reuse.is_none() {
         // A denoiser takes noise that is correlated between pixels for detail
         job.change(|s| s.integrator.path_reuse = Some(1));
     }
-    let start = Instant::now();
-    // What goes on, or is planned, has its pilots, whatever the time
-    let is_open = stored.is_none() && args.scene.plan.is_none();
-    let time_limit = args.time.filter(|_| is_open).map(Duration::from_secs_f64);
-    let how = Preparation { threads: None, ratio_map: asks_for_ratio, time_limit, loading, stop: interrupt::stop() };
-    let plan = plan(&args.scene, (&mut job, &given), &how, args.quiet)?;
-    let preparation = start.elapsed();
+    let settings = settings_of(args, &job, asked.as_deref());
+    let canvas = session.watch.begin(&name_of(args), &job.world.scene.film, settings.with_features);
+    if let (Some(canvas), true) = (&canvas, has_pilot(job.settings())) {
+        watch::preview(canvas, (&job, &settings), interrupt::stop())?;
+    }
+    let begin = Instant::now();
+    // What goes on has the pilots of what is stored
+    let limit = clock.limit.filter(|_| stored.is_none());
+    let deadline = limit.and_then(|limit| pilot_deadline(start, limit));
+    let ratio_map = asked.as_ref().is_some_and(|list| list.contains(&Aov::Ratio));
+    let expect = |time| expect_trials(time, args.quiet);
+    let is_planned = args.scene.frame.as_ref().is_some_and(|frame| frame.plan.is_some());
+    let tunes = args.tune && stored.is_none() && !is_planned;
+    let how =
+        Preparation { ratio_map, tunes, deadline, expect: &expect, stop: interrupt::stop(), ..Preparation::default() };
+    let mut plan = plan(&args.scene, (&mut job, &given), &how, args.quiet)?;
+    if plan.settings.is_empty() {
+        // What goes on from a checkpoint has the choices of its beginning
+        let text = stored.as_ref().and_then(|stored| stored.header.note(PLAN_NOTE));
+        plan = text.and_then(|text| serde_json::from_str(text).ok()).unwrap_or(plan);
+    }
+    if let Some(canvas) = &canvas {
+        let _ = canvas.summary.set(job.settings().summary());
+    }
+    let setup = SetupTimes { prepare: begin.elapsed().as_secs_f64(), ..setup };
     let outputs = outputs(args, &job);
     if args.output.is_empty() {
         check_outputs(&outputs)?;
@@ -140,25 +158,27 @@ pub(super) fn render_one(args: &RenderArgs, session: &Session) -> anyhow::Result
     args.output_options.check(&outputs);
     note_layers(args, &job, (&outputs, asked.as_deref()));
 
-    let bar = Bar::new(args.quiet);
     let mut settings = settings_of(args, &job, asked.as_deref());
-    settings.time_limit = settings.time_limit.map(|limit| limit.saturating_sub(preparation));
     let mut film_file = parts::film_file(args, (&job, &plan, &files), &mut settings, stored)?;
+    settings.time_limit = clock.left();
     let continuation = film_file.as_mut().map_or_else(Continuation::default, FilmFile::continuation);
-    let rendering = render_shown((&job, &settings), session, (&name_of(args), &bar), continuation, preparing)?;
-    bar.finish();
-    if is_stopped() && rendering.film.summary().samples[1] == 0 {
+    let rendering = render_shown((&job, &settings), (canvas.as_ref(), &bar), continuation, preparing)?;
+    if interrupt::is_stopped() && rendering.film.summary().samples[1] == 0 {
         return Err(RenderError::Stopped.into());
     }
 
-    let written = write_results(args, (&job, &plan, &rendering), (session, &settings), (film_file.as_mut(), outputs))?;
-    report(args, &rendering, (preparation, &written.paths));
-    let mut stats = stats(args, &job, &rendering, SetupTimes { prepare: preparation.as_secs_f64(), ..setup });
+    let (written, denoising) =
+        write_results(args, (&job, &plan, &rendering), (session, &settings), (film_file.as_mut(), outputs))?;
+    drop(bar);
+    let times = Times { setup, denoising, all: start.elapsed() };
+    report(args, (&job, &rendering), (&times, &written.paths));
+    let mut stats = stats(args, &job, &rendering, setup);
     stats["checkpoints"] = parts::stats(film_file.as_ref());
     Ok(Rendered {
         stats,
-        seconds: (preparation + rendering.elapsed).as_secs_f64(),
+        seconds: times.all.as_secs_f64(),
         noise: rendering.film.summary().noise.median,
+        plan,
         complete: rendering.complete,
         misplaced: written.misplaced,
     })
@@ -195,22 +215,28 @@ fn check_memory(args: &RenderArgs, job: &RenderJob, asked: Option<&[Aov]>) -> an
     memory::check(args.memory_limit, &predict(job, &wanted))
 }
 
-/// Writes the images and parts of a rendering.
+/// Denoises a rendering and writes its images and parts. Returns the time that denoising took as well.
 fn write_results(
     args: &RenderArgs,
     (job, plan, rendering): (&RenderJob, &PlanFile, &Rendering),
     (session, settings): (&Session, &RenderSettings),
     (film_file, outputs): (Option<&mut FilmFile>, Vec<PathBuf>),
-) -> anyhow::Result<Written> {
+) -> anyhow::Result<(Written, Duration)> {
     // Only EXR files hold them
     let has_exr = outputs.iter().any(|path| is_exr(path));
     let kinds = if has_exr { &args.exr.cryptomatte[..] } else { &[] };
     let cryptomattes = cryptomattes(job, settings, &rendering.film, kinds)?;
+    let begin = Instant::now();
+    if session.denoiser.is_some() {
+        progress::stage("denoising", None);
+    }
     let denoised = session.denoiser.as_ref().map(|denoiser| denoise(denoiser, &rendering.film, true));
     let (denoised, not_denoised) = denoised.unwrap_or_default();
+    let denoising = begin.elapsed();
+    progress::stage("writing", None);
     let asked = asked_aovs(args)?;
     let asked = asked.as_deref();
-    let is_interrupted = is_stopped();
+    let is_interrupted = interrupt::is_stopped();
     let made = Made { args, job, plan, rendering, asked, cryptomattes, denoised, is_interrupted };
     let (part_files, images): (Vec<PathBuf>, Vec<PathBuf>) = outputs.into_iter().partition(|path| is_part(path));
     let mut written = write_pictures(&made, &images)?;
@@ -220,7 +246,7 @@ fn write_results(
         let write = |path: &Path| Ok(film_file.write(path, rendering)?);
         part_files.into_iter().for_each(|path| written.write(path, write));
     }
-    Ok(written)
+    Ok((written, denoising))
 }
 
 /// Refuses to denoise what is no whole image, and to show a denoised image without keeping the other.
@@ -235,24 +261,33 @@ fn check_denoise(args: &RenderArgs, outputs: &[PathBuf]) -> Result<(), UsageErro
 /// Renders, for those who watch as well. From the first sample on there is something to lose.
 fn render_shown(
     (job, settings): (&RenderJob, &RenderSettings),
-    session: &Session,
-    (name, bar): (&str, &Bar),
+    (canvas, bar): (Option<&Arc<Canvas>>, &Bar),
     continuation: Continuation<'_>,
     preparing: During,
 ) -> anyhow::Result<Rendering> {
+    progress::stage(before_samples(&job.settings().integrator), None);
     let preparing = Mutex::new(Some(preparing));
-    let canvas = session.watch.begin(name, &job.world.scene.film, settings.with_features);
     let observe = |progress: &Progress| {
         drop(preparing.lock().unwrap_or_else(PoisonError::into_inner).take());
         bar.update(progress);
-        watch::observe(canvas.as_ref(), progress);
+        watch::observe(canvas, progress);
     };
-    let Some(shown) = &canvas else { return Ok(go_on(job, settings, interrupt::stop(), &observe, continuation)?) };
+    let Some(shown) = canvas else { return Ok(go_on(job, settings, interrupt::stop(), &observe, continuation)?) };
     let set_tile = |tile: &Film| shown.set_tile(tile);
     let watched = Continuation { watch: Some(&set_tile), ..continuation };
     let rendering = go_on(job, settings, interrupt::stop(), &observe, watched)?;
     shown.finish(&rendering.film);
     Ok(rendering)
+}
+
+/// What a rendering does before its first sample.
+fn before_samples(settings: &IntegratorSettings) -> &'static str {
+    match settings.kind {
+        IntegratorKind::PhotonMap => "tracing photons",
+        IntegratorKind::IrradianceCache => "filling the irradiance cache",
+        _ if settings.light_paths.is_some_and(|paths| paths > 0.0) => "tracing light paths",
+        _ => "beginning",
+    }
 }
 
 /// What an image is called by those who watch: the name of its scene, without folders.
@@ -392,51 +427,4 @@ fn cache_stats(c: &CacheReport) -> serde_json::Value {
         "lookups": c.lookups.lookups,
         "misses": c.lookups.misses,
     })
-}
-
-fn report(args: &RenderArgs, rendering: &Rendering, (preparation, outputs): (Duration, &[PathBuf])) {
-    if args.quiet {
-        return;
-    }
-    let names: Vec<String> = outputs.iter().map(|p| p.display().to_string()).collect();
-    let names = if names.is_empty() { "rendered".to_owned() } else { names.join(", ") };
-    let summary = rendering.film.summary();
-    let is_of_tiles = args.parts.part.is_some() && args.parts.is_by_tiles();
-    let of = if is_of_tiles { Summary::samples_text_of_sampled } else { Summary::samples_text };
-    let samples = of(summary, if summary.samples[1] == 1 { "sample per pixel" } else { "samples per pixel" });
-    let partial = if rendering.complete { "" } else { " (stopped early)" };
-    let pilots = if preparation.as_secs_f64() < 0.05 {
-        String::new()
-    } else {
-        format!(" ({:.1} s of it for pilots)", preparation.as_secs_f64())
-    };
-    progress::say(&format!(
-        "{names} after {:.1} s{pilots}, {samples}{partial}, {}",
-        (preparation + rendering.elapsed).as_secs_f64(),
-        progress::noise(&summary.noise)
-    ));
-    if let Some(c) = &rendering.cache {
-        progress::say(&format!(
-            "irradiance cache: {} records in {:.1} s, {:.2} % cache misses in {} lookups",
-            c.records,
-            c.build.elapsed.as_secs_f64(),
-            100.0 * c.lookups.misses as f64 / c.lookups.lookups.max(1) as f64,
-            c.lookups.lookups
-        ));
-    }
-    if let Some(p) = &rendering.photons {
-        progress::say(&format!(
-            "photon maps: {} global and {} caustic photons from {} photon paths in {:.1} s, {:.1} MB{}",
-            p.global,
-            p.caustic,
-            p.paths,
-            (p.tracing + p.sorting).as_secs_f64(),
-            p.bytes as f64 * 1e-6,
-            if p.maps > 1 { format!(", {} maps", p.maps) } else { String::new() }
-        ));
-    }
-    let invalid = summary.invalid;
-    if invalid > 0 {
-        progress::say(&format!("warning: {invalid} samples were not finite, or too bright, and were counted as black"));
-    }
 }

@@ -7,23 +7,24 @@ use super::memory::MemoryLimit;
 use super::pictures::is_picture;
 use super::plan_file::PlanFile;
 use super::progress;
+use super::trials::outcome;
 use anyhow::{Context, bail};
 use lumiris::film::filter::PixelFilter;
 use lumiris::import::cache::FileCache;
 use lumiris::import::fingerprint::SceneFiles;
 use lumiris::import::{Loaded, is_gltf, load_text, load_with};
+use lumiris::planning::allocation::complete_for_noise;
+use lumiris::planning::preparation::complete_for_time;
+use lumiris::planning::{Preparation, prepare};
 use lumiris::render::RenderSettings;
-use lumiris::render::allocation::complete_for_noise;
 use lumiris::render::parts::Stored;
-use lumiris::render::plan::{Preparation, prepare};
 use lumiris::scene::RenderJob;
-use lumiris::settings::table::rows;
-use lumiris::settings::{Given, Proposals, SampleCounts, Settings, StageTimes};
+use lumiris::settings::Given;
 use lumiris_formats::source::read_bytes;
 use std::io;
 use std::path::Path;
 use std::sync::OnceLock;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 /// Times before the first ray is traced (s).
 #[derive(Clone, Copy, Debug)]
@@ -37,10 +38,16 @@ pub(super) struct SetupTimes {
 }
 
 /// Loads the scene, but what `files` has of its files, and applies the options, after the settings of what is stored; prints
-/// warnings.
-pub(super) fn load_scene(args: &SceneArgs, files: &FileCache, stored: Option<&Stored>) -> anyhow::Result<Loaded> {
+/// warnings. `time` is that which the image may take.
+pub(super) fn load_scene(
+    args: &SceneArgs,
+    files: &FileCache,
+    stored: Option<&Stored>,
+    time: Option<Duration>,
+) -> anyhow::Result<Loaded> {
     check_scene(args)?;
     let _loading = interrupt::during(format!("loading {}", args.name()));
+    progress::stage(&format!("reading {}", args.name()), None);
     if let Some(MemoryLimit::Bytes(bytes)) = args.texture_memory {
         files.limit_textures(bytes);
     }
@@ -67,15 +74,27 @@ pub(super) fn load_scene(args: &SceneArgs, files: &FileCache, stored: Option<&St
         stored.apply(&mut loaded.settings)?;
     }
     if let Some(path) = &args.plan {
-        apply_plan(path, &mut loaded.settings)?;
+        PlanFile::read(path)?.apply(&path.display().to_string(), &mut loaded.settings)?;
     }
     args.settings.apply(&mut loaded.settings);
     loaded.given.extend(args.settings.given());
     let has_spp = args.settings.has("spp");
+    if let Some(time) = time.filter(|_| stored.is_none()) {
+        complete_for_time(&mut loaded.settings, has_spp, time, loaded.scene.film.bounds.area());
+    }
     complete_for_noise(&mut loaded.settings, has_spp).map_err(|needs| UsageError(format!("--noise {needs}")))?;
     // More samples belong to what the first ones were prepared for
     if let Some(stored) = stored {
         loaded.settings.sampling.spp = stored.spp()?;
+    }
+    // What is stored is of a frame already
+    if let Some(frame) = &args.frame {
+        if stored.is_none() {
+            frame.plan.iter().try_for_each(|plan| plan.apply("the plan of the first frame", &mut loaded.settings))?;
+        }
+        if stored.is_none() || args.settings.has("seed") {
+            loaded.settings.sampling.seed = frame.seed(loaded.settings.sampling.seed);
+        }
     }
     if args.box_filter {
         loaded.scene.film.filter = PixelFilter::Box { rx: 0.5, ry: 0.5 };
@@ -143,39 +162,28 @@ pub(super) struct Setup {
 
 /// Loads the scene and builds its ray tracers.
 pub(super) fn load_job(args: &SceneArgs) -> anyhow::Result<(RenderJob, Setup)> {
-    load_job_of(args, &FileCache::default(), None)
+    load_job_of(args, &FileCache::default(), None, None)
 }
 
-/// The same with the settings of what is stored, and without reading what `files` has.
+/// The same with the settings of what is stored, for the time that the image may take, and without reading what `files` has.
 pub(super) fn load_job_of(
     args: &SceneArgs,
     files: &FileCache,
     stored: Option<&Stored>,
+    time: Option<Duration>,
 ) -> anyhow::Result<(RenderJob, Setup)> {
     let start = Instant::now();
-    let mut loaded = load_scene(args, files, stored)?;
+    let mut loaded = load_scene(args, files, stored, time)?;
     let (files, given) = (std::mem::take(&mut loaded.files), std::mem::take(&mut loaded.given));
     let load = start.elapsed().as_secs_f64();
     let start = Instant::now();
     let _building = interrupt::during(format!("building the ray tracers of {}", args.name()));
+    progress::stage("building the ray tracers", None);
     let job = loaded
         .job(args.accel, args.packet_width)
         .with_context(|| format!("cannot build the ray tracer of {}", args.scene.display()))?;
     let times = SetupTimes { load, build: start.elapsed().as_secs_f64(), prepare: 0.0 };
     Ok((job, Setup { times, files, given }))
-}
-
-/// Applies the choices of a plan file, which options may override.
-fn apply_plan(path: &Path, settings: &mut Settings) -> anyhow::Result<()> {
-    let file = PlanFile::read(path)?;
-    for (key, value) in &file.settings {
-        let row = rows().find(|row| row.key == key);
-        let row = row.with_context(|| format!("{}: there is no setting `{key}`", path.display()))?;
-        if let Err(expected) = row.set_text(settings, value) {
-            bail!("{}: `{key}`: {expected}, but found `{value}`", path.display());
-        }
-    }
-    Ok(())
 }
 
 /// Chooses what the settings leave open, and prints it unless `quiet`; on the threads of the options. Of the settings that were
@@ -188,25 +196,11 @@ pub(super) fn plan(
 ) -> anyhow::Result<PlanFile> {
     let _preparing = interrupt::during(format!("measuring what the settings of {} leave open", args.name()));
     let asked = *job.settings();
-    let plan = prepare(job, &Preparation { threads: args.threads.map(|t| t as usize), ..*how })?;
-    if let (Some(auto), false) = (&plan.auto, quiet) {
-        progress::say(&format!("auto: {}", auto.chosen));
-    }
-    if let (Some(ris), false) = (plan.ris, quiet) {
-        let SampleCounts { samples, proposals } = ris.sample_counts;
-        let StageTimes { t1, t2 } = ris.times;
-        let is_optimal = job.settings().integrator.ris.proposals == Proposals::Optimal;
-        let by_pixel = if is_optimal { ", chosen anew in each pixel" } else { "" };
-        progress::say(&format!(
-            "ris: {samples} of {proposals} proposals are traced{by_pixel} (a proposal takes {t1} ns, a sample {t2} ns)"
-        ));
-    }
-    if let (Some(of_pixels), false) = (&job.pixel_samples, quiet) {
-        let range = of_pixels.counts.iter().min().zip(of_pixels.counts.iter().max());
-        let (min, max) = range.unwrap_or((&0, &0));
-        let looks = of_pixels.looks.iter().max().filter(|looks| **looks > 1);
-        let looks = looks.map_or(String::new(), |n| format!(", and up to {n} camera rays each where lights are seen"));
-        progress::say(&format!("adaptive: {min} to {max} samples per pixel{looks}"));
+    let how = Preparation { threads: args.threads.map(|t| t as usize), observe: &progress::stage, ..*how };
+    let plan = prepare(job, &how)?;
+    if !quiet {
+        plan.tuning.iter().for_each(|tuning| progress::say(&outcome(tuning)));
+        progress::say_once(&job.settings().summary());
     }
     plan.warnings.iter().for_each(|warning| progress::say(&format!("warning: {warning}")));
     for line in given.without_effect(&asked, job.settings()) {
@@ -220,7 +214,9 @@ pub(super) fn plan(
             path.display()
         ));
     }
-    PlanFile::new(&args.scene, job, &plan)
+    let made = PlanFile::new(&args.scene, job, &plan)?;
+    let of_sequence = args.frame.as_ref().and_then(|frame| frame.plan.clone());
+    Ok(of_sequence.filter(|_| made.settings.is_empty()).unwrap_or(made))
 }
 
 /// Render settings from the options.

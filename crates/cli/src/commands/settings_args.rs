@@ -2,7 +2,7 @@
 
 use clap::builder::{PossibleValuesParser, TypedValueParser, ValueParser};
 use clap::{Arg, ArgMatches, Args, Command, FromArgMatches};
-use lumiris::settings::table::{GROUPS, Setting, rows};
+use lumiris::settings::table::{GROUPS, Group, RESEARCH, Setting, rows};
 use lumiris::settings::value::{Integers, Kind, Value};
 use lumiris::settings::{Given, Settings};
 
@@ -48,8 +48,10 @@ impl SettingsArgs {
 
 impl Args for SettingsArgs {
     fn augment_args(command: Command) -> Command {
-        let options =
-            GROUPS.iter().flat_map(|group| group.rows.iter().map(|row| option(row).help_heading(group.title)));
+        let options = GROUPS.iter().flat_map(|group| {
+            let rows = group.rows.iter().filter(|row| row.is_option);
+            rows.map(|row| option(row, group.title == RESEARCH).help_heading(heading(group)))
+        });
         command.args(options)
     }
 
@@ -67,15 +69,25 @@ impl FromArgMatches for SettingsArgs {
 
     fn update_from_arg_matches(&mut self, matches: &ArgMatches) -> Result<(), clap::Error> {
         let typed = |row: &'static Setting| Some((row, *matches.get_one::<Value>(row.flag)?));
-        self.typed.extend(rows().filter_map(typed));
+        self.typed.extend(rows().filter(|row| row.is_option).filter_map(typed));
         Ok(())
     }
 }
 
-/// The option of a setting.
-fn option(row: &'static Setting) -> Arg {
+/// The heading of the first group, which says what holds for all of them.
+const FIRST_HEADING: &str =
+    "Light transport (the default of this and of all settings below is the file's, or the one that is stated)";
+
+/// The heading of a group.
+fn heading(group: &Group) -> &'static str {
+    let is_first = GROUPS.first().is_some_and(|first| first.title == group.title);
+    if is_first { FIRST_HEADING } else { group.title }
+}
+
+/// The option of a setting. That of research says whom it serves.
+fn option(row: &'static Setting, is_research: bool) -> Arg {
     let option = Arg::new(row.flag).long(row.flag).aliases(row.aliases).value_name(row.value_name);
-    let option = option.help(help(row)).value_parser(parser(row.kind));
+    let option = option.help(help(row, is_research)).value_parser(parser(row.kind));
     match row.bare {
         Some(value) => option.num_args(0..=1).default_missing_value(value),
         None => option,
@@ -83,23 +95,33 @@ fn option(row: &'static Setting) -> Arg {
 }
 
 /// The help of an option, with its range and its default.
-fn help(row: &Setting) -> String {
+fn help(row: &Setting, is_research: bool) -> String {
     let range = match row.kind {
         Kind::Integer { range: Integers::ALL, .. } => String::new(),
         Kind::Integer { range, .. } => format!("{range}; "),
         Kind::Real { range, .. } => format!("{range}; "),
         // These are listed, or part of the sentence
-        Kind::Choice { .. } | Kind::Pair { .. } | Kind::Graded { .. } | Kind::Bytes => String::new(),
+        Kind::Choice { .. } | Kind::Percentage { .. } | Kind::Pair { .. } | Kind::Graded { .. } | Kind::Bytes => {
+            String::new()
+        }
     };
-    format!("{} [{range}default: the file's, or {}]", row.help, row.default_text())
+    let condition = row.applies.condition();
+    let whom = condition
+        .strip_prefix("it is for ")
+        .filter(|_| is_research)
+        .map_or(String::new(), |whom| format!("for {whom}; "));
+    format!("{} [{whom}{range}default: {}]", row.help, row.default_text())
 }
 
 fn parser(kind: Kind) -> ValueParser {
     match kind {
         Kind::Choice { names, .. } => PossibleValuesParser::new(names).try_map(move |name| kind.parse(&name)).into(),
-        Kind::Integer { .. } | Kind::Real { .. } | Kind::Pair { .. } | Kind::Graded { .. } | Kind::Bytes => {
-            ValueParser::new(move |text: &str| kind.parse(text))
-        }
+        Kind::Integer { .. }
+        | Kind::Real { .. }
+        | Kind::Percentage { .. }
+        | Kind::Pair { .. }
+        | Kind::Graded { .. }
+        | Kind::Bytes => ValueParser::new(move |text: &str| kind.parse(text)),
     }
 }
 

@@ -1,6 +1,6 @@
 //! Processor time of threads that serve those who watch: whatever is asked of them, rendering has the rest of the machine.
 
-use lumiris::render::processor_time;
+use lumiris::planning::processor_time;
 use std::time::{Duration, Instant};
 
 /// Share of the machine's processor time.

@@ -9,7 +9,7 @@ use lumiris::render::Progress;
 use lumiris::render::output::{Aov, Layers, live_aovs};
 use std::collections::{BTreeMap, HashMap};
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 
 /// Pixels that are handed out at once, at most: less than a megabyte, whatever the size of tiles. A row of a tile is the least.
 const AT_ONCE: usize = 1 << 14;
@@ -58,6 +58,8 @@ pub(crate) struct Canvas {
     aovs: Vec<Aov>,
     state: Mutex<State>,
     is_finished: AtomicBool,
+    /// How the image is rendered, in plain words, once that is known.
+    pub summary: OnceLock<String>,
 }
 
 impl Canvas {
@@ -75,6 +77,7 @@ impl Canvas {
             aovs,
             state: Mutex::default(),
             is_finished: AtomicBool::new(false),
+            summary: OnceLock::new(),
         }
     }
 

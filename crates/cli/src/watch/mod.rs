@@ -6,13 +6,15 @@
 
 mod allowance;
 mod canvas;
+mod preview;
 mod server;
 mod tev;
 
 use anyhow::Context;
-use canvas::Canvas;
+pub(crate) use canvas::Canvas;
 use lumiris::render::Progress;
 use lumiris::scene::FilmSettings;
+pub(crate) use preview::preview;
 use server::Server;
 use std::net::{Shutdown, SocketAddr, TcpStream};
 use std::sync::atomic::{AtomicBool, Ordering};

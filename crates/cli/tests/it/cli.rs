@@ -139,32 +139,25 @@ fn an_irradiance_cache_is_part_of_image_and_statistics() {
 }
 
 #[test]
-fn numbers_that_ris_chose_give_the_same_image_when_they_are_given() {
+fn numbers_of_proposals_are_the_same_in_every_run() {
     let folder = tempfile::tempdir().unwrap();
     let path = scene("demo/gallery.pbrt");
     let render = |name: &str, options: &[&str]| {
-        let common = ["render", &path, "--integrator", "direct", "--spp", "2", "--resolution", "48x27", "-o", name];
-        let output = lumiris(&[&common, options].concat(), folder.path());
+        let common =
+            ["render", &path, "--integrator", "direct", "--spp", "2", "--resolution", "48x27", "-q", "-o", name];
+        let output = lumiris(&[&common[..], &["--estimator", "ris"], options].concat(), folder.path());
         assert!(output.status.success(), "{}", stderr(&output));
-        (stderr(&output), read_image(&folder.path().join(name), &ReadLimits::default()).unwrap())
+        read_image(&folder.path().join(name), &ReadLimits::default()).unwrap()
     };
-    let (said, chosen) = render("chosen.exr", &["--estimator", "ris", "--proposals", "optimal"]);
-    assert!(said.contains("ris: 4 of ") && said.contains("chosen anew in each pixel"), "{said}");
-    assert!(chosen.image.channels.iter().any(|c| c == "ratio.proposals"), "{:?}", chosen.image.channels);
-
-    let value = |key: &str| chosen.metadata[&format!("lumiris:{key}")].clone();
-    let (samples, times) = (value("samples"), value("stage_times"));
-    let given = ["--estimator", &value("estimator"), "--proposals", &value("proposals"), "--samples", &samples];
-    let (_, again) = render("again.exr", &[&given[..], &["--stage-times", &times, "--threads", "1"]].concat());
     let bits = |image: &lumiris::imaging::Image| image.data.iter().map(|v| v.to_bits()).collect::<Vec<_>>();
+    let chosen = render("chosen.exr", &["--proposals", "optimal"]);
+    assert!(chosen.image.channels.iter().any(|c| c == "ratio.proposals"), "{:?}", chosen.image.channels);
+    let again = render("again.exr", &["--proposals", "optimal", "--threads", "1"]);
     assert_eq!(bits(&chosen.image), bits(&again.image));
 
-    let (said, auto) = render("auto.exr", &["--estimator", "ris"]);
-    assert!(said.contains("proposals are traced (a proposal takes "), "{said}");
-    let proposals = auto.metadata["lumiris:proposals"].clone();
-    assert!(proposals.parse::<u32>().unwrap() >= 4);
-    let (_, again) = render("auto-again.exr", &["--estimator", "ris", "--proposals", &proposals]);
-    assert_eq!(bits(&auto.image), bits(&again.image));
+    let auto = render("auto.exr", &[]);
+    assert_eq!(auto.metadata["lumiris:proposals"], "12", "three for each of four samples");
+    assert_eq!(bits(&auto.image), bits(&render("given.exr", &["--proposals", "12"]).image));
 }
 
 #[test]
@@ -260,6 +253,70 @@ fn a_time_limit_ends_the_rendering_and_writes_it() {
     assert!(output.status.success(), "{}", stderr(&output));
     assert!(stderr(&output).contains("stopped early"), "{}", stderr(&output));
     assert!(folder.path().join("gallery.exr").exists());
+}
+
+#[test]
+fn a_time_alone_is_filled_with_samples_and_with_spp_both_are_limits() {
+    let folder = tempfile::tempdir().unwrap();
+    let gallery = scene("demo/gallery.pbrt");
+    let samples = |more: &[&str]| {
+        let args =
+            [&["render", gallery.as_str(), "--resolution", "64x36", "-o", "a.exr", "--stats", "s.json"], more].concat();
+        let output = lumiris(&args, folder.path());
+        assert!(output.status.success(), "{}", stderr(&output));
+        let stats = std::fs::read_to_string(folder.path().join("s.json")).unwrap();
+        let stats: serde_json::Value = serde_json::from_str(&stats).unwrap();
+        (stats["complete"].as_bool().unwrap(), stats["settings"].clone(), stderr(&output))
+    };
+    let (complete, settings, said) = samples(&["--time", "1"]);
+    assert!(!complete && said.contains("stopped early"), "{said}");
+    // They follow from what is asked for, not from measured times
+    assert_eq!(
+        (&settings["lumiris:spp"], &settings["lumiris:pilot_spp"]),
+        (&"1048576".into(), &"64".into()),
+        "{settings}"
+    );
+    let (complete, settings, said) = samples(&["--time", "1000", "--spp", "2"]);
+    assert!(complete && said.contains("2 samples per pixel"), "{said}");
+    assert_eq!(settings["lumiris:spp"], "2");
+}
+
+#[test]
+fn what_a_time_cut_short_goes_on_to_the_same_image() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let gallery = scene("demo/gallery.pbrt");
+    // A tile with a pass takes long enough for the time to end within one
+    let common = ["render", &gallery, "--resolution", "192x108", "--spp", "64", "--estimator", "mis", "-q"];
+    let run = |more: &[&str]| {
+        let output = lumiris(&[&common[..], more].concat(), folder);
+        assert!(output.status.success(), "{}", stderr(&output));
+    };
+    run(&["--time", "0.3", "--checkpoint", "a.film", "-o", "cut.exr"]);
+    run(&["--resume", "a.film", "-o", "resumed.exr"]);
+    run(&["-o", "whole.exr"]);
+    let [resumed, whole] = ["resumed.exr", "whole.exr"].map(|name| crate::program::read(folder, name).image.data);
+    assert!(resumed.iter().zip(&whole).all(|(a, b)| a.to_bits() == b.to_bits()));
+}
+
+#[test]
+fn a_noise_is_a_number_or_a_percentage_and_said_to_be_reached_or_not() {
+    let folder = tempfile::tempdir().unwrap();
+    let gallery = scene("demo/gallery.pbrt");
+    let said_at = |resolution: &str, more: &[&str]| {
+        let args = [&["render", gallery.as_str(), "--resolution", resolution, "-o", "a.exr"], more].concat();
+        let output = lumiris(&args, folder.path());
+        assert!(output.status.success(), "{}", stderr(&output));
+        stderr(&output).lines().find(|line| line.starts_with("target")).unwrap_or_default().to_owned()
+    };
+    let said = |more: &[&str]| said_at("64x36", more);
+    let [number, percent] = ["0.2", "20%"].map(|noise| said(&["--noise", noise]));
+    assert!(number.starts_with("target 20 % reached in") && number == percent, "{number} {percent}");
+    let limited = said(&["--noise", "0.1%", "--spp", "8"]);
+    assert!(limited.contains("hit the limit of --spp (8 samples per pixel)"), "{limited}");
+    let late = said_at("160x90", &["--noise", "0.5%", "--time", "2"]);
+    // Unless a busy machine gives up the pilot, and with it the target
+    assert!(late.contains("hit the limit of --time") || late.is_empty(), "{late}");
 }
 
 #[test]
@@ -414,8 +471,8 @@ fn ctrl_c_writes_what_there_is() {
 fn ctrl_c_before_the_first_sample_leaves_what_there_is() {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("a.exr"), "an image of yesterday").unwrap();
-    // So many samples have a pilot that takes longer than this test
-    let args = ["render", &scene("demo/gallery.pbrt"), "--spp", "1000000", "-q", "-o", "a.exr"];
+    // So little noise has a pilot that takes longer than this test
+    let args = ["render", &scene("demo/gallery.pbrt"), "--spp", "1000000", "--noise", "0.01%", "-q", "-o", "a.exr"];
     let mut command = Command::new(env!("CARGO_BIN_EXE_lumiris"));
     let child = command.args(args).current_dir(folder.path()).stderr(Stdio::piped()).spawn().unwrap();
     std::thread::sleep(std::time::Duration::from_secs(2));

@@ -2,7 +2,7 @@
 
 use super::program::{command, stderr};
 use lumiris::imaging::Image;
-use lumiris::imaging::oiio::{Part, ReadLimits, read_image, write_image};
+use lumiris::imaging::oiio::{Part, ReadLimits, read_image, read_metadata, write_image};
 use std::path::Path;
 use std::process::{Command, Output};
 
@@ -51,6 +51,11 @@ fn image(path: &Path) -> Image {
     read_image(path, &ReadLimits::default()).unwrap().image
 }
 
+/// A setting that metadata have.
+fn setting(path: &Path, name: &str) -> String {
+    read_metadata(path).unwrap()[&format!("lumiris:{name}")].clone()
+}
+
 fn bits(image: &Image) -> Vec<u32> {
     image.data.iter().map(|v| v.to_bits()).collect()
 }
@@ -79,9 +84,10 @@ fn frames_read_each_file_once_and_have_the_pixels_of_single_renderings() {
 
     let mut pictures = std::collections::HashSet::new();
     for number in 1..=4 {
-        let one = format!("render shot.{number:04}.pbrt -o one.exr -q");
+        let of_frames = path(&format!("f.{number:02}.exr"));
+        let one = format!("render shot.{number:04}.pbrt --seed {} -o one.exr -q", setting(&of_frames, "seed"));
         assert!(lumiris(folder.path(), &one).status.success());
-        let (of_frames, alone) = (image(&path(&format!("f.{number:02}.exr"))), image(&path("one.exr")));
+        let (of_frames, alone) = (image(&of_frames), image(&path("one.exr")));
         assert_eq!(bits(&of_frames), bits(&alone), "frame {number}");
         assert!(path(&format!("f.{number:02}.png")).exists());
         pictures.insert(bits(&of_frames));
@@ -136,6 +142,61 @@ fn existing_images_are_left_alone_unless_they_are_incomplete() {
 }
 
 #[test]
+fn frames_have_other_noise_each_unless_it_is_to_be_the_same() {
+    let folder = animation();
+    let path = |name: &str| folder.path().join(name);
+    for number in 1..=2 {
+        std::fs::write(path(&format!("still.{number}.pbrt")), frame(1, "old.ply")).unwrap();
+    }
+    let run = |args: &str| {
+        let output = lumiris(folder.path(), args);
+        assert!(output.status.success(), "{args}: {}", stderr(&output));
+    };
+    let pixels = |name: &str| bits(&image(&path(name)));
+    run("render still.#.pbrt --frames 1-2 --seed 7 -q -o f.#.exr");
+    assert_ne!(pixels("f.1.exr"), pixels("f.2.exr"));
+    assert_ne!(setting(&path("f.1.exr"), "seed"), setting(&path("f.2.exr"), "seed"));
+    run("render still.#.pbrt --frames 2 --seed 7 -q -o again.#.exr");
+    assert_eq!(pixels("again.2.exr"), pixels("f.2.exr"), "other frames do not matter");
+    run("render still.#.pbrt --frames 1-2 --seed 7 --seed-per-frame off -q -o same.#.exr");
+    run("render still.1.pbrt --seed 7 -q -o alone.exr");
+    assert_eq!(pixels("same.1.exr"), pixels("same.2.exr"));
+    assert_eq!(pixels("same.1.exr"), pixels("alone.exr"));
+
+    // What goes on has the seed that it began with, whether the seed of the sequence is given again or not
+    run("render still.#.pbrt --frames 1-2 --seed 7 --estimator mis -q -o whole.#.exr");
+    run("render still.#.pbrt --frames 1-2 --seed 7 --estimator mis --spp 1 --checkpoint c.#.film -q -o half.#.exr");
+    for given in ["", "--seed 7"] {
+        run(&format!("render still.#.pbrt --frames 1-2 {given} --spp 2 --resume c.#.film -q -o more.#.exr"));
+        assert_eq!(pixels("more.2.exr"), pixels("whole.2.exr"), "{given}");
+    }
+}
+
+#[test]
+fn what_is_chosen_for_the_first_frame_is_the_choice_for_all() {
+    let folder = animation();
+    let path = |name: &str| folder.path().join(name);
+    let run = |frames: &str| {
+        let args = format!("render shot.####.pbrt --frames {frames} --estimator auto -o f.#.exr --skip-existing");
+        let output = lumiris(folder.path(), &args);
+        assert!(output.status.success(), "{args}: {}", stderr(&output));
+        stderr(&output)
+    };
+    let said = run("1-2");
+    assert_eq!(said.matches("direct light: ").count(), 1, "{said}");
+    let plan = setting(&path("f.1.exr"), "plan");
+    assert!(plan.contains("\"samples\""), "{plan}");
+    assert_eq!(setting(&path("f.2.exr"), "plan"), plan);
+    // Also where the first frame is there already
+    run("1-3");
+    assert_eq!(setting(&path("f.3.exr"), "plan"), plan);
+    for number in 2..=3 {
+        let name = path(&format!("f.{number}.exr"));
+        assert_eq!(setting(&name, "samples"), setting(&path("f.1.exr"), "samples"));
+    }
+}
+
+#[test]
 fn parts_of_frames_are_merged_to_the_frames() {
     let folder = animation();
     let path = |name: &str| folder.path().join(name);
@@ -148,7 +209,8 @@ fn parts_of_frames_are_merged_to_the_frames() {
     run(&format!("{frames} -o whole.##.exr"));
     run(&format!("{frames} --part 1/2 -o f.####.1.part --checkpoint c.####.film"));
     // The other part of a frame alone: what frames share does not tell their files apart
-    run("render shot.0003.pbrt --estimator mis -q --part 2/2 -o f.0003.2.part");
+    let seed = setting(&path("whole.03.exr"), "seed");
+    run(&format!("render shot.0003.pbrt --estimator mis --seed {seed} -q --part 2/2 -o f.0003.2.part"));
     run(&format!("{frames} --part 2/2 -o f.####.2.part --skip-existing --stats s.json"));
     let results: Vec<_> = stats(&path("s.json")).iter().map(|f| f["result"].as_str().unwrap().to_owned()).collect();
     assert_eq!(results, ["done", "skipped"]);

@@ -16,7 +16,7 @@ fn one_sample_has_no_known_noise() {
     let folder = tempfile::tempdir().unwrap();
     let one = "render GALLERY --resolution 16x9 --estimator mis --spp 1";
     let said = stderr(&lumiris(&format!("{one} -o a.exr"), folder.path()));
-    assert!(said.contains("s, 1 sample per pixel, noise unknown") && !said.contains("inf"), "{said}");
+    assert!(said.contains(", 1 sample per pixel, noise unknown") && !said.contains("inf"), "{said}");
 }
 
 #[test]
@@ -34,7 +34,7 @@ fn samples_are_told_by_their_mean_and_range() {
     assert!((mean.parse::<f64>().unwrap() - expected).abs() <= 0.05 + 1e-9, "{text}, but {expected}");
     // Looks have a part of the time of 64 samples
     assert!((40.0..68.0).contains(&expected), "{expected}");
-    assert!(said.contains(" camera rays each where lights are seen"), "{said}");
+    assert!(said.contains("; adaptive sampling"), "{said}");
     let [least, most] = [counts().fold(f32::INFINITY, f32::min), counts().fold(0.0, f32::max)];
     assert_eq!(range, format!("{least} to {most})"));
     assert!(said.contains(&format!("{mean} samples per pixel ({range}")), "{said}");
@@ -122,10 +122,6 @@ fn options_without_effect_are_named() {
     let said =
         stderr(&lumiris("render GALLERY --resolution 8x6 --spp 1 -o a.exr --estimator mis --exposure 1", folder));
     assert_eq!(warnings(&said), ["--exposure"], "{said}");
-
-    // There is too little to gain for the pilot
-    let said = stderr(&lumiris("render GALLERY --resolution 128x72 --spp 1 -q -o a.png --estimator ocv", folder));
-    assert_eq!(warnings(&said), ["--estimator ocv"], "{said}");
 
     // In a scene file, with the place
     let head = "Integrator \"direct\" \"integer maxdepth\" 7\n  \"string estimator\" \"mis\" \"integer proposals\" 4";

@@ -66,15 +66,13 @@ pub(crate) const METHODS: &[(&str, bool)] = &[
     ("--integrator path --estimator mis", true),
     ("--integrator path --estimator mis --path-reuse 3", true),
     ("--integrator path --estimator mis --path-reuse 2 --light-paths 0.5", true),
-    ("--integrator path --estimator mis --roulette efficiency", true),
     ("--integrator path --estimator mis --allocation adaptive --spp 12", true),
     ("--integrator direct --estimator mis --samples 8 --allocation adaptive --spp 16", true),
     ("--integrator direct --estimator mc --sampler independent", true),
     ("--integrator path --estimator ris --samples 2 --proposals 12", true),
-    ("--integrator direct --estimator ris --samples 1 --proposals optimal --stage-times 20,200", true),
+    ("--integrator direct --estimator ris --samples 1 --proposals optimal", true),
     ("--integrator direct --estimator ocv --ocv pixels", true),
-    ("--integrator direct --estimator ocv --control-variates always --allocation adaptive --spp 16", true),
-    ("--integrator direct --estimator ocv --ocv crossfit", true),
+    ("--integrator direct --estimator ocv --allocation adaptive --spp 16", true),
     ("--integrator direct --estimator ocv --ocv progressive", false),
     ("--integrator direct --estimator optimal-mis --optimal-mis progressive", false),
     ("--integrator direct --estimator correlated", true),
@@ -102,7 +100,12 @@ fn merged_parts_have_the_bits_of_the_single_image_whatever_the_method_and_the_sp
             "--samples-from 6 --part 2/2 --part-by tiles",
             "--samples-from 6 --part 1/2 --part-by tiles",
         ];
-        let splits: &[&[&str]] = if *allows_samples { &[&by_tiles, &by_share, &by_hand] } else { &[&by_tiles] };
+        let splits: &[&[&str]] = match allows_samples {
+            // Pixels share paths with others in all tiles
+            _ if method.contains("path-reuse") => &[&by_share],
+            true => &[&by_tiles, &by_share, &by_hand],
+            false => &[&by_tiles],
+        };
         // Each way of dividing for each method would take long; all for the first ones, then in turn
         let chosen = |i: &usize| k < 2 || *i == k % splits.len();
         for (i, split) in splits.iter().enumerate().filter(|(i, _)| chosen(i)) {
@@ -112,7 +115,7 @@ fn merged_parts_have_the_bits_of_the_single_image_whatever_the_method_and_the_sp
             let mut names: Vec<String> = (0..split.len()).map(|p| format!("{p}.part")).collect();
             names.rotate_left(1 + k % 2);
             run(&format!("merge {} -q -o merged.exr", names.join(" ")), folder);
-            if !method.contains("optimal --stage") {
+            if !method.contains("--proposals optimal") {
                 assert_same("single.exr", "merged.exr", folder, &format!("{method}, split {i}"));
             } else {
                 // Its additional layer, the ratio, is not part of the sums
@@ -179,7 +182,7 @@ fn more_samples_than_first_asked_for_are_one_more_part() {
 }
 
 #[test]
-fn an_image_too_small_for_a_pilot_needs_no_plan() {
+fn parts_by_the_rule_need_no_plan() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
     let auto = "render GALLERY --integrator path --resolution 32x24 --spp 4 --estimator auto -q";
@@ -188,7 +191,7 @@ fn an_image_too_small_for_a_pilot_needs_no_plan() {
     (1..3).for_each(|i| run(&format!("{auto} --part {i}/2 -o {i}.part"), folder));
     let output = lumiris("merge 2.part 1.part -o merged.exr", folder);
     assert!(output.status.success() && stderr(&output).contains("from 2 parts"), "{}", stderr(&output));
-    assert_same("single.exr", "merged.exr", folder, "without a pilot");
+    assert_same("single.exr", "merged.exr", folder, "by the rule");
     let said = stderr(&lumiris("merge 1.part --allow-missing -o some.exr", folder));
     assert!(said.contains("from 1 part,"), "{said}");
 }
@@ -198,21 +201,8 @@ fn what_a_plan_has_chosen_is_the_same_for_all_parts() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
     let auto = "GALLERY --integrator direct --resolution 64x48 --spp 8";
-    let words = ["measured times", "lumiris plan", "--plan plan.json"];
-    refuse(
-        &format!("render {auto} --spp 512 --part 1/2 -o 1.part"),
-        folder,
-        2,
-        &[&words[..], &["--estimator mis"]].concat(),
-    );
-    refuse(
-        &format!("render {auto} --estimator ris --part 1/2 -o 1.part"),
-        folder,
-        2,
-        &[&words[..], &["--proposals"]].concat(),
-    );
-    run(&format!("plan {auto} --estimator ris -o plan.json"), folder);
-    let planned = format!("render {auto} --estimator ris --plan plan.json -q");
+    run(&format!("plan {auto} -o plan.json"), folder);
+    let planned = format!("render {auto} --plan plan.json -q");
     run(&format!("{planned} -o single.exr"), folder);
     (1..3).for_each(|i| run(&format!("{planned} --part {i}/2 -o {i}.part"), folder));
     run("merge 2.part 1.part -o merged.exr", folder);
@@ -224,10 +214,10 @@ fn what_a_plan_has_chosen_is_the_same_for_all_parts() {
         assert_same("single.exr", "resumed.exr", folder, "by a plan, resumed");
     }
     let plan = std::fs::read_to_string(folder.join("plan.json")).unwrap();
-    let (at, rest) = plan.split_once("\"proposals\": \"").unwrap();
+    let (at, rest) = plan.split_once("\"samples\": \"").unwrap();
     let (_, rest) = rest.split_once('"').unwrap();
-    std::fs::write(folder.join("plan.json"), format!("{at}\"proposals\": \"640\"{rest}")).unwrap();
-    refuse(&format!("{planned} --resume c.film -o other.exr"), folder, 3, &["c.film", "proposals: 640, not"]);
+    std::fs::write(folder.join("plan.json"), format!("{at}\"samples\": \"640\"{rest}")).unwrap();
+    refuse(&format!("{planned} --resume c.film -o other.exr"), folder, 3, &["c.film", "samples: 640, not"]);
 }
 
 #[test]
@@ -251,6 +241,11 @@ fn what_cannot_be_divided_is_refused_with_the_reason() {
         refuse(&format!("{render} {options}"), folder, 2, &words);
         assert!(!folder.join("a.part").exists());
     }
+    for shared in ["--estimator mis --path-reuse 3", "--estimator auto --resolution 40x40"] {
+        let part = format!("{IMAGE} --integrator path {shared} --part 1/2 --part-by tiles -o a.part");
+        refuse(&part, folder, 2, &["share paths", "--part-by samples", "--path-reuse 1"]);
+    }
+    run(&format!("{IMAGE} --integrator path --part 1/2 --part-by tiles --path-reuse 1 -o a.part"), folder);
     refuse(&format!("{render} --checkpoint no/a -o a.exr"), folder, 3, &["no/a", "does not exist"]);
     refuse(&format!("{render} --resume no -o a.exr"), folder, 3, &["no: ", "No such file"]);
 }

@@ -63,6 +63,25 @@ fn make_install_puts_program_completions_and_manual_where_shells_look() {
     assert!(page("lumiris-render.1").contains("\\-\\-estimator"));
 }
 
+/// Lines of help that begin with an option.
+fn options(help: &str) -> usize {
+    let begins = |line: &&str| {
+        let rest = line.trim_start();
+        // Further lines of help, which may begin with the name of another option, are indented by more
+        (1..=6).contains(&(line.len() - rest.len())) && rest.starts_with('-') && rest.contains("--")
+    };
+    help.lines().filter(begins).count()
+}
+
+#[test]
+fn help_of_render_is_short_enough_to_be_read() {
+    let [long, short] = ["--help", "-h"].map(|flag| output(BINARY, &["render", flag]));
+    assert!((60..=80).contains(&options(&long)), "{}: {long}", options(&long));
+    assert_eq!(options(&short), 25, "{short}");
+    assert!(long.contains("\nResearch:\n") && !short.contains("Research"), "{short}");
+    assert_eq!(long.matches("the file's, or").count(), 1, "{long}");
+}
+
 #[test]
 fn an_unknown_shell_is_a_usage_error_and_a_file_in_place_of_a_folder_a_failure() {
     let folder = tempfile::tempdir().unwrap();

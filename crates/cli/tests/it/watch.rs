@@ -176,7 +176,11 @@ fn address_of(stderr: &mut BufReader<ChildStderr>) -> String {
 
 impl Endless {
     fn start(folder: &Path) -> Endless {
-        let mut child = lumiris(folder, "-o a.exr --spp 1000000000 --estimator mis --view=0");
+        Endless::of(folder, "--spp 1000000000 --estimator mis")
+    }
+
+    fn of(folder: &Path, options: &str) -> Endless {
+        let mut child = lumiris(folder, &format!("-o a.exr --view=0 {options}"));
         let address = address_of(&mut BufReader::new(child.stderr.take().unwrap()));
         Endless { child, address }
     }
@@ -218,6 +222,16 @@ impl Endless {
         assert!(Command::new("kill").args(["-INT", &self.child.id().to_string()]).status().unwrap().success());
         self.child.wait().unwrap().code()
     }
+}
+
+#[test]
+fn there_are_pixels_to_see_before_pilots_are_done() {
+    let folder = folder();
+    let view = Endless::of(folder.path(), "--noise 0.0000001 --spp 1000000000");
+    // All tiles, while the pilot of the noise goes on
+    view.state();
+    assert_eq!(view.stop(), Some(130));
+    assert!(!folder.path().join("a.exr").exists(), "the first sample has not been rendered");
 }
 
 #[test]

@@ -1,29 +1,36 @@
 //! Sample counts for equal time.
 //!
 //! A rendering costs c + P·(M·T1 + N·T2), where P is the number of shading points. T1 is the cost of a proposal and its
-//! weight, T2 that of drawing, evaluating and tracing a sample; the renderer measures both for its own choice. The
+//! weight, T2 that of drawing, evaluating and tracing a sample: renderings of few and of many of both tell them. The
 //! counts are N = B/(2·T2), M = B/(2·T1) for a time of B per point: M/N = T2/T1 [Talbot 2005, Eq. 4.4]. Then M is
 //! corrected until renderings take as long as those of the baseline.
 
 use super::measure::{Measured, Seconds, Stage, View, turns};
 use super::method::Method;
 use super::{Observer, ReproduceError};
-use lumiris::settings::{SampleCounts, StageTimes};
+use lumiris::lights::LightSamplerKind;
+use lumiris::settings::{SampleCounts, Strata};
+use lumiris_numbers::estimators::ris::choice::Costs;
 
 /// Turns of a measurement of times.
 const TURNS: u32 = 3;
 /// Most corrections of the number of proposals.
 const CORRECTIONS: u32 = 4;
+/// Least time of a proposal or a sample (ns).
+const LEAST_TIME: f64 = 0.1;
 /// Good enough a match of times.
 const MATCH: f64 = 0.01;
 /// Most proposals: the buffers of a batch grow with them.
 const MAX_PROPOSALS: u32 = 1024;
 
+/// M and N of the estimates that are timed: few and many.
+const TIMED: [[u32; 2]; 2] = [[8, 1], [40, 5]];
+
 /// Times of the stages, and sample counts that cost as much as the baseline.
 #[derive(Clone, Copy, Debug)]
 pub struct Calibration {
-    /// T1 and T2 (ns), by the renderer's own measurement.
-    pub times: StageTimes,
+    /// T1 and T2 (ns).
+    pub times: Costs,
     /// Direct lighting of one point by the baseline (ns).
     pub budget: f64,
     /// M and N.
@@ -37,16 +44,36 @@ fn points(m: &Measured) -> f64 {
     (m.proposals as f64 / f64::from(m.method.proposals) / m.turns().max(1) as f64).max(1.0)
 }
 
+/// T1 and T2 (ns), with lights chosen in this way; `None` if nothing in the image is lit.
+fn stage_times(
+    stage: &mut Stage,
+    lights: LightSamplerKind,
+    observer: Observer<'_>,
+) -> Result<Option<Costs>, ReproduceError> {
+    let method = |[m, n]: [u32; 2]| Method::ris(m, n).lights_by(lights).stratified().strata(Strata::Systematic);
+    let timed = turns(stage, &TIMED.map(method), View::Centres, 1, 0..TURNS, observer)?;
+    if timed.iter().any(|m| m.segments == 0) {
+        return Ok(None);
+    }
+    let difference = |of: fn(&Seconds) -> f64| {
+        let [few, many] = [0, 1].map(|i| timed[i].median_seconds(of) * 1e9 / points(&timed[i]));
+        many - few
+    };
+    let [m, n] = [0, 1].map(|i| f64::from(TIMED[1][i] - TIMED[0][i]));
+    let t1 = (difference(|s| s.t1) / m).max(LEAST_TIME);
+    Ok(Some(Costs { t1, t2: (difference(|s| s.select + s.t2) / n).max(LEAST_TIME) }))
+}
+
 /// N and M for a time per point, of which half goes to samples; at least one sample, and no fewer proposals than
 /// samples.
-pub fn equal_halves(budget: f64, times: StageTimes) -> SampleCounts {
+pub fn equal_halves(budget: f64, times: Costs) -> SampleCounts {
     let samples = (0.5 * budget / times.t2).round().max(1.0);
     let samples = samples.min((budget / (times.t1 + times.t2)).floor().max(1.0));
     counts_for_budget(budget, times, samples as u32)
 }
 
 /// The proposals that fit beside a number of samples.
-pub fn counts_for_budget(budget: f64, times: StageTimes, samples: u32) -> SampleCounts {
+pub fn counts_for_budget(budget: f64, times: Costs, samples: u32) -> SampleCounts {
     let proposals = ((budget - f64::from(samples) * times.t2) / times.t1).round().clamp(1.0, f64::from(MAX_PROPOSALS));
     SampleCounts { samples, proposals: (proposals as u32).max(samples) }
 }
@@ -54,8 +81,8 @@ pub fn counts_for_budget(budget: f64, times: StageTimes, samples: u32) -> Sample
 /// Measures times, and finds sample counts that cost as much as the baseline, within about a percent.
 pub fn calibrate(stage: &mut Stage, base: &Method, observer: Observer<'_>) -> Result<Calibration, ReproduceError> {
     // Times, and that of the baseline
-    let default = StageTimes { t1: 100.0, t2: 100.0 };
-    let times = stage.stage_times(base.light_sampler)?.unwrap_or(default);
+    let default = Costs { t1: 100.0, t2: 100.0 };
+    let times = stage_times(stage, base.light_sampler, observer)?.unwrap_or(default);
     let ris = |proposals, samples| Method::ris(proposals, samples).lights_by(base.light_sampler).stratified();
     let guess = ris(4 * base.samples, base.samples.div_ceil(2));
     let pilot = turns(stage, &[*base, guess], View::Centres, 1, 0..TURNS, observer)?;
@@ -113,7 +140,7 @@ mod tests {
 
     #[test]
     fn halves_of_the_time_go_to_proposals_and_to_samples() {
-        let times = StageTimes { t1: 10.0, t2: 160.0 };
+        let times = Costs { t1: 10.0, t2: 160.0 };
         // The paper's case: 20 samples of one proposal each.
         let sample_counts = equal_halves(20.0 * 170.0, times);
         assert_eq!(sample_counts.samples, 11);
@@ -122,13 +149,7 @@ mod tests {
         assert!((spent(sample_counts) - 3400.0).abs() < times.t1);
         // One sample at least; proposals as dear as samples leave M = N.
         assert_eq!(equal_halves(100.0, times).samples, 1);
-        assert_eq!(
-            equal_halves(2000.0, StageTimes { t1: 100.0, t2: 100.0 }),
-            SampleCounts { samples: 10, proposals: 10 }
-        );
-        assert_eq!(
-            equal_halves(2000.0, StageTimes { t1: 100.0, t2: 10.0 }),
-            SampleCounts { samples: 18, proposals: 18 }
-        );
+        assert_eq!(equal_halves(2000.0, Costs { t1: 100.0, t2: 100.0 }), SampleCounts { samples: 10, proposals: 10 });
+        assert_eq!(equal_halves(2000.0, Costs { t1: 100.0, t2: 10.0 }), SampleCounts { samples: 18, proposals: 18 });
     }
 }

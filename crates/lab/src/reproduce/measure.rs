@@ -13,12 +13,12 @@ use lumiris::accel::{Accel, AccelStats, Bvh, Coherence, Hit, RayBatch};
 use lumiris::film::Film;
 use lumiris::film::filter::PixelFilter;
 use lumiris::import::{LoadOptions, load};
-use lumiris::lights::{LightSamplerKind, VisibilityCache};
-use lumiris::render::plan::{Preparation, prepare};
-use lumiris::render::processor_time;
-use lumiris::render::{RenderSettings, Rendering, render};
+use lumiris::lights::VisibilityCache;
+use lumiris::planning::processor_time;
+use lumiris::planning::proposals::sample_count_map;
+use lumiris::render::{RenderError, RenderSettings, Rendering, render, thread_pool};
 use lumiris::scene::{AccelKind, RenderJob};
-use lumiris::settings::{Proposals, StageTimes, Strata};
+use lumiris_numbers::estimators::ris::choice::Costs;
 use lumiris_numbers::estimators::stats::{Welford, median, z_test};
 use lumiris_numbers::math::luminance;
 use serde::Serialize;
@@ -114,30 +114,19 @@ impl Stage {
         self.job.change(|settings| method.apply(settings, self.depth));
     }
 
-    /// T1 and T2 as the renderer measures them for its own choice, with lights chosen in this way; `None` if nothing in
-    /// the image is lit.
-    pub fn stage_times(&mut self, lights: LightSamplerKind) -> Result<Option<StageTimes>, ReproduceError> {
-        self.set(&Method::ris(1, 1).lights_by(lights).stratified().strata(Strata::Systematic));
-        self.job.change(|s| (s.integrator.ris.proposals, s.integrator.ris.stage_times) = (Proposals::Auto, None));
-        self.shadows.store(true, Ordering::Relaxed);
-        Ok(prepare(&mut self.job, &Preparation::on(self.threads))?.ris.map(|ris| ris.times))
-    }
-
     /// Finds the best allocation of an estimate's time to proposals and samples in each pixel, by the renderer's own
     /// pilot. The answer is M/N of every pixel, and the processor time that it took (s).
-    pub fn plan_per_pixel(&mut self, times: StageTimes, budget: f64) -> Result<(Vec<f32>, f64), ReproduceError> {
+    pub fn plan_per_pixel(&mut self, times: Costs, budget: f64) -> Result<(Vec<f32>, f64), ReproduceError> {
         let start = processor_time::of_process();
-        // The pilot asks for a number of samples; half of the time is for proposals
-        let samples = (0.5 * budget / times.t2).round().max(1.0) as u32;
-        self.set(&Method { per_pixel: true, ..Method::ris(samples, samples) });
+        self.set(&Method { per_pixel: true, ..Method::ris(1, 1) });
         self.job.world.scene.film.filter = PixelFilter::Box { rx: CENTRE, ry: CENTRE };
-        self.job.change(|s| s.integrator.ris.stage_times = Some(times));
         self.shadows.store(true, Ordering::Relaxed);
-        prepare(&mut self.job, &Preparation::on(self.threads))?;
+        let pool = thread_pool(self.threads).map_err(RenderError::from)?;
+        let map = pool.install(|| sample_count_map(&self.job, times, budget));
         let seconds = processor_time::of_process().saturating_sub(start).as_secs_f64();
-        let Some(map) = &mut self.job.sample_count_map else { return Ok((Vec::new(), seconds)) };
-        map.time = budget;
-        Ok((map.ratios.clone(), seconds))
+        let ratios = map.ratios.clone();
+        self.job.sample_count_map = Some(map);
+        Ok((ratios, seconds))
     }
 
     /// Renders `spp` camera rays per pixel.

@@ -2,11 +2,10 @@
 
 use lumiris::lights::LightSamplerKind;
 use lumiris::settings::{
-    Cached, EstimatorKind, IntegratorKind, IntegratorSettings, OptimalForm, ProposalPoints, Proposals, Settings,
-    Strata, Target,
+    Cached, EstimatorKind, IntegratorKind, IntegratorSettings, OcvForm, OptimalForm, ProposalPoints, Proposals,
+    Settings, Strata, Target,
 };
 use lumiris_numbers::estimators::mis::Heuristic;
-use lumiris_numbers::estimators::ocv::Form;
 use lumiris_numbers::samplers::SamplerKind;
 
 /// Light that is computed.
@@ -55,7 +54,7 @@ pub struct Method {
     /// Weights of the techniques; the estimator's own if `None`.
     pub heuristic: Option<Heuristic>,
     /// How `ocv` finds its coefficients.
-    pub form: Form,
+    pub form: OcvForm,
     /// How `optimal-mis` finds its weights.
     pub optimal: OptimalForm,
     /// N.
@@ -84,7 +83,7 @@ impl Method {
             estimator,
             light_sampler: LightSamplerKind::Tree,
             heuristic: None,
-            form: Form::Progressive,
+            form: OcvForm::Progressive,
             optimal: OptimalForm::Progressive,
             samples,
             proposals: samples,
@@ -102,7 +101,7 @@ impl Method {
     }
 
     /// Optimizing control variates with independent random numbers.
-    pub fn ocv(form: Form, samples: u32) -> Self {
+    pub fn ocv(form: OcvForm, samples: u32) -> Self {
         Method { estimator: EstimatorKind::Ocv, form, ..Method::mc(samples) }
     }
 

@@ -4,11 +4,9 @@ use super::mixtures::{Mixture, Sampler};
 use super::{assert_means, level};
 use lumiris_numbers::estimators::ocv::Form;
 use lumiris_numbers::estimators::ocv::pixels::{Memory, Picture, Pixel};
-use lumiris_numbers::estimators::ris::control::OfGroups;
-use lumiris_numbers::estimators::ris::systematic;
 use lumiris_numbers::estimators::stats::{Welford, z_test};
 use lumiris_test_support::integrals::run;
-use lumiris_test_support::random::{Pcg32, RngExt};
+use lumiris_test_support::random::Pcg32;
 
 /// Edge of a picture.
 const EDGE: usize = 8;
@@ -30,11 +28,6 @@ fn picture(sampler: &Sampler, passes: u32, copies: bool, stream: &mut Pcg32) -> 
         controls.extend((0..m).map(|j| (equations.sum_of_column(&sums, j) / n) as f32));
         pixels.push(Pixel { mean: equations.mean(&sums), class: Some(1), normal: [0.0, 0.0, 1.0] });
     }
-    corrected(m, pixels, controls)
-}
-
-/// Pixels as they are, and corrected by their `m` control variates.
-fn corrected(m: usize, pixels: Vec<Pixel>, controls: Vec<f32>) -> [Estimates; 2] {
     let before: Estimates = pixels.iter().map(|p| p.mean.map(f64::from)).collect();
     let picture = Picture::new(EDGE, m, pixels, controls);
     let (mut memory, mut beta, mut corrected) = (Memory::default(), Vec::new(), Vec::new());
@@ -47,35 +40,6 @@ fn corrected(m: usize, pixels: Vec<Pixel>, controls: Vec<f32>) -> [Estimates; 2]
         }
     }
     [before, corrected]
-}
-
-/// The same of `sets` that are resampled for each pixel: of as many proposals as `sampler` has samples, `draws` are drawn by what
-/// they contribute without the occluder. Each of both lights is a group, whatever proposes it.
-fn resampled(sampler: &Sampler, (sets, draws): (u32, u32), stream: &mut Pcg32) -> [Estimates; 2] {
-    let (mut pixels, mut controls) = (Vec::new(), Vec::new());
-    for _ in 0..EDGE * EDGE {
-        let (mut mean, mut parts) = ([0.0; 3], [0.0; 2]);
-        for _ in 0..sets {
-            let mut of_groups = OfGroups::default();
-            let (mut weights, mut proposals, mut drawn) = (Vec::new(), Vec::new(), Vec::new());
-            sampler.points(1, stream, |point| {
-                let of_one = 1.0 / (point.mixture_pdf * f64::from(sampler.n * sets));
-                weights.push((sampler.mixture.unshadowed(point.x) * of_one) as f32);
-                proposals.push((usize::from(point.x > 0.55), sampler.mixture.f(point.x).map(|f| f * of_one)));
-            });
-            systematic(&weights, draws, stream.random::<f32>(), &mut drawn);
-            weights.iter().zip(&proposals).for_each(|(weight, (group, _))| of_groups.propose(*group, *weight));
-            for draw in &drawn {
-                let (weight, (group, f)) = (weights[draw.index as usize], proposals[draw.index as usize]);
-                of_groups.draw(group, weight * draw.scale);
-                (0..3).for_each(|c| mean[c] += f[c] * f64::from(draw.scale));
-            }
-            (0..2).for_each(|g| parts[g] += of_groups.parts()[g] / sets as f32);
-        }
-        pixels.push(Pixel { mean: mean.map(|v| v as f32), class: Some(1), normal: [0.0, 0.0, 1.0] });
-        controls.extend(parts);
-    }
-    corrected(2, pixels, controls)
 }
 
 fn mean(estimates: &[[f64; 3]]) -> [f64; 3] {
@@ -108,28 +72,6 @@ fn coefficients_of_pixels_that_share_their_samples_are_biased() {
     let [w, ..] = runs_of_pixels(&sampler, 1_000_000, true);
     let z = z_test(w.mean(), Mixture::Table.value()[0], w.standard_error());
     assert!(z.p_value < level(), "{} {}", w.mean(), Mixture::Table.value()[0]);
-}
-
-#[test]
-fn groups_of_resampled_sets_are_unbiased_and_take_back_what_chance_gives_to_a_group() {
-    // Of `Occluded`, one light is hidden; in `Table`, parts of both, of which groups say little
-    for (mixture, most) in [(Mixture::Table, 1.03), (Mixture::Occluded, 0.6)] {
-        let (sampler, value) = (Sampler::new(mixture, 16, true), mixture.value());
-        for (pixels, sets) in [(1_000_000, (2, 3)), (50_000, (8, 1)), (50_000, (8, 3))] {
-            let name = format!("{mixture:?}, {} sets of {} draws", sets.0, sets.1);
-            let (mut squares, key) = ([0.0; 2], [43, sets.0 * 8 + sets.1, mixture as u32]);
-            let means = run(pixels / (EDGE * EDGE), key, |stream| {
-                let both = resampled(&sampler, sets, stream);
-                for (sum, estimates) in squares.iter_mut().zip(&both) {
-                    *sum += estimates.iter().map(|e| (e[0] - value[0]).powi(2)).sum::<f64>();
-                }
-                mean(&both[1])
-            });
-            assert_means(&name, &means, value);
-            let ratio = squares[1] / squares[0];
-            assert!(ratio < most, "{name}: {ratio}");
-        }
-    }
 }
 
 /// Variance of a pixel over that of MIS, in the first channel.

@@ -66,6 +66,7 @@ function zoom(factor, x, y) {
 function begin(next) {
   const isNew = !state || state.image !== next.image;
   state = next;
+  get("summary").textContent = state.summary ?? "";
   if (!isNew) return;
   [picture.width, picture.height] = [state.width, state.height];
   const chosen = layerChoice.selectedOptions[0]?.textContent;

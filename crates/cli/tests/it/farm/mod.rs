@@ -55,12 +55,12 @@ fn assert_success(output: &Output) {
 #[test]
 fn jobs_render_the_bits_of_the_image_at_once_in_any_folder_and_do_nothing_again() {
     let (root, folder) = queue();
-    let args = format!("{FARM} --integrator path --estimator ris --submit --sbatch --time=1:00:00");
+    let args = format!("{FARM} --integrator path --submit --sbatch --time=1:00:00");
     let output = farm(&args, &folder).output().unwrap();
     assert_success(&output);
     assert_eq!(String::from_utf8_lossy(&output.stdout), "plan: job 1\npart: job 2\nmerge: job 3\n");
     run(
-        "render GALLERY --resolution 40x36 --spp 7 -q --integrator path --estimator ris --plan image.farm/plan.json -o whole.exr",
+        "render GALLERY --resolution 40x36 --spp 7 -q --integrator path --plan image.farm/plan.json -o whole.exr",
         &folder,
     );
     assert_same("image.exr", "whole.exr", &folder, "merged by a queue");
@@ -70,11 +70,13 @@ fn jobs_render_the_bits_of_the_image_at_once_in_any_folder_and_do_nothing_again(
     assert!(calls[1].contains("--array=1-3") && calls[1].contains("--dependency=afterok:1 "), "{}", calls[1]);
     assert!(calls[2].contains("--dependency=afterok:2 "), "{}", calls[2]);
 
-    // Nothing is measured where the image is too small for the pilot of `auto`
-    let output = farm(&FARM.replace("image.exr", "small.exr --integrator path --submit"), &folder).output().unwrap();
+    // There are no trials where the estimator is named
+    let output = farm(&FARM.replace("image.exr", "small.exr --integrator path --estimator mis --submit"), &folder)
+        .output()
+        .unwrap();
     assert_success(&output);
     assert!(!folder.join("small.farm/plan.json").exists(), "{}", String::from_utf8_lossy(&output.stdout));
-    run("render GALLERY --resolution 40x36 --spp 7 -q --integrator path -o whole.exr", &folder);
+    run("render GALLERY --resolution 40x36 --spp 7 -q --integrator path --estimator mis -o whole.exr", &folder);
     assert_same("small.exr", "whole.exr", &folder, "without a plan");
 
     // Again
@@ -101,8 +103,13 @@ fn write_frames(folder: &Path) {
 /// Fails unless frames have the pixels of images rendered at once.
 fn assert_frames(folder: &Path, plan: &str) {
     for number in 1..=2 {
-        run(&format!("render shot.000{number}.pbrt -q {plan} -o whole.exr"), folder);
-        assert_same(&format!("out.000{number}.exr"), "whole.exr", folder, &format!("frame {number}"));
+        run(&format!("render shot.####.pbrt --frames {number} -q {plan} -o whole.####.exr"), folder);
+        assert_same(
+            &format!("out.000{number}.exr"),
+            &format!("whole.000{number}.exr"),
+            folder,
+            &format!("frame {number}"),
+        );
     }
 }
 
@@ -110,12 +117,12 @@ fn assert_frames(folder: &Path, plan: &str) {
 fn frames_have_jobs_of_their_own_and_those_that_are_merged_are_left_alone() {
     let (root, folder) = queue();
     write_frames(&folder);
-    let args = "farm slurm shot.####.pbrt --frames 1-2 --parts 2 --estimator ris -o out.####.exr";
+    let args = "farm slurm shot.####.pbrt --frames 1-2 --parts 2 -o out.####.exr";
     let output = farm(&format!("{args} --submit"), &folder).output().unwrap();
     assert_success(&output);
     let told = "plan: job 1\npart of frame 1: job 2\nmerge of frame 1: job 3\npart of frame 2: job 4\nmerge of frame 2: job 5\n";
     assert_eq!(String::from_utf8_lossy(&output.stdout), told);
-    assert_frames(&folder, "--estimator ris --plan out.farm/plan.json");
+    assert_frames(&folder, "--plan out.farm/plan.json");
     let calls = fs::read_to_string(root.path().join("calls")).unwrap();
     let calls: Vec<&str> = calls.lines().collect();
     for (i, words) in [(1, "--output=0001.%a.log --array=1-2 "), (3, "--dependency=afterok:1 "), (4, "afterok:4 ")] {
@@ -130,7 +137,7 @@ fn frames_have_jobs_of_their_own_and_those_that_are_merged_are_left_alone() {
     assert_success(&output);
     let told = "frame 1 is merged\npart of frame 2: job 6\nmerge of frame 2: job 7\n";
     assert_eq!(String::from_utf8_lossy(&output.stdout), told);
-    assert_frames(&folder, "--estimator ris --plan out.farm/plan.json");
+    assert_frames(&folder, "--plan out.farm/plan.json");
     let log = fs::read_to_string(folder.join("out.farm/log")).unwrap();
     assert!(log.contains("part 2 of 2 of frame 2 is complete"), "{log}");
 

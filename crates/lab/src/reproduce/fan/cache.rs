@@ -10,8 +10,8 @@ use super::Setup;
 use super::cases::LONG_TURNS;
 use super::report::{Asked, HEADER, method_json, method_row, summary, variances};
 use super::truth::{Errors, Truth};
+use lumiris::settings::OcvForm;
 use lumiris_numbers::estimators::mis::Heuristic;
-use lumiris_numbers::estimators::ocv::Form;
 use serde_json::{Value, json};
 use std::time::{Duration, Instant};
 
@@ -40,10 +40,8 @@ fn methods() -> Vec<(&'static str, Method)> {
     vec![
         ("mis, balance heuristic", of(Method::mis(SAMPLES).weighted(Heuristic::Balance))),
         ("mis, power heuristic", of(Method::mis(SAMPLES).weighted(Heuristic::Power))),
-        ("ocv, progressive", of(Method::ocv(Form::Progressive, SAMPLES))),
-        ("ocv, crossfit", of(Method::ocv(Form::Crossfit, SAMPLES))),
-        ("ocv, regression", of(Method::ocv(Form::Regression, SAMPLES))),
-        ("ocv, paper", of(Method::ocv(Form::Paper, SAMPLES))),
+        ("ocv, progressive", of(Method::ocv(OcvForm::Progressive, SAMPLES))),
+        ("ocv, paper", of(Method::ocv(OcvForm::Paper, SAMPLES))),
     ]
 }
 

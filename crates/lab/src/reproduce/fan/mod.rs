@@ -56,8 +56,8 @@ const STUDY: Study = Study {
          of a pixel are one well distributed set, which mis can use; progressive ocv cannot, since its coefficients \
          must be independent of the samples to which they are applied: it has one set for each of its blocks of 1, 1, \
          2, 4, … rays. Independent: all random numbers are.",
-        "Bias: mean luminance of the image over that of the reference, less 1, with its 95 % confidence interval. ocv in the forms paper and \
-         regression and direct optimal-mis are biased by design, as they fit and estimate with the same samples; all others are \
+        "Bias: mean luminance of the image over that of the reference, less 1, with its 95 % confidence interval. ocv in the form paper \
+         and direct optimal-mis are biased by design, as they fit and estimate with the same samples; all others are \
          not.",
         "Progressive ocv cannot improve the first camera ray of a pixel, for which it is mis; with four rays a quarter \
          of the variance is not reduced. The curves show the error with more rays.",

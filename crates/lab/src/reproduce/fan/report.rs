@@ -158,7 +158,7 @@ fn reason(o: &Outcome<'_>, way: usize) -> String {
             .map(|r| percent(o.errors[r.place(way)].relative(&o.errors[r.place(alike)])));
         return format!("against lights chosen alike: mis {mis}, ocv {ocv}");
     }
-    let others: Vec<String> = [Role::Crossfit, Role::Regression, Role::Paper, Role::Optimal, Role::Correlated]
+    let others: Vec<String> = [Role::Paper, Role::Optimal, Role::Correlated]
         .iter()
         .map(|&r| format!("{} {}", r.name(), percent(o.relative(r, way))))
         .collect();

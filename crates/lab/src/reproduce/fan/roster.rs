@@ -4,9 +4,8 @@
 
 use super::super::method::{Method, Points};
 use lumiris::lights::LightSamplerKind;
-use lumiris::settings::{OptimalForm, SampleCounts, Strata};
+use lumiris::settings::{OcvForm, OptimalForm, SampleCounts, Strata};
 use lumiris_numbers::estimators::mis::Heuristic;
-use lumiris_numbers::estimators::ocv::Form;
 
 /// Who takes part, in this order with each of the ways to draw samples.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -16,8 +15,6 @@ pub(super) enum Role {
     Power,
     /// What the target is about.
     Progressive,
-    Crossfit,
-    Regression,
     Paper,
     Optimal,
     OptimalDirect,
@@ -31,12 +28,10 @@ pub(super) enum Role {
 }
 
 /// All of them.
-pub(super) const ROLES: [Role; 12] = [
+pub(super) const ROLES: [Role; 10] = [
     Role::Balance,
     Role::Power,
     Role::Progressive,
-    Role::Crossfit,
-    Role::Regression,
     Role::Paper,
     Role::Optimal,
     Role::OptimalDirect,
@@ -99,8 +94,6 @@ impl Role {
             Role::Balance => "mis, balance heuristic",
             Role::Power => "mis, power heuristic",
             Role::Progressive => "ocv, progressive",
-            Role::Crossfit => "ocv, crossfit",
-            Role::Regression => "ocv, regression",
             Role::Paper => "ocv, paper",
             Role::Optimal => "optimal-mis, progressive",
             Role::OptimalDirect => "optimal-mis, direct",
@@ -114,11 +107,10 @@ impl Role {
     /// False if the expectation may differ from the truth.
     pub(super) fn is_unbiased(self) -> bool {
         match self {
-            Role::Regression | Role::Paper | Role::OptimalDirect | Role::Correlated => false,
+            Role::Paper | Role::OptimalDirect | Role::Correlated => false,
             Role::Balance
             | Role::Power
             | Role::Progressive
-            | Role::Crossfit
             | Role::Optimal
             | Role::Light
             | Role::Ris
@@ -131,16 +123,14 @@ impl Role {
         let method = match self {
             Role::Balance => Method::mis(n.samples).weighted(Heuristic::Balance),
             Role::Power => Method::mis(n.samples).weighted(Heuristic::Power),
-            Role::Progressive => Method::ocv(Form::Progressive, n.samples),
-            Role::Crossfit => Method::ocv(Form::Crossfit, n.samples),
-            Role::Regression => Method::ocv(Form::Regression, n.samples),
-            Role::Paper => Method::ocv(Form::Paper, n.samples),
+            Role::Progressive => Method::ocv(OcvForm::Progressive, n.samples),
+            Role::Paper => Method::ocv(OcvForm::Paper, n.samples),
             Role::Optimal => Method::optimal_mis(OptimalForm::Progressive, n.samples),
             Role::OptimalDirect => Method::optimal_mis(OptimalForm::Direct, n.samples),
             Role::Correlated => Method::correlated(n.samples),
             Role::Light => Method::mc(n.samples),
             Role::Ris => Method::ris(n.ris.proposals, n.ris.samples).strata(Strata::Systematic),
-            Role::EqualTime => Method::ocv(Form::Progressive, n.equal_time),
+            Role::EqualTime => Method::ocv(OcvForm::Progressive, n.equal_time),
         };
         method.lights_by(LightSamplerKind::Uniform).stratified()
     }

@@ -11,7 +11,7 @@ use super::super::verdicts::hardly_perceivable;
 use super::super::{Observer, ReproduceError, scaled};
 use super::{SHAPE, Setup};
 use lumiris::lights::LightSamplerKind;
-use lumiris::render::visibility_cache::build_visibility_cache;
+use lumiris::planning::visibility_cache::build_visibility_cache;
 use lumiris::settings::{SampleCounts, Strata, Target};
 use serde_json::{Value, json};
 use std::time::{Duration, Instant};

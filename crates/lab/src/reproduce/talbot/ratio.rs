@@ -14,7 +14,7 @@ use super::classes::{Classes, NAMES};
 use super::report::method_json;
 use super::scenes::Which;
 use super::{Setup, portrait};
-use lumiris::settings::{SampleCounts, StageTimes};
+use lumiris::settings::SampleCounts;
 use lumiris_numbers::estimators::ris::choice::{Costs, Variances, clamp_ratio, optimal_ratio};
 use serde_json::json;
 use std::time::{Duration, Instant};
@@ -98,8 +98,7 @@ impl Outcome {
 
     /// Times, and the time to spend on a point (ns).
     fn costs(&self) -> (Costs, f64) {
-        let StageTimes { t1, t2 } = self.calibration.times;
-        (Costs { t1, t2 }, self.calibration.budget)
+        (self.calibration.times, self.calibration.budget)
     }
 
     fn auto(&self) -> &Measured {

@@ -1,0 +1,214 @@
+//! What a whole frame costs per camera sample on one thread, and which part of that tracing by itself would cost: a bare
+//! Embree loop over exactly the rays that were traced, in their order, in packets of the width that is best for each
+//! kind.
+//!
+//! Whole batches, spread over the image, are rendered from the camera samples to the film. The renderer and the bare
+//! loop take turns.
+
+use lumiris::accel::RayBatch;
+use lumiris::accel::embree::EmbreeError;
+use lumiris::accel::embree::bare::{Bare, Packed};
+use lumiris::direct::Estimator;
+use lumiris::film::PixelSample;
+use lumiris::film::accumulator::PixelAccumulator;
+use lumiris::geometry::AlphaSource;
+use lumiris::integrators::path::{CameraSample, Recording};
+use lumiris::integrators::{PathStats, PathTracer, Tracer};
+use lumiris::render::RenderSettings;
+use lumiris::render::batches::Batches;
+use lumiris::scene::RenderJob;
+use lumiris_numbers::estimators::stats::median;
+use serde::Serialize;
+use std::hint::black_box;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+/// The cost of a frame.
+#[derive(Clone, Debug, Serialize)]
+pub struct FrameReport {
+    /// Camera samples of a turn.
+    pub camera_samples: usize,
+    /// Median time of the renderer per camera sample (ns).
+    pub ns_per_camera_sample: f64,
+    /// Median time of the bare loops per camera sample (ns).
+    pub bare_trace_ns_per_camera_sample: f64,
+    /// The second by the first.
+    pub tracing_share: f64,
+    /// Time of the stages per camera sample; what remains are camera rays' making and the film.
+    pub stages: Vec<FrameStage>,
+    /// The rays that were traced.
+    pub rays: Vec<BareRays>,
+    /// Nanoseconds per camera sample of each turn, of the renderer and of the bare loops.
+    pub turns: Vec<[f64; 2]>,
+}
+
+/// A stage of the renderer.
+#[derive(Clone, Debug, Serialize)]
+pub struct FrameStage {
+    /// Which.
+    pub name: &'static str,
+    /// Median time (ns per camera sample).
+    pub ns_per_camera_sample: f64,
+}
+
+/// Rays of one kind in the bare loop.
+#[derive(Clone, Debug, Serialize)]
+pub struct BareRays {
+    /// Kind of rays.
+    pub name: &'static str,
+    /// Rays per camera sample.
+    pub per_camera_sample: f64,
+    /// Rays per packet.
+    pub width: u32,
+    /// Time of the bare loop per ray (ns), median of the turns.
+    pub ns_per_ray: f64,
+}
+
+/// Batches of a kind, and how the bare loop traces them best.
+struct Kind<'a> {
+    name: &'static str,
+    batches: &'a [RayBatch],
+    is_occlusion: bool,
+    width: u32,
+    coherent: bool,
+}
+
+impl Kind<'_> {
+    fn rays(&self) -> usize {
+        self.batches.iter().map(RayBatch::len).sum()
+    }
+
+    /// Time of the bare loop over all rays, packing not included.
+    fn time(&self, bare: &Bare) -> Result<Duration, EmbreeError> {
+        let mut sum = Duration::ZERO;
+        for rays in self.batches {
+            let pack = if self.is_occlusion { Packed::any } else { Packed::first };
+            let mut packed = pack(rays, self.width)?;
+            let start = Instant::now();
+            bare.trace(&mut packed, self.coherent);
+            sum += start.elapsed();
+            black_box(&packed);
+        }
+        Ok(sum)
+    }
+
+    /// Chooses the width and the flag of the shortest time.
+    fn calibrate(&mut self, bare: &Bare) -> Result<(), EmbreeError> {
+        let mut best = (Duration::MAX, self.width, self.coherent);
+        for (width, coherent) in [(1, false), (4, false), (8, false), (16, false), (4, true), (8, true), (16, true)] {
+            (self.width, self.coherent) = (width, coherent);
+            let time = self.time(bare)?.min(self.time(bare)?);
+            if time < best.0 {
+                best = (time, width, coherent);
+            }
+        }
+        (self.width, self.coherent) = (best.1, best.2);
+        Ok(())
+    }
+}
+
+/// Measures `turns` turns of some `rays` camera samples.
+pub fn measure_frame(job: &RenderJob, tile_size: u32, rays: usize, turns: u32) -> Result<FrameReport, EmbreeError> {
+    let settings = RenderSettings { tile_size, spp: job.settings().sampling.spp, ..RenderSettings::default() };
+    let batches = Batches::new(job, &settings, rays);
+    let pixels = (0..batches.count()).map(|batch| batches.pixels(batch)).sum::<usize>();
+    let camera_samples = pixels * batches.samples_per_pixel();
+
+    let mut frame = Frame { job, batches, tracer: PathTracer::default(), samples: Vec::new(), results: Vec::new() };
+    frame.tracer.record();
+    frame.render();
+    let recording = frame.tracer.take_recording();
+    frame.tracer.take_stats();
+
+    let (geometry, textures) = (Arc::clone(&job.world.scene.geometry), Arc::clone(&job.world.scene.textures));
+    let bare = Bare::new(geometry, Some(textures as Arc<dyn AlphaSource>))?;
+    let mut kinds = kinds(&recording);
+    for kind in &mut kinds {
+        kind.calibrate(&bare)?;
+    }
+
+    let per_sample = |time: Duration| time.as_secs_f64() * 1e9 / camera_samples.max(1) as f64;
+    let mut stats: Vec<PathStats> = Vec::new();
+    let (mut both, mut of_kinds) = (Vec::new(), vec![Vec::new(); kinds.len()]);
+    for _ in 0..turns.max(1) {
+        let start = Instant::now();
+        frame.render();
+        let ours = start.elapsed();
+        stats.push(frame.tracer.take_stats());
+        let mut sum = Duration::ZERO;
+        for (kind, times) in kinds.iter().zip(&mut of_kinds) {
+            let time = kind.time(&bare)?;
+            sum += time;
+            times.push(time.as_secs_f64() * 1e9 / kind.rays().max(1) as f64);
+        }
+        both.push([per_sample(ours), per_sample(sum)]);
+    }
+    let [ours, traced] = [0, 1].map(|slot| median(both.iter().map(|turn| turn[slot])));
+    let stage = |name, of: &dyn Fn(&PathStats) -> Duration| FrameStage {
+        name,
+        ns_per_camera_sample: median(stats.iter().map(|s| per_sample(of(s)))),
+    };
+    Ok(FrameReport {
+        camera_samples,
+        ns_per_camera_sample: ours,
+        bare_trace_ns_per_camera_sample: traced,
+        tracing_share: traced / ours,
+        stages: vec![
+            stage("camera_rays", &|s| s.camera_time),
+            stage("bounce_rays", &|s| s.bounce_time),
+            stage("shade", &|s| s.shade_time),
+            stage("t1_propose", &|s| s.direct.t1),
+            stage("select_resolve", &|s| s.direct.select),
+            stage("t2_trace", &|s| s.direct.t2),
+        ],
+        rays: kinds
+            .iter()
+            .zip(&of_kinds)
+            .map(|(kind, times)| BareRays {
+                name: kind.name,
+                per_camera_sample: kind.rays() as f64 / camera_samples.max(1) as f64,
+                width: kind.width,
+                ns_per_ray: median(times.iter().copied()),
+            })
+            .collect(),
+        turns: both,
+    })
+}
+
+fn kinds(recording: &Recording) -> Vec<Kind<'_>> {
+    let kind = |name, batches, is_occlusion| Kind { name, batches, is_occlusion, width: 1, coherent: false };
+    let all = [
+        kind("camera_rays", &recording.camera[..], false),
+        kind("bounce_rays", &recording.bounces, false),
+        kind("segments", &recording.segments, true),
+        kind("bounce_segments", &recording.bounce_segments, true),
+    ];
+    all.into_iter().filter(|kind| kind.rays() > 0).collect()
+}
+
+/// The renderer on one thread, with its buffers.
+struct Frame<'a> {
+    job: &'a RenderJob,
+    batches: Batches<'a>,
+    tracer: PathTracer,
+    samples: Vec<CameraSample>,
+    results: Vec<PixelSample>,
+}
+
+impl Frame<'_> {
+    /// Renders the batches, from camera samples to sums of pixels.
+    fn render(&mut self) {
+        let integrator = &self.job.settings().integrator;
+        for batch in 0..self.batches.count() {
+            self.batches.camera_samples(batch, &mut self.samples);
+            let pixels = self.batches.pixels(batch);
+            let mut fits = Estimator::at_vertex(integrator, 0).fits(self.job, pixels);
+            self.tracer.trace(self.job, integrator, &self.samples, &mut fits, &mut self.results);
+            let mut sums = vec![PixelAccumulator::default(); pixels];
+            for (pixel, results) in sums.iter_mut().zip(self.results.chunks(self.batches.samples_per_pixel())) {
+                (0..).zip(results).for_each(|(index, result)| pixel.add(index, result));
+            }
+            black_box(&sums);
+        }
+    }
+}

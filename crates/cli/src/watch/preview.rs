@@ -1,0 +1,37 @@
+//! A first image before pilots take their time.
+
+use super::Canvas;
+use lumiris::film::Film;
+use lumiris::render::{Continuation, RenderError, RenderSettings, go_on};
+use lumiris::scene::RenderJob;
+use lumiris::settings::IntegratorKind;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+/// Time of the preview, at most; and as the inverse of a part of that of the image.
+const LONGEST: Duration = Duration::from_millis(500);
+const PART: u32 = 20;
+
+/// Shows tiles with a sample per pixel, as many as there is time for. They are not part of the image.
+pub(crate) fn preview(
+    canvas: &Arc<Canvas>,
+    (job, settings): (&RenderJob, &RenderSettings),
+    stop: &AtomicBool,
+) -> Result<(), RenderError> {
+    // Others have preparations that take longer
+    if !matches!(job.settings().integrator.kind, IntegratorKind::Direct | IntegratorKind::Path) {
+        return Ok(());
+    }
+    let (start, is_over) = (Instant::now(), AtomicBool::new(false));
+    let time = settings.time_limit.map_or(LONGEST, |limit| LONGEST.min(limit / PART));
+    let set_tile = |tile: &Film| {
+        canvas.set_tile(tile);
+        if start.elapsed() >= time || stop.load(Ordering::Relaxed) {
+            is_over.store(true, Ordering::Relaxed);
+        }
+    };
+    let first = RenderSettings { spp: 1, skip: 0, share: None, time_limit: None, ..*settings };
+    let watched = Continuation { watch: Some(&set_tile), ..Continuation::default() };
+    go_on(job, &first, &is_over, &|_| (), watched).map(drop)
+}

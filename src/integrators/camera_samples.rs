@@ -1,0 +1,211 @@
+//! Camera samples: places on the film with their rays and random numbers.
+
+use super::path::CameraSample;
+use super::{light_paths, reuse};
+use crate::cameras::CameraRay;
+use crate::direct::Estimator;
+use crate::film::filter::FilterSampler;
+use crate::scene::{PixelSamples, RenderJob};
+use crate::settings::{Proposals, SampleCounts};
+use lumiris_lanes::camera::{Pinhole, PinholeRays};
+use lumiris_lanes::columns::{Column, Columns3, padded, reserve};
+use lumiris_lanes::{level, sampler};
+use lumiris_numbers::estimators::ocv::block_of;
+use lumiris_numbers::math::hash::pcg4d;
+use lumiris_numbers::math::{Ray, Vec2, Vec3};
+use lumiris_numbers::samplers::{SampleStream, SamplerKind};
+use std::ops::Range;
+
+/// Domains of a camera sample.
+mod domain {
+    pub(super) const FILM_AND_LENS: u32 = 0;
+    pub(super) const TIME: u32 = 1;
+    pub(super) const SAMPLE_COUNTS: u32 = 2;
+}
+
+/// Seed of the blocks of progressive estimators.
+const BLOCK_SEED: u32 = 0x62_6c_6f_63;
+
+/// Makes camera samples.
+pub struct CameraSampler<'a> {
+    job: &'a RenderJob,
+    /// The first sample of the rendering.
+    first_sample: u32,
+    filter: FilterSampler,
+    /// Samples of pixels that have different numbers of them, and share camera paths or light paths.
+    shared: Option<&'a PixelSamples>,
+    /// False if the time of a ray does not matter.
+    has_motion: bool,
+    /// What makes many rays at once.
+    pinhole: Option<(Pinhole, Vec3)>,
+    direct: DirectNumbers,
+    /// Sample counts, unless chosen per pixel.
+    sample_counts: SampleCounts,
+}
+
+/// The random numbers of direct light.
+#[derive(Clone, Copy, Debug)]
+enum DirectNumbers {
+    /// Those of the camera sample.
+    Same,
+    /// Of this kind: estimators over pixels need those of a pixel to be independent of its neighbours'.
+    Kind(SamplerKind),
+    /// Those of a block of samples.
+    Blocks,
+}
+
+/// Memory for many samples at once.
+#[derive(Debug, Default)]
+pub struct Scratch {
+    /// Fit, pixel and index of each sample.
+    places: Vec<(u32, [u32; 2], u32)>,
+    streams: Vec<SampleStream>,
+    drawn: Vec<SampleStream>,
+    u: [Column; 2],
+    weight: Column,
+    d: Columns3,
+    spread: Column,
+}
+
+impl<'a> CameraSampler<'a> {
+    /// Of an image whose first sample has this index.
+    pub fn new(job: &'a RenderJob, first_sample: u32) -> Self {
+        let scene = &job.world.scene;
+        let has_motion = scene.geometry.has_motion() || scene.camera.is_moving();
+        let pinhole = if has_motion { None } else { scene.camera.pinhole() };
+        let settings = job.settings();
+        let estimator = Estimator::at_vertex(&settings.integrator, 0);
+        let direct = if estimator.is_over_pixels() && settings.sampling.sampler == SamplerKind::SobolBlueNoise {
+            DirectNumbers::Kind(SamplerKind::Sobol)
+        } else if estimator.is_progressive() {
+            DirectNumbers::Blocks
+        } else {
+            DirectNumbers::Same
+        };
+        let (filter, sample_counts) = (scene.film.filter.sampler(), settings.integrator.sample_counts());
+        let shared = job.pixel_samples.as_ref().filter(|_| reuse::edge(job) > 1 || light_paths::per_sample(job) > 0.0);
+        CameraSampler { job, first_sample, shared, filter, has_motion, pinhole, direct, sample_counts }
+    }
+
+    /// Appends samples of some pixels, each with a range of its own and given with the fits of its samples.
+    pub fn samples(
+        &self,
+        pixels: impl Iterator<Item = (u32, [u32; 2], Range<u32>)>,
+        seed: u32,
+        scratch: &mut Scratch,
+        out: &mut Vec<CameraSample>,
+    ) {
+        let Some((pinhole, o)) = &self.pinhole else {
+            for (fit, pixel, samples) in pixels {
+                out.extend(samples.map(|sample| CameraSample { fit, ..self.sample(pixel, sample, seed) }));
+            }
+            return;
+        };
+        let Scratch { places, streams, drawn, u: [x, y], weight, d, spread } = scratch;
+        let kind = self.job.settings().sampling.sampler;
+        places.clear();
+        streams.clear();
+        drawn.clear();
+        for (fit, pixel, samples) in pixels {
+            for sample in samples {
+                let stream = SampleStream::new(kind, pixel, sample, seed);
+                places.push((fit, pixel, sample));
+                streams.push(stream);
+                drawn.push(stream.domain(domain::FILM_AND_LENS));
+            }
+        }
+
+        let n = places.len();
+        let len = padded(n);
+        reserve(&mut [x, y, weight, spread], len);
+        d.reserve(len);
+        sampler::draw(level(), drawn, [&mut x[..n], &mut y[..n]]);
+        for (((_, pixel, _), weight), (x, y)) in places.iter().zip(&mut *weight).zip(x.iter_mut().zip(&mut *y)) {
+            let filter = self.filter.sample([*x, *y]);
+            let film = center(*pixel) + filter.offset;
+            (*x, *y, *weight) = (film.x, film.y, filter.weight);
+        }
+        let mut rays = PinholeRays { d: d.get_mut(len), spread: &mut spread[..len] };
+        pinhole.rays(level(), [&x[..len], &y[..len]], &mut rays);
+
+        let scene = &self.job.world.scene;
+        let (time, scale) = (scene.camera.time(0.0), scene.film.scale);
+        out.extend(places.iter().zip(&*streams).enumerate().map(|(i, (&(fit, pixel, sample), &stream))| {
+            let ray = Ray { o: *o, d: d.vec3(i), t_max: f32::INFINITY, time };
+            CameraSample {
+                ray: CameraRay { ray, spread: spread[i], width0: 0.0, weight: 1.0 },
+                weight: weight[i] * scale,
+                stream,
+                direct: self.direct_stream(pixel, sample, seed).unwrap_or(stream),
+                sample_counts: self.chosen_counts(pixel, &stream).unwrap_or(self.sample_counts),
+                turn: self.turn(pixel, sample),
+                fit,
+                pixel,
+                is_replica: false,
+            }
+        }));
+    }
+
+    /// One sample. The direct light of a progressive estimator is drawn block by block, each with a seed of its own.
+    pub fn sample(&self, pixel: [u32; 2], sample: u32, seed: u32) -> CameraSample {
+        let of_seed = self.sample_of_seed(pixel, sample, seed);
+        CameraSample { direct: self.direct_stream(pixel, sample, seed).unwrap_or(of_seed.stream), ..of_seed }
+    }
+
+    /// One sample, whose direct light belongs to no block.
+    pub fn sample_of_seed(&self, pixel: [u32; 2], sample: u32, seed: u32) -> CameraSample {
+        let (scene, settings) = (&self.job.world.scene, self.job.settings());
+        let stream = SampleStream::new(settings.sampling.sampler, pixel, sample, seed);
+        let [fx, fy, lx, ly] = stream.domain(domain::FILM_AND_LENS).draw::<4>();
+        let [u_time] = if self.has_motion { stream.domain(domain::TIME).draw::<1>() } else { [0.0] };
+        let filter = self.filter.sample([fx, fy]);
+        let ray = scene.camera.ray(center(pixel) + filter.offset, [lx, ly], u_time);
+        CameraSample {
+            ray,
+            weight: filter.weight * ray.weight * scene.film.scale,
+            stream,
+            direct: stream,
+            sample_counts: self.chosen_counts(pixel, &stream).unwrap_or(self.sample_counts),
+            turn: self.turn(pixel, sample),
+            fit: 0,
+            pixel,
+            is_replica: false,
+        }
+    }
+
+    /// Which samples of neighbouring pixels may share its path, and which light paths it has.
+    #[inline]
+    fn turn(&self, pixel: [u32; 2], sample: u32) -> u32 {
+        self.shared.map_or(sample, |of_pixels| {
+            self.first_sample.wrapping_add(of_pixels.turn(pixel, sample.wrapping_sub(self.first_sample)))
+        })
+    }
+
+    /// The random numbers of direct light, if they are those of a block.
+    #[inline]
+    fn direct_stream(&self, pixel: [u32; 2], sample: u32, seed: u32) -> Option<SampleStream> {
+        match self.direct {
+            DirectNumbers::Same => None,
+            DirectNumbers::Kind(kind) => Some(SampleStream::new(kind, pixel, sample, seed)),
+            DirectNumbers::Blocks => {
+                let block = block_of(sample - self.first_sample);
+                let block_seed = pcg4d([seed, self.first_sample, block.index, BLOCK_SEED])[0];
+                let index = sample - self.first_sample - block.first;
+                Some(SampleStream::new(self.job.settings().sampling.sampler, pixel, index, block_seed))
+            }
+        }
+    }
+
+    /// Sample counts, if they are chosen per pixel.
+    #[inline]
+    fn chosen_counts(&self, pixel: [u32; 2], stream: &SampleStream) -> Option<SampleCounts> {
+        let map = self.job.sample_count_map.as_ref()?;
+        let is_chosen = self.job.settings().integrator.ris.proposals == Proposals::Optimal;
+        is_chosen.then(|| map.sample_counts(pixel, stream.domain(domain::SAMPLE_COUNTS).draw::<2>()))
+    }
+}
+
+/// The centre of a pixel.
+fn center(pixel: [u32; 2]) -> Vec2 {
+    Vec2::new(pixel[0] as f32 + 0.5, pixel[1] as f32 + 0.5)
+}

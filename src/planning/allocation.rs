@@ -1,0 +1,433 @@
+//! Camera samples where they lower the error most: more for pixels of more noise, fewer for expensive ones.
+//!
+//! The relative error of an image is Σ v_p/n_p over pixels of relative variance v_p with n_p samples. For a given time
+//! Σ c_p n_p, where c_p is the cost of a sample, it is least for n_p ∝ √(v_p/c_p). Both come from a *pilot*: a few samples
+//! per pixel with random numbers of their own. So n_p is independent of the samples of the image, and the mean of a
+//! pixel's samples remains unbiased: were n_p to follow from the very samples that are averaged, pixels whose first samples
+//! happen to be dark would stay dark.
+//!
+//! What visible lights make of v_p is known from more samples than the rest, which see nothing but these lights and so cost
+//! little: it lies in few pixels, those at the edges. The rest is averaged over neighbours. In the image, too, samples may
+//! see lights by more camera rays than become paths (`render::looks`): as many as their own variance and cost ask for, as if they
+//! were independent. Of those of nets fewer would do for the relative error, which falls by 5 % then; the absolute one triples.
+//!
+//! What is gained is estimated from the pilot, too, by one half of the pixels with numbers from the other half: where noise is much the same everywhere, as in most paths of many bounces, numbers remain uniform.
+//!
+//! The numbers depend on scene, settings and seed only; costs are counted in rays and proposals and not in seconds.
+
+use super::allocation_counts::{ALONE, Pixel, Rules, SHARED, Share, counts};
+use super::constants::{
+    COST_TILE, EDGE_RATIO, FEW_PIXELS, LOOK_COST, MAX_SPP_FOR_NOISE, PILOT_SPP, SIGHT_OF_EDGES, SIGHT_PART,
+    SIGHT_RADIUS, SIGHT_SPP, TILES_AT_ONCE,
+};
+use super::noise::counts_for;
+use super::preparation::{PlanError, Preparation, Stage};
+use super::probe::{LeftToLightPaths, Probe, around};
+use crate::direct::Estimator;
+use crate::film::accumulator::PixelAccumulator;
+use crate::film::{FeatureSet, PixelBounds, PixelSample, PixelSums};
+use crate::imaging::metrics::difference::DEFAULT_EPSILON;
+use crate::integrators::reuse;
+use crate::scene::{PixelSamples, RenderJob};
+use crate::settings::{Allocation, IntegratorSettings, MIN_ADAPTIVE_SPP, SamplingSettings, Settings};
+use lumiris_numbers::math::hash::{pcg4d, unit_f32};
+use lumiris_numbers::math::luminance;
+use rayon::prelude::*;
+use std::collections::BTreeMap;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// Combined with the seed of the image to give that of the pilot.
+const PILOT_SEED: u32 = 0x61_6c_6c_6f;
+
+/// The camera samples of each pixel, if the settings ask for different numbers and allow them.
+pub(super) fn allocate(job: &RenderJob, how: &Preparation<'_>) -> Result<Option<PixelSamples>, PlanError> {
+    let settings = job.settings();
+    if let Some(noise) = settings.sampling.noise.filter(|_| settings.allows_adaptive()) {
+        return counts_for(job, noise, how).map(Some);
+    }
+    let is_short = settings.sampling.pilot_spp() < MIN_ADAPTIVE_SPP;
+    if settings.allocation() != Allocation::Adaptive || !settings.allows_adaptive() || is_short {
+        return Ok(None);
+    }
+    let mut pilot = Pilot::new(job, how);
+    let spp = settings.sampling.spp;
+    pilot.measure();
+    let (counts, looks) = counts(&pilot.known(|_| true, &[0, 1]), (&pilot.rules, spp));
+    let is_better = pilot.gain(spp) >= pilot.rules.min_gain;
+    how.goes_on()?;
+    Ok(is_better.then_some(PixelSamples { bounds: pilot.bounds, spp, counts, looks }))
+}
+
+/// Completes settings that ask for a standard error: its maximum number of samples per pixel, unless `has_spp`. `Err` says what it
+/// needs.
+pub fn complete_for_noise(settings: &mut Settings, has_spp: bool) -> Result<(), &'static str> {
+    if settings.sampling.noise.is_none() {
+        return Ok(());
+    }
+    if !has_spp {
+        settings.sampling.spp = MAX_SPP_FOR_NOISE;
+    }
+    let enough = SamplingSettings { spp: MIN_ADAPTIVE_SPP, ..settings.sampling };
+    if settings.allows_adaptive() {
+        Ok(())
+    } else if (Settings { sampling: enough, ..*settings }).allows_adaptive() {
+        Err("needs 8 samples per pixel at least (--spp)")
+    } else {
+        Err("needs the integrator direct or path, and an estimator that does not fit blocks of samples")
+    }
+}
+
+/// True if samples of an image that is rendered with the settings `of_paths` may be split: their looks have the noise of visible
+/// lights then.
+pub(super) fn may_split(settings: &Settings, of_paths: &IntegratorSettings) -> bool {
+    let sampling = settings.sampling;
+    let is_open = sampling.allocation != Allocation::Uniform || sampling.noise.is_some();
+    is_open && Settings { integrator: *of_paths, sampling }.allows_adaptive()
+}
+
+/// What a pilot's samples of a pixel say, in few bytes: a pilot has all pixels of an image at once.
+#[derive(Clone, Copy, Debug, Default)]
+struct Measured {
+    count: u32,
+    /// Σ of the samples without what they see of visible lights.
+    radiance: [f32; 3],
+    /// Variance of these; 0 of fewer than two.
+    variance: [f32; 3],
+    /// Mean of what samples see of visible lights.
+    sight: [f32; 3],
+    /// Variance of that from each of two sets of samples.
+    sight_variance: [[f32; 3]; 2],
+    /// Cost of a sample, and of one that sees visible lights alone; 0 where nothing was measured.
+    cost: f32,
+    look: f32,
+    /// Material of the first surface, or [`NO_MATERIAL`].
+    material: u32,
+}
+
+/// The material of pixels that see no surface.
+const NO_MATERIAL: u32 = u32::MAX;
+
+impl Measured {
+    fn of(samples: &PixelAccumulator, sight: &Sight, [cost, look]: [f64; 2]) -> Self {
+        let sums = samples.sums();
+        let [a, b] = sight.sets.each_ref().map(PixelAccumulator::sums);
+        Measured {
+            count: sums.count as u32,
+            radiance: sums.radiance.map(|x| x as f32),
+            variance: variance(&sums).map(|v| v as f32),
+            sight: std::array::from_fn(|c| {
+                ((a.radiance[c] + b.radiance[c]) / (a.count + b.count).max(1) as f64) as f32
+            }),
+            sight_variance: [a, b].map(|sums| variance(&sums).map(|v| v as f32)),
+            cost: cost as f32,
+            look: look as f32,
+            material: sight.material,
+        }
+    }
+
+    /// The variance of what samples see of visible lights, by some of the sets.
+    fn mean_sight_variance(&self, sets: &[usize]) -> [f64; 3] {
+        let of = |c: usize| sets.iter().map(|&k| f64::from(self.sight_variance[k][c])).sum::<f64>() / sets.len() as f64;
+        [0, 1, 2].map(of)
+    }
+}
+
+/// Σ over channels.
+fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
+    a.into_iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
+/// What samples see that go no further than the first surface.
+struct Sight {
+    sets: [PixelAccumulator; 2],
+    material: u32,
+}
+
+/// The variance of a sample.
+fn variance(sums: &PixelSums) -> [f64; 3] {
+    sums.variance_of_mean().map(|v| v * sums.count as f64)
+}
+
+/// A few samples of the pixels, or of some of them.
+struct Pilot<'a> {
+    job: &'a RenderJob,
+    stage: Stage<'a>,
+    stop: &'a AtomicBool,
+    sampling: PilotSampling,
+    rules: Rules,
+    left: LeftToLightPaths,
+    bounds: PixelBounds,
+    /// Row by row.
+    pixels: Vec<Measured>,
+}
+
+#[derive(Clone, Copy)]
+struct PilotSampling {
+    /// Samples of a pixel.
+    spp: u32,
+    /// Part of the pixels that have them.
+    fraction: f32,
+    seed: u32,
+    /// Edge of the blocks of pixels that have them together, and share paths.
+    edge: u32,
+    /// Samples of each of two sets that see visible lights alone.
+    sight: u32,
+}
+
+impl<'a> Pilot<'a> {
+    /// Without samples.
+    fn new(job: &'a RenderJob, how: &'a Preparation<'a>) -> Self {
+        let (sampling, edge) = (&job.settings().sampling, reuse::edge(job));
+        let rules = if edge > 1 { SHARED } else { ALONE };
+        let wanted = rules.fraction * f64::from(sampling.pilot_spp());
+        let spp = (wanted.round() as u32).clamp(PILOT_SPP[0], PILOT_SPP[1]);
+        let sampling = PilotSampling {
+            spp,
+            fraction: (wanted / f64::from(spp)) as f32,
+            seed: pcg4d([sampling.seed, PILOT_SEED, 0, 0])[0],
+            edge,
+            sight: (sampling.pilot_spp() / SIGHT_PART).clamp(SIGHT_SPP[0], SIGHT_SPP[1]),
+        };
+        let bounds = job.world.scene.film.bounds;
+        let pixels = vec![Measured::default(); bounds.area()];
+        let stage = Stage::new(how, "measuring where the noise is", bounds.tiles(COST_TILE).len());
+        Pilot { job, stage, stop: how.stop, sampling, rules, left: LeftToLightPaths::new(job, how), bounds, pixels }
+    }
+
+    /// Samples the tiles whose numbers are chosen. Tiles with the same remainder lie on lattices.
+    fn measure(&mut self) {
+        let tiles = self.bounds.tiles(COST_TILE);
+        let features = if self.rules.radius.is_none() { FeatureSet::NoAlbedo } else { FeatureSet::None };
+        let probe = || Probe::new(self.job, &self.left, features);
+        let of_tile = |probe: &mut _, tile: &PixelBounds| {
+            let is_over = self.stop.load(Ordering::Relaxed);
+            let measured = if is_over { Vec::new() } else { pilot_tile(self.job, probe, tile, self.sampling) };
+            self.stage.add(1);
+            measured
+        };
+        for tiles in tiles.chunks(TILES_AT_ONCE) {
+            let measured: Vec<_> = tiles.par_iter().map_init(probe, of_tile).collect();
+            for (tile, measured) in tiles.iter().zip(measured) {
+                for ([x, y], measured) in tile.pixels().zip(measured) {
+                    let row = (y - self.bounds.y0) as usize * self.bounds.width() as usize;
+                    self.pixels[row + (x - self.bounds.x0) as usize] = measured;
+                }
+            }
+        }
+    }
+
+    /// The pixels up to `radius` away in each direction.
+    fn around(&self, i: usize, radius: usize) -> impl Iterator<Item = usize> + use<> {
+        around(i, (self.bounds.width() as usize, self.bounds.height() as usize), radius)
+    }
+
+    /// 1/(m² + ε) of each channel; m is the mean of what a pixel sees of visible lights, and of the rest of its neighbours.
+    fn relative_to(&self, i: usize) -> [f64; 3] {
+        self.relative_beside(i, self.pixels[i].sight.map(f64::from))
+    }
+
+    /// The same beside visible lights of this radiance.
+    fn relative_beside(&self, i: usize, sight: [f64; 3]) -> [f64; 3] {
+        let (mut sum, mut count) = ([0.0; 3], 0);
+        for q in self.around(i, self.rules.mean_radius).map(|q| &self.pixels[q]) {
+            count += q.count;
+            (0..3).for_each(|c| sum[c] += f64::from(q.radiance[c]));
+        }
+        std::array::from_fn(|c| {
+            let mean = sight[c] + sum[c] / f64::from(count.max(1));
+            1.0 / (mean * mean + DEFAULT_EPSILON)
+        })
+    }
+
+    /// Relative variance of a sample without visible lights, added up over channels. `None` where it is not known.
+    fn relative_variance(&self, i: usize) -> Option<f64> {
+        let p = &self.pixels[i];
+        let of_channels = self.relative_to(i).into_iter().zip(p.variance);
+        (p.count >= 2).then(|| of_channels.map(|(relative, v)| relative * f64::from(v)).sum())
+    }
+
+    /// The same of visible lights, by some of the sets of samples.
+    fn of_sight(&self, i: usize, sets: &[usize]) -> f64 {
+        let variance = self.pixels[i].mean_sight_variance(sets);
+        if variance == [0.0; 3] { 0.0 } else { dot(variance, self.relative_to(i)) }
+    }
+
+    /// What is known of each pixel: the relative variance, averaged over the chosen ones of the neighbours or of all pixels of
+    /// the material, and that of visible lights by some of the sets of samples.
+    fn known(&self, is_chosen: impl Fn(usize) -> bool + Sync, sets: &[usize]) -> Vec<Pixel> {
+        let known = |i: usize| self.relative_variance(i).filter(|_| is_chosen(i));
+        let rest = match self.rules.radius {
+            Some(radius) => {
+                // Σ over neighbours, and their number
+                let terms = (0..self.bounds.area()).into_par_iter().map(|i| known(i).map_or([0.0; 2], |v| [v, 1.0]));
+                box_sums(terms.collect(), self.bounds.width() as usize, radius)
+            }
+            None => self.of_materials(known),
+        };
+        // Few pixels may have no sample of a tile among them
+        let (sum, count) =
+            self.pixels.iter().filter(|p| p.cost > 0.0).fold((0.0, 0), |(sum, n), p| (sum + f64::from(p.cost), n + 1));
+        let mean = (sum / f64::from(count.max(1))) as f32;
+        let of_pixel = |(i, [sum, count]): (usize, [f64; 2])| {
+            let Measured { cost, look, .. } = self.pixels[i];
+            let cost = if cost == 0.0 && look > 0.0 { mean } else { cost };
+            let rest = (sum.max(0.0) / count.max(1.0)) as f32;
+            Pixel { rest, sight: self.of_sight_around(i, sets) as f32, cost, look }
+        };
+        rest.into_par_iter().enumerate().map(of_pixel).collect()
+    }
+
+    /// Σ of what is known of pixels of the same first material, and their number: near the mean of all where they are few.
+    fn of_materials(&self, known: impl Fn(usize) -> Option<f64>) -> Vec<[f64; 2]> {
+        let (mut all, mut of_material) = ([0.0; 2], BTreeMap::<u32, [f64; 2]>::new());
+        for (i, pixel) in self.pixels.iter().enumerate() {
+            let Some(v) = known(i) else { continue };
+            for sums in [&mut all, of_material.entry(pixel.material).or_default()] {
+                *sums = [sums[0] + v, sums[1] + 1.0];
+            }
+        }
+        let mean = all[0] / all[1].max(1.0);
+        let with_mean = |[sum, count]: [f64; 2]| [sum + FEW_PIXELS * mean, count + FEW_PIXELS];
+        let of = |pixel: &Measured| with_mean(of_material.get(&pixel.material).copied().unwrap_or_default());
+        self.pixels.iter().map(of).collect()
+    }
+
+    /// The relative variance of visible lights that a pixel has, or its neighbours together: a few samples do not see the
+    /// edge of a light in all pixels that it touches.
+    fn of_sight_around(&self, i: usize, sets: &[usize]) -> f64 {
+        let (mut variance, mut sight, mut count) = ([0.0; 3], [0.0; 3], 0.0);
+        for q in self.around(i, SIGHT_RADIUS).map(|q| &self.pixels[q]) {
+            let of_pixel = q.mean_sight_variance(sets);
+            (0..3).for_each(|c| {
+                variance[c] += of_pixel[c];
+                sight[c] += f64::from(q.sight[c]);
+            });
+            count += 1.0;
+        }
+        if variance == [0.0; 3] {
+            return 0.0;
+        }
+        let of_all = dot(variance, self.relative_beside(i, sight.map(|s| s / count))) / count;
+        of_all.max(self.of_sight(i, sets))
+    }
+
+    /// By how much the numbers lower error × cost: of half of the pixels, with numbers that follow from the other half, and
+    /// of visible lights by one set of samples with numbers that follow from the other. Where pixels share paths, the
+    /// geometric mean for the relative and for the absolute error, which is nearly all at edges of visible lights.
+    fn gain(&self, spp: u32) -> f64 {
+        let width = self.bounds.width() as usize;
+        let is_even = |i: usize| (i % width + i / width).is_multiple_of(2);
+        let (counts, looks) = counts(&self.known(is_even, &[0]), (&self.rules, spp));
+        let (mut uniform, mut adaptive) = ([0.0; 3], [0.0; 3]);
+        for i in (0..counts.len()).filter(|&i| !is_even(i)) {
+            let Some(relative) = self.relative_variance(i) else { continue };
+            let p = &self.pixels[i];
+            let [rest, sight] = [p.variance, p.sight_variance[1]].map(|v| v.iter().map(|v| f64::from(*v)).sum::<f64>());
+            let share = Share { samples: f64::from(counts[i]) / f64::from(spp), looks: looks[i] };
+            for (sums, share) in [(&mut uniform, Share::ONE), (&mut adaptive, share)] {
+                let known = |rest: f64, sight: f64| Pixel {
+                    rest: rest as f32,
+                    sight: sight as f32,
+                    cost: p.cost,
+                    look: p.look,
+                };
+                let [relative, cost] = share.of(&known(relative, self.of_sight(i, &[1])));
+                let [absolute, _] = share.of(&known(rest, sight));
+                sums.iter_mut().zip([relative, absolute, cost]).for_each(|(sum, term)| *sum += term);
+            }
+        }
+        let [relative, absolute, cost] = [0, 1, 2].map(|k| uniform[k] / adaptive[k]);
+        let gain = cost * if self.rules.doubles { (relative * absolute).sqrt() } else { relative };
+        if gain.is_finite() { gain } else { 1.0 }
+    }
+}
+
+/// Σ over the neighbours up to `radius` away in each direction, in rows of so many.
+fn box_sums(mut values: Vec<[f64; 2]>, width: usize, radius: usize) -> Vec<[f64; 2]> {
+    let sums_of = |line: &[[f64; 2]]| -> Vec<[f64; 2]> {
+        let prefix: Vec<[f64; 2]> = std::iter::once([0.0; 2])
+            .chain(line.iter().scan([0.0; 2], |sum, v| {
+                *sum = [sum[0] + v[0], sum[1] + v[1]];
+                Some(*sum)
+            }))
+            .collect();
+        let sum = |i: usize| {
+            let (from, to) = (prefix[i.saturating_sub(radius)], prefix[(i + radius + 1).min(line.len())]);
+            [to[0] - from[0], to[1] - from[1]]
+        };
+        (0..line.len()).map(sum).collect()
+    };
+    let height = values.len() / width.max(1);
+    values.par_chunks_mut(width.max(1)).for_each(|row| row.copy_from_slice(&sums_of(row)));
+    let columns: Vec<Vec<[f64; 2]>> = (0..width)
+        .into_par_iter()
+        .map(|x| sums_of(&(0..height).map(|y| values[y * width + x]).collect::<Vec<_>>()))
+        .collect();
+    (0..values.len()).into_par_iter().map(|i| columns[i % width][i / width]).collect()
+}
+
+/// What the pilot's samples in a tile say.
+fn pilot_tile(
+    job: &RenderJob,
+    probe: &mut Probe<'_>,
+    tile: &PixelBounds,
+    PilotSampling { spp, fraction, seed, edge, sight: sight_spp }: PilotSampling,
+) -> Vec<Measured> {
+    let settings = &Estimator::without_fits(&job.settings().integrator, 0);
+    let origin = job.world.scene.film.bounds;
+    let seeing = &IntegratorSettings { max_depth: 0, ..*settings };
+    let is_chosen = |[x, y]: &[u32; 2]| {
+        let [x, y] = [(x - origin.x0) / edge, (y - origin.y0) / edge];
+        unit_f32(pcg4d([x, y, PILOT_SEED, 1])[0]) < fraction
+    };
+    let all: Vec<[u32; 2]> = tile.pixels().collect();
+    let (places, chosen): (Vec<usize>, Vec<[u32; 2]>) = (0..).zip(&all).filter(|(_, pixel)| is_chosen(pixel)).unzip();
+    let mut seen = Vec::with_capacity(chosen.len() * spp as usize);
+    probe.trace(seeing, &chosen, (0..spp, seed), |_, sample| seen.push(sample.radiance));
+    probe.take_cost(0);
+    let mut sums = vec![PixelAccumulator::default(); all.len()];
+    let mut seen = seen.into_iter();
+    probe.trace(settings, &chosen, (0..spp, seed), |i, sample| {
+        let radiance = sample.radiance - seen.next().unwrap_or_default();
+        sums[places[i]].add(0, &PixelSample { radiance, ..PixelSample::default() });
+    });
+    let cost = probe.take_cost(chosen.len() * spp as usize);
+    let sight = see(probe, seeing, (&all, tile.width() as usize), (sight_spp, seed));
+    let looks: u64 = sight.iter().flat_map(|sight| &sight.sets).map(|sums| u64::from(sums.radiance.count)).sum();
+    let costs = [cost, LOOK_COST * probe.take_cost(looks as usize)];
+    sums.iter().zip(&sight).map(|(samples, sight)| Measured::of(samples, sight, costs)).collect()
+}
+
+/// Two sets of samples that see visible lights alone, at pixels in rows of the given width: more for pixels beside which these differ.
+fn see(
+    probe: &mut Probe<'_>,
+    settings: &IntegratorSettings,
+    (pixels, width): (&[[u32; 2]], usize),
+    (spp, seed): (u32, u32),
+) -> Vec<Sight> {
+    let none = || Sight { sets: <[PixelAccumulator; 2]>::default(), material: NO_MATERIAL };
+    let mut sums: Vec<Sight> = std::iter::repeat_with(none).take(pixels.len()).collect();
+    let seeds = [1, 2].map(|set| pcg4d([seed, PILOT_SEED, 0, set])[0]);
+    let mut add = |places: &[usize], samples: std::ops::Range<u32>| {
+        let some: Vec<[u32; 2]> = places.iter().map(|&i| pixels[i]).collect();
+        for (set, seed) in seeds.into_iter().enumerate() {
+            probe.trace(settings, &some, (samples.clone(), seed), |i, sample| {
+                let sight = &mut sums[places[i]];
+                sight.sets[set].add(0, sample);
+                sight.material = sample.features.as_ref().map_or(sight.material, |features| features.material);
+            });
+        }
+        let luminance = |sums: &PixelAccumulator| luminance(sums.radiance.values());
+        sums.iter().map(|sight| sight.sets.each_ref().map(luminance)).collect::<Vec<_>>()
+    };
+    let all: Vec<usize> = (0..pixels.len()).collect();
+    let first = add(&all, 0..spp);
+    let differs = |i: &usize| {
+        let around = around(*i, (width, pixels.len() / width), 1).flat_map(|q| first[q]);
+        let (low, high) = around.fold((f64::INFINITY, 0.0), |(a, b), v| (v.min(a), v.max(b)));
+        high > EDGE_RATIO * low
+    };
+    let edges: Vec<usize> = all.iter().copied().filter(differs).collect();
+    add(&edges, spp..SIGHT_OF_EDGES * spp);
+    sums
+}

@@ -1,0 +1,289 @@
+//! How many camera samples pixels get, and how many looks each of these, from the variance and the cost of both.
+
+use super::constants::{BISECTIONS, CHUNK, ITERATIONS, MAX_LOOKS, MIN_SPLIT, RANGE};
+use rayon::prelude::*;
+
+/// What numbers follow from.
+#[derive(Clone, Copy)]
+pub(super) struct Rules {
+    /// Samples of the pilot as a fraction of those of the image.
+    pub(super) fraction: f64,
+    /// Pixels to each side over which means are averaged.
+    pub(super) mean_radius: usize,
+    /// The same of variances; `None`: over all pixels of a material.
+    pub(super) radius: Option<usize>,
+    /// True if pixels have this number of samples or twice, 4 times or 8 times as many.
+    pub(super) doubles: bool,
+    /// Gain below which numbers remain uniform.
+    pub(super) min_gain: f64,
+}
+
+/// Where pixels have paths of their own.
+pub(super) const ALONE: Rules =
+    Rules { fraction: 0.05, mean_radius: 1, radius: Some(2), doubles: false, min_gain: 1.05 };
+/// Where they share them: few samples do not tell what is left of the noise of one pixel from that of others, so numbers
+/// follow from visible lights, whose edges gain nothing by sharing, and from materials: metal and glass share nothing
+/// either. All others have as many samples as each other, so that they share all of their paths.
+pub(super) const SHARED: Rules = Rules { fraction: 0.025, mean_radius: 4, radius: None, doubles: true, min_gain: 1.03 };
+
+/// What is known of a pixel.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Pixel {
+    /// Relative variance of a sample without visible lights.
+    pub(super) rest: f32,
+    /// Relative variance of what a sample sees of visible lights.
+    pub(super) sight: f32,
+    /// Cost of a sample.
+    pub(super) cost: f32,
+    /// Cost of a look.
+    pub(super) look: f32,
+}
+
+/// What a pixel gets.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Share {
+    /// Samples, relative to the mean.
+    pub(super) samples: f64,
+    /// Looks of each, its own included.
+    pub(super) looks: u8,
+}
+
+impl Share {
+    /// That of all pixels of an image whose samples are not distributed.
+    pub(super) const ONE: Share = Share { samples: 1.0, looks: 1 };
+
+    /// Error and cost of a pixel that gets it. The path of a sample has a look of its own; where there are more, that one is
+    /// repeated, to be told from what the path finds later.
+    pub(super) fn of(self, pixel: &Pixel) -> [f64; 2] {
+        let Pixel { rest, sight, cost, look } = *pixel;
+        let looks = f64::from(self.looks);
+        let error = (f64::from(rest) + f64::from(sight) / looks) / self.samples;
+        let of_looks = if self.looks > 1 { looks * f64::from(look) } else { 0.0 };
+        [error, (f64::from(cost.max(1.0)) + of_looks) * self.samples]
+    }
+
+    /// What makes error + rate × cost least. Samples and looks follow from their own variances: n ∝ √(v/c).
+    fn best(pixel: &Pixel, rate: f64, rules: &Rules) -> Share {
+        let [rest, sight, cost, look] =
+            [pixel.rest, pixel.sight, pixel.cost.max(1.0), pixel.look.max(1.0)].map(f64::from);
+        let all_looks = (sight / (look * rate)).sqrt();
+        let with_looks = |samples: f64| {
+            // Not a number where nothing varies
+            let looks = (all_looks / samples + 0.5).max(1.0).min(f64::from(MAX_LOOKS));
+            Share { samples, looks: looks as u8 }
+        };
+        let loss = |share: Share| {
+            let [error, cost] = share.of(pixel);
+            error + rate * cost
+        };
+        let limit = |variance: f64| (variance / (cost * rate)).sqrt().clamp(RANGE[0], RANGE[1]);
+        let together = if rules.doubles { 1.0 } else { limit(rest + sight) };
+        let first = Share { samples: together, looks: 1 };
+        let mut best = (first, loss(first));
+        let mut consider = |share: Share| {
+            let loss = loss(share);
+            best = if loss < best.1 { (share, loss) } else { best };
+        };
+        // Where no light is seen a look more is never worth its cost
+        let is_lit = sight > 0.0;
+        if rules.doubles {
+            for samples in [1.0, 2.0, 4.0, 8.0] {
+                consider(Share { samples, looks: 1 });
+                if is_lit {
+                    consider(with_looks(samples));
+                }
+            }
+        } else if is_lit {
+            consider(with_looks(together.max(MIN_SPLIT)));
+            consider(with_looks(limit(rest).max(MIN_SPLIT)));
+        }
+        best.0
+    }
+}
+
+/// Numbers of samples of pixels, and of the looks of each sample: those of the least error, of the same cost as `spp` samples
+/// everywhere; or if samples are doubled, `spp` or 2, 4 or 8 times as many, where that lowers error × cost of the image. Pixels
+/// whose cost is 0, of which nothing is known, have no part in that.
+pub(super) fn counts(pixels: &[Pixel], (rules, spp): (&Rules, u32)) -> (Vec<u32>, Vec<u8>) {
+    let sums = |rate: f64| -> [f64; 2] {
+        let of_chunk = |pixels: &[Pixel]| {
+            pixels.iter().filter(|pixel| pixel.cost > 0.0).fold([0.0; 2], |sum, pixel| {
+                let of_pixel = Share::best(pixel, rate, rules).of(pixel);
+                [sum[0] + of_pixel[0], sum[1] + of_pixel[1]]
+            })
+        };
+        // In the order of chunks, whoever is first
+        let of_chunks: Vec<[f64; 2]> = pixels.par_chunks(CHUNK).map(of_chunk).collect();
+        of_chunks.into_iter().fold([0.0; 2], |a, b| [a[0] + b[0], a[1] + b[1]])
+    };
+    let rate = if rules.doubles {
+        (0..ITERATIONS).fold(f64::INFINITY, |rate, _| {
+            let [error, cost] = sums(rate);
+            error / cost
+        })
+    } else {
+        let costs = pixels.iter().map(|pixel| pixel.cost).filter(|cost| *cost > 0.0);
+        let all: f64 = costs.map(|cost| f64::from(cost.max(1.0))).sum();
+        // Bisection of the logarithm; costs fall as the rate rises
+        let (mut low, mut high) = (-100.0_f64, 60.0_f64);
+        for _ in 0..BISECTIONS {
+            let middle = 0.5 * (low + high);
+            if sums(middle.exp2())[1] > all { low = middle } else { high = middle }
+        }
+        high.exp2()
+    };
+    let share = |pixel: &Pixel| {
+        let Share { samples, looks } = Share::best(pixel, rate, rules);
+        (((samples * f64::from(spp)).round() as u32).max(1), looks)
+    };
+    pixels.par_iter().map(share).unzip()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::f64::consts::SQRT_2;
+
+    /// Pixels of these variances without visible lights, and of these costs.
+    fn pixels(variances: &[f32], costs: &[f32]) -> Vec<Pixel> {
+        let pixel = |(&rest, &cost): (&f32, &f32)| Pixel { rest, sight: 0.0, cost, look: 1.0 };
+        variances.iter().zip(costs).map(pixel).collect()
+    }
+
+    /// Numbers of samples of pixels without visible lights.
+    fn numbers(variances: &[f32], costs: &[f32], (rules, spp): (&Rules, u32)) -> Vec<u32> {
+        let (counts, looks) = counts(&pixels(variances, costs), (rules, spp));
+        assert!(looks.iter().all(|looks| *looks == 1));
+        counts
+    }
+
+    /// Error and cost of pixels with the numbers that they got.
+    fn error_and_cost(pixels: &[Pixel], (counts, looks): &(Vec<u32>, Vec<u8>), spp: u32) -> [f64; 2] {
+        let all = pixels.iter().zip(counts.iter().zip(looks));
+        all.fold([0.0; 2], |sum, (pixel, (&n, &looks))| {
+            let [error, cost] = Share { samples: f64::from(n) / f64::from(spp), looks }.of(pixel);
+            [sum[0] + error, sum[1] + cost]
+        })
+    }
+
+    #[test]
+    fn numbers_of_samples_follow_noise_and_cost_and_keep_the_time() {
+        // Two in three pixels have a quarter of the variance of the others, and one of these costs twice as much
+        let weights: Vec<f32> = (0..300).map(|i| if i % 3 == 0 { 4.0 } else { 1.0 }).collect();
+        let costs: Vec<f32> = (0..300).map(|i| if i % 3 == 1 { 2.0 } else { 1.0 }).collect();
+        let counts = numbers(&weights, &costs, (&ALONE, 64));
+        assert!((f64::from(counts[0]) / f64::from(counts[2]) - 2.0).abs() < 0.05, "{:?}", &counts[..3]);
+        assert!((f64::from(counts[2]) / f64::from(counts[1]) - SQRT_2).abs() < 0.05, "{:?}", &counts[..3]);
+        let time: f64 = counts.iter().zip(&costs).map(|(&n, &c)| f64::from(n) * f64::from(c)).sum();
+        let uniform = 64.0 * f64::from(costs.iter().sum::<f32>());
+        assert!((time / uniform - 1.0).abs() < 0.01, "{time} {uniform}");
+    }
+
+    #[test]
+    fn no_pixel_has_less_than_half_or_more_than_eight_times_the_mean() {
+        let weights: Vec<f32> = (0..1000_u16).map(|i| if i == 5 { 1e12 } else { f32::from(i % 2) * 1e-9 }).collect();
+        let counts = numbers(&weights, &[1.0; 1000], (&ALONE, 16));
+        assert_eq!((counts[5], counts[0]), (128, 8));
+        assert!(counts.iter().all(|n| (8..=128).contains(n)));
+        for rules in [ALONE, SHARED] {
+            let still = numbers(&[0.0; 4], &[1.0; 4], (&rules, 16));
+            assert!(still.iter().all(|n| *n >= 1), "nothing varies: {still:?}");
+        }
+    }
+
+    #[test]
+    fn what_varies_by_visible_lights_has_more_looks_and_not_more_paths() {
+        // One pixel in 50 sees the edge of a lamp; a path costs 10 looks
+        let pixel = |i: usize| Pixel {
+            rest: 1.0,
+            sight: if i.is_multiple_of(50) { 400.0 } else { 0.0 },
+            cost: 20.0,
+            look: 2.0,
+        };
+        let all: Vec<Pixel> = (0..1000).map(pixel).collect();
+        for rules in [ALONE, SHARED] {
+            let given = counts(&all, (&rules, 64));
+            let (edge, other) = ((given.0[0], given.1[0]), (given.0[1], given.1[1]));
+            assert_eq!(other.1, 1);
+            // √(s c/(r c_look)) where both are free
+            assert!((50..64).contains(&edge.1), "{edge:?} {other:?}");
+            assert!(edge.0 < 2 * other.0, "{edge:?} {other:?}");
+            let [_, cost] = error_and_cost(&all, &given, 64);
+            let uniform: f64 = all.iter().map(|pixel| f64::from(pixel.cost)).sum();
+            assert!(rules.doubles || (cost / uniform - 1.0).abs() < 0.01, "looks are in the time: {cost} {uniform}");
+            // Better than samples alone by far, and than twice or half as many looks
+            let alone: Vec<Pixel> = all.iter().map(|p| Pixel { rest: p.rest + p.sight, sight: 0.0, ..*p }).collect();
+            let loss = |given: &(Vec<u32>, Vec<u8>)| error_and_cost(&all, given, 64).iter().product::<f64>();
+            assert!(loss(&given) < 0.65 * loss(&counts(&alone, (&rules, 64))));
+            for looks in [edge.1 / 2, 2 * edge.1] {
+                let changed = given.1.iter().map(|&n| if n > 1 { looks } else { 1 }).collect();
+                assert!(loss(&given) <= 1.001 * loss(&(given.0.clone(), changed)), "{looks}");
+            }
+        }
+        // The same of an image in which light varies as much: a look more is worth no more than what it costs
+        let still: Vec<Pixel> = all.iter().map(|p| Pixel { rest: 400.0, ..*p }).collect();
+        assert!(counts(&still, (&ALONE, 64)).1.iter().all(|looks| *looks <= 3));
+    }
+
+    #[test]
+    fn who_is_split_has_as_many_samples_as_the_mean_at_least() {
+        let power_of_two = |i: usize, by: usize| (i / by % 9) as f32 - 4.0;
+        let pixel = |i: usize| {
+            let [rest, sight] = [1, 9].map(|by| 0.1 * power_of_two(i, by).exp2());
+            Pixel { rest, sight: 4.0 * sight, cost: 20.0, look: 2.0 }
+        };
+        let (numbers, looks) = counts(&(0..810).map(pixel).collect::<Vec<_>>(), (&ALONE, 64));
+        assert!(looks.iter().any(|looks| *looks > 2));
+        assert!(numbers.iter().zip(&looks).all(|(&n, &looks)| looks == 1 || n >= 64));
+    }
+
+    #[test]
+    fn pixels_of_which_nothing_is_known_have_no_part_in_the_cost() {
+        let known = Pixel { rest: 1.0, sight: 0.0, cost: 20.0, look: 2.0 };
+        let noisy = Pixel { rest: 4.0, ..known };
+        let some: Vec<Pixel> = (0..300).map(|i| if i % 3 == 0 { noisy } else { known }).collect();
+        for rules in [ALONE, SHARED] {
+            let alone = counts(&some, (&rules, 64));
+            let beside: Vec<Pixel> = some.iter().copied().chain(vec![Pixel::default(); 600]).collect();
+            let (numbers, looks) = counts(&beside, (&rules, 64));
+            assert_eq!((&numbers[..300], &looks[..300]), (&alone.0[..], &alone.1[..]));
+        }
+    }
+
+    #[test]
+    fn who_shares_has_a_power_of_two_of_samples_and_the_others_as_many_as_each_other() {
+        // One pixel in 100 has 10,000 times the variance, one 20 times, one 1.5 times
+        let weight = |i: usize| {
+            if i % 100 == 7 {
+                1e4
+            } else if i % 100 == 8 {
+                20.0
+            } else if i % 100 == 9 {
+                1.5
+            } else {
+                1.0
+            }
+        };
+        let weights: Vec<f32> = (0..1000).map(weight).collect();
+        let counts = numbers(&weights, &[2.0; 1000], (&SHARED, 12));
+        let all = pixels(&weights, &[2.0; 1000]);
+        let loss = |counts: &[u32]| error_and_cost(&all, &(counts.to_vec(), vec![1; 1000]), 12).iter().product::<f64>();
+        assert_eq!(counts[7], 96);
+        assert!(
+            counts
+                .iter()
+                .enumerate()
+                .all(|(i, n)| [12, 24, 48, 96].contains(n) && (i % 100 == 7 || i % 100 == 8 || *n == 12))
+        );
+        // None is better with twice or half as many, all pixels of its kind together
+        let best = loss(&counts);
+        for kind in [7, 8, 9] {
+            for factor in [0.5, 2.0] {
+                let mut other = counts.clone();
+                other.iter_mut().skip(kind).step_by(100).for_each(|n| *n = (f64::from(*n) * factor) as u32);
+                let is_allowed = (12..=96).contains(&other[kind]);
+                assert!(!is_allowed || loss(&other) >= 0.999 * best, "{kind} {factor}");
+            }
+        }
+    }
+}

@@ -1,0 +1,108 @@
+//! Completes what settings leave open until the scene is loaded, on one page: [`prepare`].
+//!
+//! The estimator `auto` is chosen by a [rule] from [facts] of the scene. Where more is asked for, [trials](tune) look for better
+//! settings. Then pilots tell how many camera samples each pixel gets: by their [noise](allocation), or for a [standard
+//! error](noise) that is asked for. All of it but trials is a function of scene, settings and seed, and counts in place of measuring time.
+
+pub mod allocation;
+mod allocation_counts;
+mod constants;
+pub mod facts;
+mod noise;
+pub mod preparation;
+mod probe;
+pub mod processor_time;
+pub mod proposals;
+mod rule;
+mod trials;
+pub mod tune;
+pub mod visibility_cache;
+
+pub use preparation::{PlanError, Preparation};
+
+use crate::integrators::{light_layers, light_paths, reuse, through_media};
+use crate::scene::RenderJob;
+use crate::settings::table::rows;
+use crate::settings::{Allocation, EstimatorKind, Settings};
+use tune::Tuning;
+
+/// What was chosen for an image, as far as its settings left it open.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Plan {
+    /// What trials found, if they were asked for.
+    pub tuning: Option<Tuning>,
+    /// The settings that were chosen, by their names in metadata: with these, rendering gives the same image to the bit.
+    pub chosen: Vec<(&'static str, String)>,
+    /// What the user should know of settings that have no effect.
+    pub warnings: Vec<String>,
+}
+
+/// Completes what the settings of `job` leave open, or says why there can be no image.
+pub fn prepare(job: &mut RenderJob, how: &Preparation<'_>) -> Result<Plan, PlanError> {
+    if let Some(obstacle) = through_media::obstacle(job) {
+        return Err(PlanError::Media(obstacle));
+    }
+    let open = *job.settings();
+    let mut plan = match how.until_deadline(|how| complete(job, &open, how)) {
+        Err(PlanError::Stopped) if how.goes_on().is_ok() => {
+            job.change(|s| (s.sampling.allocation, s.sampling.noise) = (Allocation::Uniform, None));
+            let plan = complete(job, &open, &Preparation { tunes: false, ..*how })?;
+            let given_up = "pilots were not done in time: all pixels have the same number of samples".to_owned();
+            Plan { warnings: [vec![given_up], plan.warnings].concat(), ..plan }
+        }
+        result => result?,
+    };
+    plan.chosen = chosen(&open, job.settings());
+    Ok(plan)
+}
+
+/// True if settings ask for pilots, which take a part of the time of the image.
+pub fn has_pilot(settings: &Settings) -> bool {
+    let sampling = &settings.sampling;
+    settings.integrator.estimator == EstimatorKind::Auto
+        || sampling.allocation == Allocation::Adaptive
+        || sampling.noise.is_some()
+}
+
+/// Makes the choices, which are not part of the plan yet.
+fn complete(job: &mut RenderJob, open: &Settings, how: &Preparation<'_>) -> Result<Plan, PlanError> {
+    let pool = preparation::thread_pool(how.threads)?;
+    (how.observe)("looking at the scene", None);
+    pool.install(|| rule::apply(job));
+    let tuning = if how.tunes { pool.install(|| tune::tune(job, open, how))? } else { None };
+    if job.settings().sampling.allocation == Allocation::Auto {
+        job.change(|s| s.sampling.allocation = Allocation::Uniform);
+    }
+    if job.settings().integrator.uses_visibility_cache() && job.lights.visibility_cache().is_none() {
+        (how.observe)("building the visibility cache", None);
+        let cache = pool.install(|| visibility_cache::build_visibility_cache(job));
+        job.lights.set_visibility_cache(cache.map(|(cache, _)| cache));
+    }
+    how.goes_on()?;
+    pool.install(|| proposals::choose(job, how));
+    job.pixel_samples = pool.install(|| allocation::allocate(job, how))?;
+    Ok(Plan { tuning, chosen: Vec::new(), warnings: warnings(job) })
+}
+
+/// What settings ask for, and the scene does not allow. Settings that do not apply are said to have no effect where they are given.
+fn warnings(job: &RenderJob) -> Vec<String> {
+    let i = &job.settings().integrator;
+    let applies = |flag| rows().any(|row| row.flag == flag && row.applies.to(job.settings()));
+    let shares = i.path_reuse.is_some_and(|edge| edge > 1) && applies("path-reuse");
+    let has_light_paths = i.light_paths.is_some_and(|n| n > 0.0) && applies("light-paths");
+    let all = [
+        ("pixels do not share paths", reuse::obstacle(job).filter(|_| shares)),
+        ("there are no light paths", light_paths::obstacle(job).filter(|_| has_light_paths)),
+        ("light groups have no layers", light_layers::obstacle(job).filter(|_| light_layers::is_wanted(job))),
+    ];
+    all.into_iter().filter_map(|(what, why)| Some(format!("{what}: {}", why?))).collect()
+}
+
+/// The settings that differ, either as they are set or by what is recorded of them: where something was open and the choice is
+/// what is recorded of open settings, too, it would be chosen again.
+fn chosen(before: &Settings, after: &Settings) -> Vec<(&'static str, String)> {
+    let recorded: Vec<_> = before.recorded().collect();
+    let is_set = |key: &str| rows().any(|row| row.key == key && (row.get)(before) != (row.get)(after));
+    let is_chosen = |entry: &(&str, _)| !recorded.contains(entry) || is_set(entry.0);
+    after.recorded().filter(is_chosen).map(|(key, value)| (key, value.to_string())).collect()
+}

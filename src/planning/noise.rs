@@ -1,0 +1,210 @@
+//! `--noise`: as many camera samples as a standard error needs, block by block.
+//!
+//! The noise of a block is defined in [`crate::film::noise`]. A *pilot* estimates its mean and its variance: each pixel is
+//! rendered twice with n samples, by two seeds of their own, and half the squared difference of the two is the variance of n samples, whatever the sampler gains over
+//! independent ones. It falls at least as fast as 1/n, which says how many samples the block needs. The schedule: n = 2,
+//! doubled for blocks that need more than [`REACH`] times the pilot's samples, until none does or the limit is reached.
+//!
+//! What the samples see of visible lights is known apart from the rest. Where it is much of the variance, as at the edge of
+//! a lamp, samples see lights by more camera rays than their own (`render::looks`): as many as make the time least in which the block
+//! has the noise that is asked for.
+//!
+//! So the number of samples follows from the pilot alone, and is independent of the samples of the image, whose mean is
+//! therefore unbiased. Rendering until the image's own samples agree would stop too early where they agree by chance: where
+//! they all miss what is rare and bright.
+
+use super::constants::{FIRST, LOOK_COST, LOOKS_KNOWN, MAX_LOOKS, REACH};
+use super::preparation::{PlanError, Preparation, Stage};
+use super::probe::{LeftToLightPaths, Probe, around};
+use crate::direct::Estimator;
+use crate::film::noise::{BLOCK, of_block};
+use crate::film::{FeatureSet, PixelBounds};
+use crate::scene::{PixelSamples, RenderJob};
+use crate::settings::{IntegratorSettings, Settings};
+use lumiris_numbers::math::hash::pcg4d;
+use lumiris_numbers::math::luminance;
+use rayon::prelude::*;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// Combined with the seed of the image to give those of the pilot.
+const SEED: u32 = 0x6e_6f_69_73;
+
+/// The camera samples of each pixel for a noise of `threshold` in every block, at most those of the settings.
+pub(super) fn counts_for(job: &RenderJob, threshold: f32, how: &Preparation<'_>) -> Result<PixelSamples, PlanError> {
+    let seed = job.settings().sampling.seed;
+    let seeds = [0, 1].map(|k| pcg4d([seed, SEED, 0, k])[0]);
+    let bounds = job.world.scene.film.bounds;
+    let blocks = bounds.tiles(BLOCK);
+    let left = LeftToLightPaths::new(job, how);
+    let stage = Stage::new(how, "measuring how much noise there is", blocks.len());
+    let of_block = |probe: &mut _, block| {
+        how.goes_on()?;
+        let numbers = numbers_of_block(job, probe, block, (seeds, threshold), how.stop);
+        stage.add(1);
+        Ok(numbers)
+    };
+    let probe = || Probe::new(job, &left, FeatureSet::None);
+    let of_blocks: Vec<Numbers> = blocks.par_iter().map_init(probe, of_block).collect::<Result<_, PlanError>>()?;
+
+    let (mut counts, mut looks) = (vec![1; bounds.area()], vec![1; bounds.area()]);
+    for (block, numbers) in blocks.iter().zip(of_blocks) {
+        for ([x, y], of_pixel) in block.pixels().zip(numbers.looks) {
+            let pixel = (y - bounds.y0) as usize * bounds.width() as usize + (x - bounds.x0) as usize;
+            (counts[pixel], looks[pixel]) = (numbers.samples, of_pixel);
+        }
+    }
+    if looks.iter().all(|n| *n == 1) {
+        looks = Vec::new();
+    }
+    let mean = counts.iter().map(|&n| u64::from(n)).sum::<u64>().div_ceil(counts.len().max(1) as u64);
+    Ok(PixelSamples { bounds, spp: (mean as u32).max(1), counts, looks })
+}
+
+/// What the pixels of a block get: samples, and looks of each of these, pixel by pixel.
+struct Numbers {
+    samples: u32,
+    looks: Vec<u8>,
+}
+
+/// Sums of the pilot's samples of a block by two seeds.
+struct Sums {
+    /// Of what the samples find.
+    all: [Vec<[f64; 3]>; 2],
+    /// Of what they see of visible lights, which is a part of that.
+    seen: [Vec<[f64; 3]>; 2],
+    /// Cost of a sample, and of a look.
+    costs: [f64; 2],
+}
+
+fn numbers_of_block(
+    job: &RenderJob,
+    probe: &mut Probe<'_>,
+    block: &PixelBounds,
+    (seeds, threshold): ([u32; 2], f32),
+    stop: &AtomicBool,
+) -> Numbers {
+    let Settings { integrator, sampling } = job.settings();
+    let integrator = &Estimator::without_fits(integrator, 0);
+    let (limit, pilot_limit) = (sampling.spp, sampling.pilot_spp());
+    let seeing = IntegratorSettings { max_depth: 0, ..*integrator };
+    let pixels: Vec<[u32; 2]> = block.pixels().collect();
+    let none = || seeds.map(|_| vec![[0.0; 3]; block.area()]);
+    let mut sums = Sums { all: none(), seen: none(), costs: [0.0; 2] };
+    let (mut done, mut until) = (0, FIRST);
+    loop {
+        let Sums { all, seen, costs } = &mut sums;
+        for ((sums, settings), of_kind) in [(all, integrator), (seen, &seeing)].into_iter().zip(costs) {
+            probe.take_cost(0);
+            for (sums, seed) in sums.iter_mut().zip(seeds) {
+                for (sum, added) in sums.iter_mut().zip(probe.sums(settings, &pixels, (done..until, seed))) {
+                    (0..3).for_each(|c| sum[c] += added[c]);
+                }
+            }
+            *of_kind = probe.take_cost(2 * pixels.len() * (until - done) as usize);
+        }
+        done = until;
+        let (needed, looks) = numbers_for(&sums, block.width() as usize, done, threshold);
+        if needed <= f64::from(REACH * 2 * done) || 2 * done >= pilot_limit || stop.load(Ordering::Relaxed) {
+            return Numbers { samples: needed.clamp(1.0, f64::from(limit)) as u32, looks };
+        }
+        until = 2 * done;
+    }
+}
+
+/// Samples for a noise of `threshold`, and the looks of each pixel, where pixels in rows of `width` have the sums of `n` samples
+/// of each seed.
+fn numbers_for(Sums { all, seen, costs }: &Sums, width: usize, n: u32, threshold: f32) -> (f64, Vec<u8>) {
+    let pixels = all[0].len();
+    let per_sample = 1.0 / f64::from(n);
+    let luminances =
+        |sums: &[Vec<[f64; 3]>; 2], i: usize| [&sums[0], &sums[1]].map(|sums| luminance(sums[i]) * per_sample);
+    // Of a sample
+    let variance = |[a, b]: [f64; 2]| 0.5 * (a - b) * (a - b) * f64::from(n);
+    let (mut mean, mut whole, mut rest) = (0.0, 0.0, 0.0);
+    let mut of_sight = Vec::with_capacity(pixels);
+    for i in 0..pixels {
+        let (found, lights) = (luminances(all, i), luminances(seen, i));
+        mean += 0.5 * (found[0] + found[1]);
+        whole += variance(found);
+        rest += variance([found[0] - lights[0], found[1] - lights[1]]);
+        of_sight.push(variance(lights));
+    }
+    let edges = around_any(&of_sight, width);
+    let (at_edges, sight) = (edges.iter().filter(|is_edge| **is_edge).count(), of_sight.iter().sum::<f64>());
+    let count = pixels.max(1) as f64;
+    let [mean, whole, rest] = [mean, whole, rest].map(|sum| sum / count);
+    let samples = |variance: f64| (of_block(mean, variance) / f64::from(threshold)).powi(2).ceil();
+    let alone = (samples(whole), vec![1; pixels]);
+    if sight == 0.0 {
+        return alone;
+    }
+    // Time × variance, with so many looks of pixels at edges, is least where their number is that; few samples tell it for few
+    let [cost, look] = [costs[0].max(1.0), LOOK_COST * costs[1].max(1.0)];
+    let part = at_edges as f64 / count;
+    let looks = (sight / at_edges as f64 * cost / (rest * look))
+        .sqrt()
+        .min(f64::from(LOOKS_KNOWN * n))
+        .min(f64::from(MAX_LOOKS));
+    let looks = looks.round();
+    let split = rest + sight / count / looks;
+    if looks < 2.0 || split * (cost + part * looks * look) >= whole * cost {
+        return alone;
+    }
+    (samples(split), edges.into_iter().map(|is_edge| if is_edge { looks as u8 } else { 1 }).collect())
+}
+
+/// The pixels, in rows of `width`, that are not 0, and those beside them: few samples do not see an edge in all pixels that it
+/// touches.
+fn around_any(values: &[f64], width: usize) -> Vec<bool> {
+    let size = (width, values.len() / width.max(1));
+    let is_any = |i: usize| around(i, size, 1).any(|q| values[q] > 0.0);
+    (0..values.len()).map(is_any).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use lumiris_test_support::random::{RngExt, pcg32};
+
+    /// Sums of 4 samples of so many pixels, of which each sees light that is spread as uniform numbers from 0 to 2 times
+    /// `sight`, beside such numbers from 0 to 2.
+    fn sums(pixels: usize, sight: impl Fn(usize) -> f64) -> Sums {
+        let mut s = pcg32([3, 1, 4]);
+        let mut sum = || (0..4).map(|_| 2.0 * f64::from(s.random::<f32>())).sum::<f64>();
+        let seen = [0, 1].map(|_| (0..pixels).map(|i| [sum() * sight(i); 3]).collect::<Vec<_>>());
+        let all = seen.each_ref().map(|seen| seen.iter().map(|v| [v[0] + sum(); 3]).collect());
+        Sums { all, seen, costs: [20.0, 1.0] }
+    }
+
+    #[test]
+    fn a_block_gets_the_samples_that_its_noise_asks_for() {
+        // Mean 1, variance 1/3 of each of 4 samples
+        let still = sums(4096, |_| 0.0);
+        let expected = 1.0 / 3.0 / (0.02 * 1.01_f64).powi(2);
+        let (found, looks) = numbers_for(&still, 64, 4, 0.02);
+        assert!((found / expected - 1.0).abs() < 0.07, "{found} {expected}");
+        assert!(looks.iter().all(|n| *n == 1));
+        let black = || [0, 1].map(|_| vec![[0.0; 3]; 4]);
+        let black = Sums { all: black(), seen: black(), costs: [1.0; 2] };
+        assert_eq!(numbers_for(&black, 2, 4, 0.02), (0.0, vec![1; 4]));
+    }
+
+    #[test]
+    fn the_edge_of_a_lamp_gets_looks_and_not_samples() {
+        // One column of 64 sees the edge of a lamp
+        let is_edge = |i: usize| i % 64 == 20;
+        let lamp = sums(4096, |i| if is_edge(i) { 100.0 } else { 0.0 });
+        let (found, looks) = numbers_for(&lamp, 64, 4, 0.02);
+        assert!((0..4096).all(|i| (looks[i] > 1) == (19..=21).contains(&(i % 64))), "in pixels beside it, too");
+        let n = f64::from(looks[20]);
+        // √(s c/(r c_look)), s being the mean over three columns
+        let best = (1e4 / 3.0 * 20.0 / LOOK_COST).sqrt().min(f64::from(4 * LOOKS_KNOWN));
+        assert!((n / best - 1.0).abs() < 0.1, "{n} {best}");
+        let wanted = |mean: f64| (0.02 * (mean + 0.01)).powi(2);
+        let expected = (1.0 / 3.0 + 1e4 / 3.0 / 64.0 / n) / wanted(1.0 + 100.0 / 64.0);
+        assert!((found / expected - 1.0).abs() < 0.2, "{found} {expected}");
+        // Where the rest varies as much, more looks are not worth their time
+        let faint = sums(4096, |i| if is_edge(i) { 0.2 } else { 0.0 });
+        assert!(numbers_for(&faint, 64, 4, 0.02).1.iter().all(|n| *n == 1));
+    }
+}

@@ -1,0 +1,128 @@
+//! Samples of some pixels with random numbers of their own, outside the film: what pilots measure with.
+
+use crate::direct::Fits;
+use crate::film::accumulator::RadianceAccumulator;
+use crate::film::{FeatureSet, PixelSample};
+use crate::integrators::camera_samples::{CameraSampler, Scratch};
+use crate::integrators::cells::Groups;
+use crate::integrators::light_paths::{self, LightPilot};
+use crate::integrators::path::{BATCH_PATHS, CameraSample};
+use crate::integrators::reuse;
+use crate::integrators::{PathStats, PathTracer};
+use crate::scene::RenderJob;
+use crate::settings::IntegratorSettings;
+use std::ops::Range;
+
+use super::constants::{COLLISION_COST, LIGHT_PILOT};
+use super::preparation::Preparation;
+
+/// What light paths find in an image that has them: pilots leave it to them as the image does.
+pub(super) struct LeftToLightPaths(Option<(LightPilot, f64)>);
+
+impl LeftToLightPaths {
+    /// Traces a pilot of light paths, if there are any. On the threads of the current pool.
+    pub(super) fn new(job: &RenderJob, how: &Preparation<'_>) -> Self {
+        let per_sample = f64::from(light_paths::per_sample(job));
+        if per_sample > 0.0 {
+            (how.observe)("tracing light paths", None);
+        }
+        let pilot = (per_sample > 0.0).then(|| LightPilot::new(job, LIGHT_PILOT)).flatten();
+        LeftToLightPaths(pilot.map(|pilot| (pilot, per_sample)))
+    }
+
+    /// Nothing is left to them.
+    pub(super) const fn none() -> Self {
+        LeftToLightPaths(None)
+    }
+}
+
+/// Traces samples; holds the buffers of a thread.
+pub(super) struct Probe<'a> {
+    job: &'a RenderJob,
+    camera: CameraSampler<'a>,
+    tracer: PathTracer,
+    samples: Vec<CameraSample>,
+    scratch: Scratch,
+    results: Vec<PixelSample>,
+}
+
+impl<'a> Probe<'a> {
+    /// A probe of an image, whose paths leave to light paths what these find, and which pixels share as they do in the image.
+    pub(super) fn new(job: &'a RenderJob, left: &LeftToLightPaths, features: FeatureSet) -> Self {
+        let groups = if reuse::obstacle(job).is_none() { Groups::Grid } else { Groups::None };
+        let mut tracer = PathTracer::sharing(groups, features);
+        tracer.leave(job, left.0.as_ref().map(|(pilot, per_sample)| (pilot, *per_sample)));
+        let camera = CameraSampler::new(job, 0);
+        Probe { job, camera, tracer, samples: Vec::new(), scratch: Scratch::default(), results: Vec::new() }
+    }
+
+    /// Traces samples of some pixels with the random numbers of a seed, and passes them on with the indices of their pixels. Pixels
+    /// that share paths must be a batch.
+    pub(super) fn trace(
+        &mut self,
+        settings: &IntegratorSettings,
+        pixels: &[[u32; 2]],
+        (samples, seed): (Range<u32>, u32),
+        mut add: impl FnMut(usize, &PixelSample),
+    ) {
+        let size = (BATCH_PATHS / samples.len().max(1)).max(1);
+        let sample_counts = settings.sample_counts();
+        for (part, pixels) in pixels.chunks(size).enumerate() {
+            self.samples.clear();
+            let of_pixels = pixels.iter().map(|&pixel| (0, pixel, samples.clone()));
+            self.camera.samples(of_pixels, seed, &mut self.scratch, &mut self.samples);
+            self.samples.iter_mut().for_each(|sample| sample.sample_counts = sample_counts);
+            self.tracer.trace(self.job, settings, &self.samples, &mut Fits::default(), &mut self.results);
+            for (i, results) in self.results.chunks(samples.len().max(1)).enumerate() {
+                results.iter().for_each(|result| add(part * size + i, result));
+            }
+        }
+    }
+
+    /// The sums of samples of some pixels.
+    pub(super) fn sums(
+        &mut self,
+        settings: &IntegratorSettings,
+        pixels: &[[u32; 2]],
+        samples: (Range<u32>, u32),
+    ) -> Vec<[f64; 3]> {
+        let mut sums = vec![RadianceAccumulator::default(); pixels.len()];
+        self.trace(settings, pixels, samples, |i, sample| {
+            sums[i].add(sample.radiance);
+        });
+        sums.iter().map(RadianceAccumulator::values).collect()
+    }
+
+    /// Mean cost of the camera samples since the last call, of which there were as many as given; that of one which hits nothing is
+    /// 1. Rays that go on where a medium begins or ends are more than samples.
+    pub(super) fn take_cost(&mut self, samples: usize) -> f64 {
+        cost(&crate::integrators::Tracer::take_stats(&mut self.tracer), samples)
+    }
+}
+
+/// The pixels of an image of this width and height that lie at most `radius` from pixel `i` in both directions.
+pub(super) fn around(i: usize, (width, height): (usize, usize), radius: usize) -> impl Iterator<Item = usize> {
+    let window = |i: usize, len: usize| i.saturating_sub(radius)..i.saturating_add(radius + 1).min(len);
+    let columns = window(i % width, width);
+    window(i / width, height).flat_map(move |y| columns.clone().map(move |x| y * width + x))
+}
+
+fn cost(stats: &PathStats, samples: usize) -> f64 {
+    let work = stats.camera_rays + 2 * stats.bounce_rays + stats.direct.proposals;
+    let collisions = (stats.collisions + stats.direct.collisions) as f64 * COLLISION_COST;
+    (work as f64 + collisions) / samples.max(1) as f64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_cost_of_samples_is_that_of_all_their_rays_and_collisions() {
+        let mut stats = PathStats { camera_rays: 12, bounce_rays: 5, collisions: 4, ..PathStats::default() };
+        (stats.direct.proposals, stats.direct.collisions) = (8, 6);
+        // Two of the camera rays went on behind the bounds of a medium
+        assert_eq!(cost(&stats, 10), (12.0 + 10.0 + 8.0 + 10.0 * COLLISION_COST) / 10.0);
+        assert_eq!(cost(&PathStats::default(), 0), 0.0);
+    }
+}

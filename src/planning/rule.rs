@@ -1,0 +1,113 @@
+//! The rule by which the estimator `auto` chooses: from [facts](super::facts) of the scene, and from no time that is measured, so
+//! that a scene has the same image on all machines.
+//!
+//! | scene | choice |
+//! |---|---|
+//! | direct light | `mis` with 8 samples |
+//! | paths of up to 8 bounces among diffuse surfaces, indoors | 4 samples, 3 at later vertices, paths shared by 6 × 6 pixels, no roulette |
+//! | the same in the open | 6 samples, 3 later, shared by 4 × 4 pixels, no roulette |
+//! | longer paths among diffuse surfaces | 3 samples, 2 later, shared by 4 × 4 pixels |
+//! | other paths, mostly of surfaces that are not diffuse | 8 samples, of which 3 by the BSDF, 2 later |
+//! | a sky beside lamps | as many of the light samples as it has of the light |
+//! | 16 lights or more, most of which photons find hidden | `contributing` in place of `mis` |
+//! | metal or glass, and lamps | a quarter of a light path for each camera sample |
+//!
+//! [docs/measurements/efficiency](../../../docs/measurements/efficiency/README.md) is the evidence. A setting that is given stays.
+
+use super::constants::{
+    DIRECT_SAMPLES, FEW_BOUNCES, GLOSSY_BSDF, INDOORS, LIGHT_PATHS, LONG, MANY_LIGHTS, MIN_PAIRS, MOST_HIDDEN, OPEN,
+    OTHERS, OUTDOORS, SKY_FRACTIONS, UNSHARED,
+};
+use super::facts::Facts;
+use super::visibility_cache::{build_visibility_cache, seen_points};
+use crate::integrators::{light_paths, reuse, through_media};
+use crate::lights::LightCtx;
+use crate::scene::RenderJob;
+use crate::settings::{Allocation, ContributingSettings, EstimatorKind, IntegratorKind, IntegratorSettings, Settings};
+
+/// Chooses what the settings of `job` leave open, if their estimator is `auto`. On the threads of the current pool.
+pub(super) fn apply(job: &mut RenderJob) {
+    let Settings { integrator: base, sampling } = *job.settings();
+    if base.estimator != EstimatorKind::Auto {
+        return;
+    }
+    job.change(|s| s.integrator.estimator = EstimatorKind::Mis);
+    if sampling.allocation == Allocation::Auto {
+        job.change(|s| s.sampling.allocation = Allocation::Adaptive);
+    }
+    if !matches!(base.kind, IntegratorKind::Direct | IntegratorKind::Path) {
+        return;
+    }
+    // Media that glow are lights only where the path is the one BSDF sample
+    if job.lights.find_glows() && base.bsdf_fraction.is_none() {
+        job.change(|s| s.integrator.bsdf_fraction = Some(0.0));
+    }
+    let facts = Facts::of(job);
+    let shares = sampling.allocation == Allocation::Auto && reuse::obstacle(job).is_none();
+    job.change(|s| s.integrator = with_numbers(&s.integrator, &facts, shares));
+    if facts.lights >= MANY_LIGHTS && !job.lights.find_glows() {
+        choose_contributing(job);
+    }
+    if base.light_paths.is_none() && job.world.scene.materials.make_caustics() && light_paths::obstacle(job).is_none() {
+        job.change(|s| s.integrator.light_paths = Some(LIGHT_PATHS));
+    }
+}
+
+/// `mis` with the numbers for a scene with these facts, where they are open.
+fn with_numbers(settings: &IntegratorSettings, facts: &Facts, shares: bool) -> IntegratorSettings {
+    let mut s = *settings;
+    let is_mixed = facts.lights > 1 && facts.sky > 0.0 && facts.sky < 1.0;
+    if is_mixed && s.infinite_fraction.is_none() {
+        let off = |fraction: &f32| (f64::from(*fraction) - facts.sky).abs();
+        s.infinite_fraction = SKY_FRACTIONS.into_iter().min_by(|a, b| off(a).total_cmp(&off(b)));
+    }
+    if s.depth() <= 1 {
+        s.samples = s.samples.or(Some(DIRECT_SAMPLES));
+        return s;
+    }
+    let has_pairs = facts.diffuse_pairs >= MIN_PAIRS;
+    let is_long = s.depth() > FEW_BOUNCES;
+    let is_outdoors = facts.sky > 0.0 && facts.open >= OPEN;
+    let numbers = match (shares && has_pairs, is_long, is_outdoors) {
+        (false, ..) => UNSHARED,
+        (true, true, _) => LONG,
+        (true, false, true) => OUTDOORS,
+        (true, false, false) => INDOORS,
+    };
+    // The path goes on by the one BSDF sample of later vertices
+    if numbers == UNSHARED && s.samples.is_none() && s.later_samples.is_none() {
+        s.bsdf_fraction = s.bsdf_fraction.or(Some(GLOSSY_BSDF));
+    }
+    s.samples = s.samples.or(Some(numbers.first));
+    s.later_samples = s.later_samples.or(Some(numbers.later));
+    s.path_reuse = s.path_reuse.or(Some(numbers.edge));
+    // What a path finds serves many pixels
+    let is_default = s.roulette_depth == IntegratorSettings::default().roulette_depth;
+    if s.path_reuse.is_some_and(|edge| edge > 1) && !is_long && is_default {
+        s.roulette_depth = None;
+    }
+    s
+}
+
+/// Takes `contributing` if photons find that most lights are hidden where the camera looks.
+fn choose_contributing(job: &mut RenderJob) {
+    let before = job.settings().integrator;
+    let depth = before.depth();
+    let s = IntegratorSettings { estimator: EstimatorKind::Contributing, ..before };
+    if s.leaves_lights_out() || !job.world.scene.media.is_empty() && through_media::obstacle_of(&s).is_some() {
+        return;
+    }
+    let Some((cache, _)) = build_visibility_cache(job) else { return };
+    job.lights.set_visibility_cache(Some(cache));
+    let points = seen_points(job);
+    let lit = job.world.scene.lights.lit.len();
+    let found = |&(p, n): &_| job.lights.contributing_lights(&LightCtx::on(p, n)).lights.len() as f64 / lit as f64;
+    let seen = points.iter().map(found).sum::<f64>() / points.len().max(1) as f64;
+    if points.is_empty() || 1.0 - seen < MOST_HIDDEN {
+        job.lights.set_visibility_cache(None);
+        return;
+    }
+    let others = s.contributing.noncontributing_samples.or(Some(OTHERS[usize::from(depth > 1)]));
+    let contributing = ContributingSettings { noncontributing_samples: others, ..s.contributing };
+    job.change(|all| all.integrator = IntegratorSettings { contributing, ..s });
+}

@@ -1,0 +1,209 @@
+//! Settings that trials find to be more efficient than the [rule](super::rule)'s: for long renders, farms and sequences, where half a
+//! minute of trials pays. From the rule's choice on, one setting after the other is changed for as long as that gains more than chance.
+//! What is found is compared with the rule on other cells, and taken if it gains a tenth.
+
+use super::constants::{MANY_LIGHTS, MIN_ERRORS, OTHERS, TUNE_CELLS, TUNE_GAIN, TUNE_SPP, TUNE_TRIALS};
+use super::facts::Facts;
+use super::preparation::{PlanError, Preparation};
+use super::processor_time;
+use super::trials::{Measured, Trials};
+use super::visibility_cache::build_visibility_cache;
+use crate::integrators::{reuse, through_media};
+use crate::scene::RenderJob;
+use crate::settings::{
+    Allocation, ContributingSettings, EstimatorKind, IntegratorKind, IntegratorSettings, Settings, bsdf_samples,
+};
+use serde::{Deserialize, Serialize};
+
+/// Settings that were tried.
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+pub struct Trial {
+    /// Their summary.
+    pub name: String,
+    /// Processor time of a camera sample (ns).
+    pub nanoseconds: f64,
+    /// 1/(error × time), relative to the rule.
+    pub efficiency: f64,
+    /// Standard error of the logarithm of that.
+    pub error: f64,
+}
+
+/// What trials found.
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+pub struct Tuning {
+    /// All trials, that of the rule first.
+    pub trials: Vec<Trial>,
+    /// Efficiency of what was found relative to the rule's, on cells of which the search knew nothing, and the standard error of its
+    /// logarithm.
+    pub gain: f64,
+    /// See `gain`.
+    pub error: f64,
+    /// True if that is enough to take it; otherwise the rule's settings are kept.
+    pub is_taken: bool,
+    /// Processor time of all trials (s).
+    pub seconds: f64,
+}
+
+/// Tunes the settings of a job, which are the rule's; `open` are those from which the rule chose. `None` where there is nothing to tune.
+pub(super) fn tune(job: &mut RenderJob, open: &Settings, how: &Preparation<'_>) -> Result<Option<Tuning>, PlanError> {
+    let kind = open.integrator.kind;
+    if open.integrator.estimator != EstimatorKind::Auto
+        || !matches!(kind, IntegratorKind::Direct | IntegratorKind::Path)
+    {
+        return Ok(None);
+    }
+    let start = processor_time::of_process();
+    let rule = job.settings().integrator;
+    let mut search = Search::new(job, how)?;
+    for candidates in steps(open, job) {
+        search.climb(job, &candidates, how)?;
+    }
+    let found = search.best;
+    let mut trials = Trials::new(job, how, (2 * TUNE_CELLS, 1), TUNE_SPP);
+    let [rule_measured, found_measured] = [rule, found].map(|settings| {
+        job.change(|s| s.integrator = settings);
+        trials.measure(job)
+    });
+    let (gain, error) = found_measured.gain_over(&rule_measured);
+    let is_taken = gain > TUNE_GAIN.ln().max(MIN_ERRORS * error);
+    job.change(|s| s.integrator = if is_taken { found } else { rule });
+    if job.settings().integrator.estimator != EstimatorKind::Contributing {
+        job.lights.set_visibility_cache(None);
+    }
+    let seconds = (processor_time::of_process() - start).as_secs_f64();
+    Ok(Some(Tuning { trials: search.trials, gain: gain.exp(), error, is_taken, seconds }))
+}
+
+/// The changes that are tried one after the other, where the settings are open: each is applied for as long as it gains.
+fn steps(open: &Settings, job: &RenderJob) -> Vec<Vec<Change>> {
+    let i = open.integrator;
+    let mut steps: Vec<Vec<Change>> = Vec::new();
+    let facts = Facts::of(job);
+    let knows_media = |estimator| {
+        let s = IntegratorSettings { estimator, ..i };
+        job.world.scene.media.is_empty() || through_media::obstacle_of(&s).is_none()
+    };
+    if facts.lights >= MANY_LIGHTS && knows_media(EstimatorKind::Contributing) && !job.lights.find_glows() {
+        steps.push(vec![Change::Contributing]);
+    }
+    if i.infinite_fraction.is_none() && facts.sky > 0.0 && facts.lights > 1 {
+        steps.push(vec![Change::Sky(0.75), Change::Sky(0.875), Change::Sky(0.25)]);
+    }
+    let numbers = [
+        (i.samples.is_none(), vec![Change::Double, Change::Halve]),
+        (i.bsdf_fraction.is_none() && !job.lights.find_glows(), vec![Change::Bsdf(0.5), Change::Bsdf(0.0)]),
+        (i.later_samples.is_none() && i.depth() > 1, vec![Change::MoreLater, Change::FewerLater]),
+    ];
+    let shares =
+        i.path_reuse.is_none() && open.sampling.allocation == Allocation::Auto && reuse::obstacle(job).is_none();
+    let is_of = |(is_open, changes): &(bool, Vec<Change>)| is_open.then(|| changes.clone());
+    steps.extend(numbers.iter().filter_map(is_of));
+    if shares {
+        steps.push(vec![Change::LargerBlocks, Change::SmallerBlocks]);
+    }
+    if i.samples.is_none() {
+        steps.push(vec![Change::Double, Change::Halve]);
+    }
+    if knows_media(EstimatorKind::Ris) && !job.lights.find_glows() {
+        steps.push(vec![Change::Resampling]);
+    }
+    steps
+}
+
+/// A change of settings.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Change {
+    Double,
+    Halve,
+    Bsdf(f32),
+    MoreLater,
+    FewerLater,
+    LargerBlocks,
+    SmallerBlocks,
+    Sky(f32),
+    Resampling,
+    Contributing,
+}
+
+impl Change {
+    /// The changed settings, if they are others.
+    fn of(self, settings: &IntegratorSettings) -> Option<IntegratorSettings> {
+        let [first, later] = [0, 1].map(|vertex| settings.sample_counts_at(vertex).samples);
+        let edge = settings.path_reuse.unwrap_or(1);
+        let mut s = *settings;
+        match self {
+            Change::Double => s.samples = Some(2 * first),
+            Change::Halve => s.samples = Some((first / 2).max(2)),
+            Change::Bsdf(fraction) => s.bsdf_fraction = Some(fraction),
+            Change::MoreLater => s.later_samples = Some(later + later.div_ceil(2)),
+            Change::FewerLater => s.later_samples = Some((later - later / 3).max(2)),
+            Change::LargerBlocks => s.path_reuse = Some((edge + edge.div_ceil(2)).min(8)),
+            Change::SmallerBlocks => s.path_reuse = Some((edge - edge.div_ceil(3)).max(1)),
+            Change::Sky(fraction) => s.infinite_fraction = Some(fraction),
+            Change::Resampling => {
+                (s.estimator, s.samples, s.later_samples) = (EstimatorKind::Ris, None, settings.later_samples);
+            }
+            Change::Contributing => {
+                let others = s.contributing.noncontributing_samples.or(Some(OTHERS[usize::from(s.depth() > 1)]));
+                s.estimator = EstimatorKind::Contributing;
+                s.contributing = ContributingSettings { noncontributing_samples: others, ..s.contributing };
+            }
+        }
+        // Paths go on by the one BSDF sample of later vertices
+        let goes_on = s.depth() <= 1 || bsdf_samples(s.sample_counts_at(1).samples.max(2), s.bsdf_fraction()) == 1;
+        (s != *settings && goes_on).then_some(s)
+    }
+}
+
+/// The best settings so far.
+struct Search {
+    best: IntegratorSettings,
+    measured: Measured,
+    rule: Measured,
+    pilot: Trials,
+    trials: Vec<Trial>,
+}
+
+impl Search {
+    fn new(job: &mut RenderJob, how: &Preparation<'_>) -> Result<Self, PlanError> {
+        how.goes_on()?;
+        let mut pilot = Trials::new(job, how, (TUNE_CELLS, 0), TUNE_SPP);
+        // The first turn fills caches
+        pilot.measure(job);
+        let start = processor_time::of_process();
+        let measured = pilot.measure(job);
+        (how.expect)((processor_time::of_process() - start).mul_f64(TUNE_TRIALS));
+        let trials = vec![trial(job, &measured, &measured)];
+        Ok(Search { best: job.settings().integrator, rule: measured.clone(), measured, pilot, trials })
+    }
+
+    /// Applies the first of the changes that gains, for as long as it does.
+    fn climb(&mut self, job: &mut RenderJob, changes: &[Change], how: &Preparation<'_>) -> Result<(), PlanError> {
+        for change in changes {
+            let mut gains = false;
+            while let Some(settings) = change.of(&self.best) {
+                how.goes_on()?;
+                if settings.uses_visibility_cache() && job.lights.visibility_cache().is_none() {
+                    job.lights.set_visibility_cache(build_visibility_cache(job).map(|(cache, _)| cache));
+                }
+                job.change(|s| s.integrator = settings);
+                let measured = self.pilot.measure(job);
+                self.trials.push(trial(job, &measured, &self.rule));
+                if !measured.is_better_than(&self.measured) {
+                    break;
+                }
+                (self.best, self.measured, gains) = (settings, measured, true);
+            }
+            if gains {
+                break;
+            }
+        }
+        job.change(|s| s.integrator = self.best);
+        Ok(())
+    }
+}
+
+fn trial(job: &RenderJob, measured: &Measured, rule: &Measured) -> Trial {
+    let (gain, error) = measured.gain_over(rule);
+    Trial { name: job.settings().summary(), nanoseconds: measured.nanoseconds, efficiency: gain.exp(), error }
+}

@@ -1,0 +1,69 @@
+//! Builds the visibility cache before rendering, where the settings ask for it [Keller and Wald 2000, §3].
+//!
+//! Photon paths start at the lights that matter where the camera looks: importons, which the camera emits, choose
+//! lights by the light tree, and the lights chosen get most of the photon paths. So the time of the cache, and its
+//! resolution where it is used, do not depend on the number of lights elsewhere.
+
+use super::constants::{IMPORTON_DEPTH, IMPORTON_PATHS, PHOTON_PATHS, UNIFORM_FRACTION};
+use crate::lights::{LightCtx, VisibilityCache};
+use crate::photons::{PhotonBudget, Tracing, importons, trace_photons};
+use crate::scene::RenderJob;
+use crate::settings::IntegratorKind;
+use lumiris_numbers::math::Vec3;
+use lumiris_numbers::math::hash::{pcg4d, unit_f32};
+
+const IMPORTON_SEED: u32 = 0x6c69_6768;
+
+/// Traces photons straight from lights on all threads of the current pool, and builds the cache from them; returned
+/// with their number. `None` if no photon arrives at a surface: estimates then do without a cache.
+pub fn build_visibility_cache(job: &RenderJob) -> Option<(VisibilityCache, usize)> {
+    let lights = &job.lights;
+    let paths = job.settings().integrator.photons.visibility_photons.map_or(PHOTON_PATHS, u64::from);
+    let seen = seen_points(job);
+    let weights = weights_at(job, &seen);
+    let tracing = Tracing {
+        seed: job.settings().sampling.seed,
+        max_depth: 0,
+        max_global_depth: 0,
+        floor: UNIFORM_FRACTION,
+        light_weights: weights.as_deref(),
+        ..Tracing::default()
+    };
+    let traced = trace_photons(job, &tracing, None, PhotonBudget::Paths(paths)).ok()?;
+    let primary: Vec<_> =
+        traced.global.iter().filter_map(|photon| Some((photon.p(), photon.n(), photon.light()?))).collect();
+    if primary.is_empty() {
+        return None;
+    }
+    let distribution = tracing.light_distribution(lights)?;
+    let paths = lights.lit.iter().map(|&light| (light, paths as f32 * distribution.pmf(light)));
+    let cache = VisibilityCache::adapted_to(&seen, &primary, lights.scene_radius).with_paths(paths);
+    Some((cache, primary.len()))
+}
+
+/// Points that the camera sees, directly or by way of others: positions and normals of importons.
+pub(super) fn seen_points(job: &RenderJob) -> Vec<(Vec3, Vec3)> {
+    let settings = job.settings();
+    let depth = match settings.integrator.kind {
+        IntegratorKind::Direct => 0,
+        IntegratorKind::Path | IntegratorKind::IrradianceCache | IntegratorKind::PhotonMap => {
+            settings.integrator.max_depth.saturating_sub(1).min(IMPORTON_DEPTH)
+        }
+    };
+    let importons = importons(job, settings.sampling.seed, IMPORTON_PATHS, depth);
+    importons.iter().map(|importon| (importon.p(), importon.n())).collect()
+}
+
+/// How often the light tree chooses each light at some points; `None` if it chooses none.
+fn weights_at(job: &RenderJob, points: &[(Vec3, Vec3)]) -> Option<Vec<f32>> {
+    let lights = &job.lights;
+    let tree = lights.tree_choice();
+    let mut weights = vec![0.0; lights.lights.len()];
+    for (i, &(p, n)) in (0..).zip(points) {
+        let [u, ..] = pcg4d([i, job.settings().sampling.seed, IMPORTON_SEED, 0]).map(unit_f32);
+        if let Some(choice) = tree.sample(&LightCtx::on(p, n), u) {
+            weights[choice.light as usize] += 1.0;
+        }
+    }
+    weights.iter().any(|&weight| weight > 0.0).then_some(weights)
+}

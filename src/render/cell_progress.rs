@@ -1,0 +1,122 @@
+//! How far cells are where pixels share paths: what a rendering that stops within a pass goes on from.
+
+use crate::film::encoding::{Decoder, Encoder};
+use crate::integrators::cells::TURNS;
+use std::collections::BTreeMap;
+
+/// The next turns of cells, and of the pixels of tiles that are estimated twice, that are further than all.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct CellProgress {
+    /// By the turns that have the same cells: the next turn of each cell.
+    cells: BTreeMap<u32, Vec<u32>>,
+    /// That of the second estimates of each tile.
+    replicas: Vec<u32>,
+}
+
+impl CellProgress {
+    /// True if no cell is further than all.
+    pub(super) fn is_empty(&self) -> bool {
+        self.cells.is_empty() && self.replicas.is_empty()
+    }
+
+    /// The turn after the last one that a cell has.
+    pub(super) fn end(&self) -> Option<u32> {
+        self.cells.values().flatten().chain(&self.replicas).copied().max()
+    }
+
+    /// True if it has as many cells, of turns that have the same ones, and as many tiles as an image has.
+    pub(super) fn fits(&self, cells: impl Fn(u32) -> usize, tiles: usize) -> bool {
+        let is_of_group = |(&group, next): (&u32, &Vec<u32>)| {
+            let turns = group.checked_mul(TURNS).map(|first| first..=first.saturating_add(TURNS));
+            turns.is_some_and(|turns| next.iter().all(|n| *n == 0 || turns.contains(n)) && next.len() == cells(group))
+        };
+        self.cells.iter().all(is_of_group) && [0, tiles].contains(&self.replicas.len())
+    }
+
+    /// The next turn of a cell, if it is known.
+    pub(super) fn of_cell(&self, group: u32, cell: usize) -> u32 {
+        self.cells.get(&group).map_or(0, |next| next[cell])
+    }
+
+    /// The same of the second estimates of a tile.
+    pub(super) fn of_replicas(&self, tile: usize) -> u32 {
+        self.replicas.get(tile).copied().unwrap_or(0)
+    }
+
+    /// Notes the next turn of one of so many cells.
+    pub(super) fn set_cell(&mut self, group: u32, (cell, count): (usize, usize), next: u32) {
+        self.cells.entry(group).or_insert_with(|| vec![0; count])[cell] = next;
+    }
+
+    /// The same of the second estimates of one of so many tiles.
+    pub(super) fn set_replicas(&mut self, (tile, count): (usize, usize), next: u32) {
+        self.replicas.resize(count, 0);
+        self.replicas[tile] = next;
+    }
+
+    /// Forgets where nothing is further than this turn, which is the next one of all pixels.
+    pub(super) fn forget_before(&mut self, turn: u32) {
+        let is_further = |next: &[u32]| next.iter().any(|n| *n > turn);
+        self.cells.retain(|_, next| is_further(next));
+        if !is_further(&self.replicas) {
+            self.replicas.clear();
+        }
+    }
+
+    /// Appends it to bytes.
+    pub(super) fn write(&self, encoder: &mut Encoder) {
+        let mut list = |values: &[u32]| {
+            encoder.word(values.len() as u32);
+            values.iter().for_each(|value| encoder.word(*value));
+        };
+        list(&self.replicas);
+        self.cells.iter().for_each(|(group, next)| {
+            list(&[*group]);
+            list(next);
+        });
+    }
+
+    /// Reads what [`Self::write`] has written, to the end; `None` if it means nothing.
+    pub(super) fn read(decoder: &mut Decoder<'_>) -> Option<Self> {
+        let list = |decoder: &mut Decoder<'_>| {
+            let len = decoder.word()?;
+            (0..len).map(|_| decoder.word()).collect::<Option<Vec<u32>>>()
+        };
+        let mut progress = CellProgress { cells: BTreeMap::new(), replicas: list(decoder)? };
+        while !decoder.is_at_end() {
+            let [group] = list(decoder)?[..] else { return None };
+            progress.cells.insert(group, list(decoder)?);
+        }
+        Some(progress)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_written_is_read_and_fits_the_same_cells_alone() {
+        let mut progress = CellProgress::default();
+        progress.set_cell(2, (1, 3), 10);
+        progress.set_cell(3, (2, 5), 16);
+        progress.set_replicas((6, 7), 12);
+        let mut encoder = Encoder::default();
+        progress.write(&mut encoder);
+        let read = |bytes: &[u8]| CellProgress::read(&mut Decoder::new(bytes));
+        assert_eq!(read(&encoder.bytes).as_ref(), Some(&progress));
+        assert_eq!(read(&encoder.bytes[..encoder.bytes.len() - 1]), None);
+        assert_eq!([progress.of_cell(2, 1), progress.of_cell(2, 0), progress.of_cell(4, 9)], [10, 0, 0]);
+        assert_eq!([progress.of_replicas(6), progress.of_replicas(0)], [12, 0]);
+
+        let cells = |group: u32| if group == 2 { 3 } else { 5 };
+        assert!(progress.fits(cells, 7) && !progress.fits(cells, 8) && !progress.fits(|_| 3, 7));
+        assert_eq!(progress.end(), Some(16));
+        progress.forget_before(12);
+        assert_eq!((progress.cells.len(), progress.replicas.len()), (1, 0));
+        progress.set_cell(2, (0, 3), 13);
+        assert!(!progress.fits(cells, 7), "a turn beyond those of its group");
+        progress.forget_before(16);
+        assert!(progress.is_empty() && progress.fits(cells, 7));
+    }
+}

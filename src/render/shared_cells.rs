@@ -1,0 +1,209 @@
+//! Passes over images whose pixels share paths.
+//!
+//! The unit of work is a cell of some turns ([`cells`]), whose pixels are traced together; then their sums are added to those of
+//! the tiles that it touches. The sums are exact, so the order does not matter. Pixels that are estimated twice share in cells of
+//! their own, which are tiles. Which units are done is kept until all pixels have the samples of the pass
+//! ([`super::cell_progress`]).
+
+use super::run::{Pass, Run};
+use super::tiles::{Tile, Tiles};
+use super::worker::{AnyWorker, Workers};
+use crate::direct::{Estimator, Fits};
+use crate::film::exact::FixedSum;
+use crate::film::replicas::ReplicaAccumulator;
+use crate::film::{Film, PixelBounds};
+use crate::integrators::PathStats;
+use crate::integrators::cells::{REPLICA_CELL, TURNS, cells};
+use rayon::prelude::*;
+use std::ops::Range;
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+/// What is traced together.
+struct Unit {
+    of: Of,
+    turns: Range<u32>,
+    is_done: bool,
+}
+
+/// Which pixels of a unit.
+#[derive(Clone, Copy)]
+enum Of {
+    /// The cell of this index, of `count`, in the turns of a group.
+    Cell { bounds: PixelBounds, group: u32, index: usize, count: usize },
+    /// The second estimates of the tile of this index.
+    Replicas(usize),
+}
+
+/// Tiles that threads add samples to.
+struct SharedTiles<'a> {
+    image: PixelBounds,
+    tiles: Vec<Mutex<&'a mut Tile>>,
+}
+
+impl<'a> SharedTiles<'a> {
+    /// The tiles that have pixels of some bounds.
+    fn touched(&self, bounds: &PixelBounds) -> impl Iterator<Item = MutexGuard<'_, &'a mut Tile>> {
+        let columns = self.image.width().div_ceil(REPLICA_CELL);
+        let range =
+            |from: u32, to: u32, origin: u32| (from - origin) / REPLICA_CELL..(to - origin).div_ceil(REPLICA_CELL);
+        let rows = range(bounds.y0, bounds.y1, self.image.y0);
+        let of_row = range(bounds.x0, bounds.x1, self.image.x0);
+        rows.flat_map(move |y| of_row.clone().map(move |x| self.tile((y * columns + x) as usize)))
+    }
+
+    fn tile(&self, index: usize) -> MutexGuard<'_, &'a mut Tile> {
+        self.tiles[index].lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl Run<'_> {
+    /// True if tiles, and how far their cells are, can be gone on from.
+    pub(super) fn has_cells(&self, Tiles { tiles, cells: progress }: &Tiles) -> bool {
+        if !self.shares_paths {
+            return progress.is_empty();
+        }
+        let image = &self.job.world.scene.film.bounds;
+        let bounds = image.tiles(REPLICA_CELL);
+        let are_alike = bounds.len() == tiles.len()
+            && tiles.iter().zip(bounds).all(|(tile, bounds)| tile.bounds == bounds && tile.done == tiles[0].done);
+        let count = |group: u32| cells(image, group.wrapping_mul(TURNS), self.seed()).len();
+        are_alike && progress.fits(count, tiles.len()) && progress.end().is_none_or(|end| end <= self.end())
+    }
+
+    /// Adds the samples of a pass to all tiles, as far as these do not have them.
+    pub(super) fn pass_of_cells(&self, workers: &Workers<'_>, tiles: &mut Tiles, pass: &Pass<'_>) -> PathStats {
+        let total = self.samples_total(&tiles.tiles);
+        let mut units = self.units(tiles, &pass.samples);
+        let image = self.job.world.scene.film.bounds;
+        let shared = SharedTiles { image, tiles: tiles.tiles.iter_mut().map(Mutex::new).collect() };
+        let of_unit = |unit: &mut Unit| {
+            if pass.is_over() || self.stops_at_once() || self.leaves(unit.turns.start) {
+                return PathStats::default();
+            }
+            let seen = |film: Film| {
+                if let Some(watch) = pass.watch {
+                    watch(&film)
+                }
+            };
+            let stats = workers.with_one(|worker| {
+                match unit.of {
+                    Of::Cell { bounds, .. } => self.render_cell(worker, &shared, (&bounds, &unit.turns), seen),
+                    Of::Replicas(tile) => self.render_replicas_of(worker, &shared, (tile, &unit.turns)),
+                }
+                worker.take_stats()
+            });
+            unit.is_done = true;
+            let pixels = if let Of::Cell { bounds, .. } = unit.of { bounds.area() } else { 0 };
+            self.note(&stats, pixels as u64 * unit.turns.len() as u64, (total, pass.noise));
+            stats
+        };
+        let stats = units.par_iter_mut().with_max_len(1).map(of_unit).reduce(PathStats::default, |mut a, b| {
+            a.merge(&b);
+            a
+        });
+        note_units(tiles, &units, pass.samples.end);
+        stats
+    }
+
+    /// The units of a pass that are not done.
+    fn units(&self, Tiles { tiles, cells: progress }: &Tiles, samples: &Range<u32>) -> Vec<Unit> {
+        let unit = |of: Of, next: u32, end: u32| {
+            let turns = next.max(samples.start)..end.min(samples.end);
+            (!turns.is_empty()).then_some(Unit { of, turns, is_done: false })
+        };
+        let image = &self.job.world.scene.film.bounds;
+        let of_group = |group: u32| {
+            let cells = cells(image, group * TURNS, self.seed());
+            let count = cells.len();
+            cells.into_iter().enumerate().filter_map(move |(index, bounds)| {
+                let next = progress.of_cell(group, index).max(group * TURNS);
+                unit(Of::Cell { bounds, group, index, count }, next, (group * TURNS).saturating_add(TURNS))
+            })
+        };
+        let of_cells = (samples.start / TURNS..=(samples.end - 1) / TURNS).flat_map(of_group);
+        let twice = tiles.iter().enumerate().filter(|(_, tile)| !tile.replicas.is_empty());
+        let of_replicas = twice.filter_map(|(i, _)| unit(Of::Replicas(i), progress.of_replicas(i), samples.end));
+        of_cells.chain(of_replicas).collect()
+    }
+
+    /// Traces a cell, and adds its samples to the tiles that have its pixels, which are passed on.
+    fn render_cell(
+        &self,
+        worker: &mut AnyWorker<'_>,
+        tiles: &SharedTiles<'_>,
+        (cell, turns): (&PixelBounds, &Range<u32>),
+        seen: impl Fn(Film),
+    ) {
+        let mut fits = self.fits(cell.area());
+        worker.begin(cell.area());
+        self.trace_pixels_of(worker, &mut fits, cell, turns);
+        let controls = fits.exact_sums();
+        for mut tile in tiles.touched(cell) {
+            worker.add_to(&mut tile, cell);
+            merge_controls(&mut tile, cell, &controls);
+            tile.fits.pack(&mut worker.packing);
+            seen(self.film_of(&tile));
+        }
+    }
+
+    /// Traces the second estimates of a tile.
+    fn render_replicas_of(
+        &self,
+        worker: &mut AnyWorker<'_>,
+        tiles: &SharedTiles<'_>,
+        (tile, turns): (usize, &Range<u32>),
+    ) {
+        let shared = &tiles.tiles[tile];
+        let (bounds, mut replicas) = {
+            let tile = tiles.tile(tile);
+            let none = |r: &ReplicaAccumulator| ReplicaAccumulator { pixel: r.pixel, ..ReplicaAccumulator::default() };
+            (tile.bounds, tile.replicas.iter().map(none).collect::<Vec<_>>())
+        };
+        let mut fits = self.fits(bounds.area() + replicas.len());
+        self.render_replicas(worker, (&bounds, &mut replicas, &mut fits), turns);
+        let mut tile = shared.lock().unwrap_or_else(PoisonError::into_inner);
+        tile.replicas.iter_mut().zip(&replicas).for_each(|(sum, more)| sum.merge(more));
+        let sums = fits.exact_sums();
+        let row = sums.len() / (bounds.area() + replicas.len());
+        (0..).zip(sums.chunks_exact(row.max(1))).for_each(|(fit, sums)| {
+            tile.fits.merge_sums(fit, sums);
+        });
+        tile.fits.pack(&mut worker.packing);
+    }
+
+    fn fits(&self, count: usize) -> Fits {
+        Estimator::at_vertex(&self.job.settings().integrator, 0).fits(self.job, count)
+    }
+
+    fn seed(&self) -> u32 {
+        self.job.settings().sampling.seed
+    }
+}
+
+/// Adds the sums of the control variates of a cell to those of a tile.
+fn merge_controls(tile: &mut Tile, cell: &PixelBounds, controls: &[FixedSum]) {
+    let row = controls.len() / cell.area();
+    if row == 0 {
+        return;
+    }
+    let bounds = tile.bounds;
+    for (of_tile, of_cell) in bounds.common_rows(cell) {
+        for (to, from) in of_tile.zip(of_cell) {
+            tile.fits.merge_sums(to as u32, &controls[from * row..][..row]);
+        }
+    }
+}
+
+/// Notes which units of a pass that ends at `end` are done.
+fn note_units(Tiles { tiles, cells: progress }: &mut Tiles, units: &[Unit], end: u32) {
+    for unit in units.iter().filter(|unit| unit.is_done) {
+        match unit.of {
+            Of::Cell { group, index, count, .. } => progress.set_cell(group, (index, count), unit.turns.end),
+            Of::Replicas(tile) => progress.set_replicas((tile, tiles.len()), unit.turns.end),
+        }
+    }
+    if units.iter().all(|unit| unit.is_done) {
+        tiles.iter_mut().for_each(|tile| tile.done = end);
+        progress.forget_before(end);
+    }
+}
