@@ -16,8 +16,8 @@ use lumiris::import::{Loaded, is_gltf, load_text, load_with};
 use lumiris::planning::allocation::complete_for_noise;
 use lumiris::planning::preparation::complete_for_time;
 use lumiris::planning::{Preparation, prepare};
-use lumiris::render::RenderSettings;
 use lumiris::render::parts::Stored;
+use lumiris::render::{RenderError, RenderSettings};
 use lumiris::scene::RenderJob;
 use lumiris::settings::Given;
 use lumiris_formats::source::read_bytes;
@@ -197,7 +197,7 @@ pub(super) fn plan(
     let _preparing = interrupt::during(format!("measuring what the settings of {} leave open", args.name()));
     let asked = *job.settings();
     let how = Preparation { threads: args.threads.map(|t| t as usize), observe: &progress::stage, ..*how };
-    let plan = prepare(job, &how)?;
+    let plan = prepare(job, &how).map_err(RenderError::from)?;
     if !quiet {
         plan.tuning.iter().for_each(|tuning| progress::say(&outcome(tuning)));
         progress::say_once(&job.settings().summary());
