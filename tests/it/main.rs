@@ -31,6 +31,7 @@ mod path_reuse;
 mod photon_map;
 mod photons;
 mod portals;
+mod principled;
 mod ptex;
 mod same_light;
 mod sample_allocation;
