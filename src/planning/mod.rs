@@ -68,8 +68,8 @@ pub fn has_pilot(settings: &Settings) -> bool {
 fn complete(job: &mut RenderJob, open: &Settings, how: &Preparation<'_>) -> Result<Plan, PlanError> {
     let pool = preparation::thread_pool(how.threads)?;
     (how.observe)("looking at the scene", None);
-    pool.install(|| rule::apply(job));
-    let tuning = if how.tunes { pool.install(|| tune::tune(job, open, how))? } else { None };
+    let facts = pool.install(|| rule::apply(job)).filter(|_| how.tunes);
+    let tuning = facts.map(|facts| pool.install(|| tune::tune(job, (open, &facts), how))).transpose()?;
     if job.settings().sampling.allocation == Allocation::Auto {
         job.change(|s| s.sampling.allocation = Allocation::Uniform);
     }

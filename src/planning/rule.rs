@@ -25,18 +25,19 @@ use crate::lights::LightCtx;
 use crate::scene::RenderJob;
 use crate::settings::{Allocation, ContributingSettings, EstimatorKind, IntegratorKind, IntegratorSettings, Settings};
 
-/// Chooses what the settings of `job` leave open, if their estimator is `auto`. On the threads of the current pool.
-pub(super) fn apply(job: &mut RenderJob) {
+/// Chooses what the settings of `job` leave open, if their estimator is `auto`; the facts by which it did. On the threads of the
+/// current pool.
+pub(super) fn apply(job: &mut RenderJob) -> Option<Facts> {
     let Settings { integrator: base, sampling } = *job.settings();
     if base.estimator != EstimatorKind::Auto {
-        return;
+        return None;
     }
     job.change(|s| s.integrator.estimator = EstimatorKind::Mis);
     if sampling.allocation == Allocation::Auto {
         job.change(|s| s.sampling.allocation = Allocation::Adaptive);
     }
     if !matches!(base.kind, IntegratorKind::Direct | IntegratorKind::Path) {
-        return;
+        return None;
     }
     // Media that glow are lights only where the path is the one BSDF sample
     if job.lights.find_glows() && base.bsdf_fraction.is_none() {
@@ -51,6 +52,7 @@ pub(super) fn apply(job: &mut RenderJob) {
     if base.light_paths.is_none() && job.world.scene.materials.make_caustics() && light_paths::obstacle(job).is_none() {
         job.change(|s| s.integrator.light_paths = Some(LIGHT_PATHS));
     }
+    Some(facts)
 }
 
 /// `mis` with the numbers for a scene with these facts, where they are open.

@@ -10,15 +10,13 @@ use super::trials::{Measured, Trials};
 use super::visibility_cache::build_visibility_cache;
 use crate::integrators::{reuse, through_media};
 use crate::scene::RenderJob;
-use crate::settings::{
-    Allocation, ContributingSettings, EstimatorKind, IntegratorKind, IntegratorSettings, Settings, bsdf_samples,
-};
+use crate::settings::{Allocation, ContributingSettings, EstimatorKind, IntegratorSettings, Settings, bsdf_samples};
 use serde::{Deserialize, Serialize};
 
 /// Settings that were tried.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 pub struct Trial {
-    /// Their summary.
+    /// How they differ from the best so far.
     pub name: String,
     /// Processor time of a camera sample (ns).
     pub nanoseconds: f64,
@@ -44,19 +42,17 @@ pub struct Tuning {
     pub seconds: f64,
 }
 
-/// Tunes the settings of a job, which are the rule's; `open` are those from which the rule chose. `None` where there is nothing to tune.
-pub(super) fn tune(job: &mut RenderJob, open: &Settings, how: &Preparation<'_>) -> Result<Option<Tuning>, PlanError> {
-    let kind = open.integrator.kind;
-    if open.integrator.estimator != EstimatorKind::Auto
-        || !matches!(kind, IntegratorKind::Direct | IntegratorKind::Path)
-    {
-        return Ok(None);
-    }
+/// Tunes the settings of a job, which are the rule's; `open` are those from which the rule chose, by `facts`.
+pub(super) fn tune(
+    job: &mut RenderJob,
+    (open, facts): (&Settings, &Facts),
+    how: &Preparation<'_>,
+) -> Result<Tuning, PlanError> {
     let start = processor_time::of_process();
     let rule = job.settings().integrator;
     let mut search = Search::new(job, how)?;
-    for candidates in steps(open, job) {
-        search.climb(job, &candidates, how)?;
+    for changes in steps(open, facts, job) {
+        search.climb(job, &changes, how)?;
     }
     let found = search.best;
     let mut trials = Trials::new(job, how, (2 * TUNE_CELLS, 1), TUNE_SPP);
@@ -71,14 +67,13 @@ pub(super) fn tune(job: &mut RenderJob, open: &Settings, how: &Preparation<'_>) 
         job.lights.set_visibility_cache(None);
     }
     let seconds = (processor_time::of_process() - start).as_secs_f64();
-    Ok(Some(Tuning { trials: search.trials, gain: gain.exp(), error, is_taken, seconds }))
+    Ok(Tuning { trials: search.trials, gain: gain.exp(), error, is_taken, seconds })
 }
 
 /// The changes that are tried one after the other, where the settings are open: each is applied for as long as it gains.
-fn steps(open: &Settings, job: &RenderJob) -> Vec<Vec<Change>> {
+fn steps(open: &Settings, facts: &Facts, job: &RenderJob) -> Vec<Vec<Change>> {
     let i = open.integrator;
     let mut steps: Vec<Vec<Change>> = Vec::new();
-    let facts = Facts::of(job);
     let knows_media = |estimator| {
         let s = IntegratorSettings { estimator, ..i };
         job.world.scene.media.is_empty() || through_media::obstacle_of(&s).is_none()
@@ -153,6 +148,24 @@ impl Change {
         let goes_on = s.depth() <= 1 || bsdf_samples(s.sample_counts_at(1).samples.max(2), s.bsdf_fraction()) == 1;
         (s != *settings && goes_on).then_some(s)
     }
+
+    /// What it makes of the settings.
+    fn name(self, s: &IntegratorSettings) -> String {
+        let [first, later] = [0, 1].map(|vertex| s.sample_counts_at(vertex).samples);
+        match self {
+            Change::Double | Change::Halve => format!("{first} samples"),
+            Change::Bsdf(_) => {
+                format!("{} of {first} samples by the BSDF", bsdf_samples(first.max(2), s.bsdf_fraction()))
+            }
+            Change::MoreLater | Change::FewerLater => format!("{later} samples at later vertices"),
+            Change::LargerBlocks | Change::SmallerBlocks => {
+                format!("paths shared by {0} × {0} pixels", s.path_reuse.unwrap_or(1))
+            }
+            Change::Sky(fraction) => format!("{fraction} of the light samples for the sky"),
+            Change::Resampling => "resampling (RIS)".to_owned(),
+            Change::Contributing => "lights that photons find".to_owned(),
+        }
+    }
 }
 
 /// The best settings so far.
@@ -161,6 +174,8 @@ struct Search {
     measured: Measured,
     rule: Measured,
     pilot: Trials,
+    /// Settings that were tried.
+    tried: Vec<IntegratorSettings>,
     trials: Vec<Trial>,
 }
 
@@ -173,22 +188,24 @@ impl Search {
         let start = processor_time::of_process();
         let measured = pilot.measure(job);
         (how.expect)((processor_time::of_process() - start).mul_f64(TUNE_TRIALS));
-        let trials = vec![trial(job, &measured, &measured)];
-        Ok(Search { best: job.settings().integrator, rule: measured.clone(), measured, pilot, trials })
+        let best = job.settings().integrator;
+        let trials = vec![trial("the rule".to_owned(), &measured, &measured)];
+        Ok(Search { best, rule: measured.clone(), measured, pilot, tried: vec![best], trials })
     }
 
     /// Applies the first of the changes that gains, for as long as it does.
     fn climb(&mut self, job: &mut RenderJob, changes: &[Change], how: &Preparation<'_>) -> Result<(), PlanError> {
         for change in changes {
             let mut gains = false;
-            while let Some(settings) = change.of(&self.best) {
+            while let Some(settings) = change.of(&self.best).filter(|settings| !self.tried.contains(settings)) {
                 how.goes_on()?;
+                self.tried.push(settings);
                 if settings.uses_visibility_cache() && job.lights.visibility_cache().is_none() {
                     job.lights.set_visibility_cache(build_visibility_cache(job).map(|(cache, _)| cache));
                 }
                 job.change(|s| s.integrator = settings);
                 let measured = self.pilot.measure(job);
-                self.trials.push(trial(job, &measured, &self.rule));
+                self.trials.push(trial(change.name(&settings), &measured, &self.rule));
                 if !measured.is_better_than(&self.measured) {
                     break;
                 }
@@ -203,7 +220,7 @@ impl Search {
     }
 }
 
-fn trial(job: &RenderJob, measured: &Measured, rule: &Measured) -> Trial {
+fn trial(name: String, measured: &Measured, rule: &Measured) -> Trial {
     let (gain, error) = measured.gain_over(rule);
-    Trial { name: job.settings().summary(), nanoseconds: measured.nanoseconds, efficiency: gain.exp(), error }
+    Trial { name, nanoseconds: measured.nanoseconds, efficiency: gain.exp(), error }
 }

@@ -99,7 +99,9 @@ impl Extent {
                 let until = |i: u32| (u64::from(spp) * u64::from(i) / u64::from(n)) as u32;
                 (settings.skip, settings.spp) = (until(i - 1), until(i));
                 if spp < n {
-                    let reason = format!("{spp} samples per pixel cannot be {n} parts: divide with --part-by tiles");
+                    let reason = format!(
+                        "{spp} samples per pixel cannot be {n} parts: divide with --part-by tiles, if pixels share no paths"
+                    );
                     return Err(ExtentError(reason));
                 }
             }

@@ -188,7 +188,9 @@ fn check(args: &SlurmArgs) -> anyhow::Result<(RenderArgs, bool)> {
     };
     let (spp, count) = (settings.sampling.spp, args.count());
     if is_uniform && args.part_by == PartBy::Samples && spp < count {
-        let message = format!("{spp} samples per pixel cannot be {count} parts: divide with --part-by tiles");
+        let message = format!(
+            "{spp} samples per pixel cannot be {count} parts: divide with --part-by tiles, if pixels share no paths"
+        );
         return Err(UsageError(message).into());
     }
     Ok((render, needs_plan))

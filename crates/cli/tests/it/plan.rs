@@ -1,4 +1,4 @@
-//! Plans: what a rendering chose by measured times, given to another one.
+//! Plans: what a rendering chose, given to another one.
 
 use lumiris::imaging::oiio::{ReadImage, ReadLimits, read_image};
 use std::path::Path;
@@ -120,7 +120,7 @@ fn noise_is_reached_with_samples_where_they_are_needed() {
     let folder = tempfile::tempdir().unwrap();
     let path = gallery();
     let image = |noise: &str, name: &str| {
-        // A choice by measured times would differ between both
+        // Trials would differ between both
         let size = ["--resolution", "64x48", "--estimator", "mis", "--samples", "2"];
         let args = ["render", &path, "--integrator", "direct", "--noise", noise, "-q", "-o", name];
         let output = lumiris(&[&args[..], &size].concat(), folder.path());
