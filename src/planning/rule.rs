@@ -21,9 +21,10 @@ use super::constants::{
 use super::facts::Facts;
 use super::visibility_cache::{build_visibility_cache, seen_points};
 use crate::integrators::{light_paths, reuse, through_media};
-use crate::lights::LightCtx;
+use crate::lights::{LightCtx, LightId};
 use crate::scene::RenderJob;
 use crate::settings::{Allocation, ContributingSettings, EstimatorKind, IntegratorKind, IntegratorSettings, Settings};
+use std::collections::BTreeSet;
 
 /// Chooses what the settings of `job` leave open, if their estimator is `auto`; the facts by which it did. On the threads of the
 /// current pool.
@@ -47,7 +48,7 @@ pub(super) fn apply(job: &mut RenderJob) -> Option<Facts> {
     let shares = sampling.allocation == Allocation::Auto && reuse::obstacle(job).is_none();
     job.change(|s| s.integrator = with_numbers(&s.integrator, &facts, shares));
     if facts.lights >= MANY_LIGHTS && !job.lights.find_glows() {
-        choose_contributing(job);
+        choose_contributing(job, &facts);
     }
     if base.light_paths.is_none() && job.world.scene.materials.make_caustics() && light_paths::obstacle(job).is_none() {
         job.change(|s| s.integrator.light_paths = Some(LIGHT_PATHS));
@@ -92,7 +93,7 @@ fn with_numbers(settings: &IntegratorSettings, facts: &Facts, shares: bool) -> I
 }
 
 /// Takes `contributing` if photons find that most lights are hidden where the camera looks.
-fn choose_contributing(job: &mut RenderJob) {
+fn choose_contributing(job: &mut RenderJob, facts: &Facts) {
     let before = job.settings().integrator;
     let depth = before.depth();
     let s = IntegratorSettings { estimator: EstimatorKind::Contributing, ..before };
@@ -102,10 +103,16 @@ fn choose_contributing(job: &mut RenderJob) {
     let Some((cache, _)) = build_visibility_cache(job) else { return };
     job.lights.set_visibility_cache(Some(cache));
     let points = seen_points(job);
-    let lit = job.world.scene.lights.lit.len();
-    let found = |&(p, n): &_| job.lights.contributing_lights(&LightCtx::on(p, n)).lights.len() as f64 / lit as f64;
-    let seen = points.iter().map(found).sum::<f64>() / points.len().max(1) as f64;
-    if points.is_empty() || 1.0 - seen < MOST_HIDDEN {
+    // Some triangles of a lamp face away from any point
+    let sources = job.world.scene.lights.sources();
+    let lamp = |&(light, _): &(LightId, u32)| sources[light as usize].map_or((1, light), |source| (0, source));
+    let found = |&(p, n): &_| {
+        let contributing = job.lights.contributing_lights(&LightCtx::on(p, n));
+        contributing.lights.iter().map(lamp).collect::<BTreeSet<_>>().len()
+    };
+    let seen = points.iter().map(found).sum::<usize>() as f64;
+    let all = (points.len() * facts.lights) as f64;
+    if points.is_empty() || 1.0 - seen / all < MOST_HIDDEN {
         job.lights.set_visibility_cache(None);
         return;
     }

@@ -139,6 +139,18 @@ fn contributing_is_taken_where_most_of_many_lights_are_hidden() {
         (job.settings().integrator.estimator, job.lights.visibility_cache().is_some())
     };
     assert_eq!(estimator(&lamps(0.5)), (EstimatorKind::Mis, false), "all are seen");
+    // Of each of these tetrahedra three triangles or more face away from most points
+    let meshes: String = (0..18)
+        .map(|i| {
+            format!(
+                "AttributeBegin AreaLightSource \"diffuse\" \"rgb L\" [ 1 1 1 ] Translate {} 0.4 0\n\
+                 Shape \"trianglemesh\" \"point3 P\" [ 0 0 0  0.02 0 0  0 0.02 0  0 0 0.02 ]\n\
+                 \"integer indices\" [ 0 2 1  0 1 3  0 3 2  1 2 3 ] AttributeEnd\n",
+                0.05 * f64::from(i) - 0.45
+            )
+        })
+        .collect();
+    assert_eq!(estimator(&meshes), (EstimatorKind::Mis, false), "all lamps are seen, of their triangles few");
     assert_eq!(estimator(&(lamps(3.0) + LAMP)), (EstimatorKind::Contributing, true), "one is seen");
 }
 
