@@ -139,14 +139,15 @@ fn contributing_is_taken_where_most_of_many_lights_are_hidden() {
         (job.settings().integrator.estimator, job.lights.visibility_cache().is_some())
     };
     assert_eq!(estimator(&lamps(0.5)), (EstimatorKind::Mis, false), "all are seen");
-    // Of each of these tetrahedra three triangles or more face away from most points
+    // Six of the eight triangles of each lamp shine at the ceiling right above
+    let (down, up) = ("0 1 2  0 2 3", "4 6 5  4 7 6");
     let meshes: String = (0..18)
         .map(|i| {
+            let (x, z) = (0.3 * f64::from(i % 6) - 0.9, 0.3 * f64::from(i / 6) - 0.5);
             format!(
-                "AttributeBegin AreaLightSource \"diffuse\" \"rgb L\" [ 1 1 1 ] Translate {} 0.4 0\n\
-                 Shape \"trianglemesh\" \"point3 P\" [ 0 0 0  0.02 0 0  0 0.02 0  0 0 0.02 ]\n\
-                 \"integer indices\" [ 0 2 1  0 1 3  0 3 2  1 2 3 ] AttributeEnd\n",
-                0.05 * f64::from(i) - 0.45
+                "AttributeBegin AreaLightSource \"diffuse\" \"rgb L\" [ 1 1 1 ] Translate {x} 0.97 {z}\n\
+                 Shape \"trianglemesh\" \"point3 P\" [ 0 0 0  0.1 0 0  0.1 0 0.1  0 0 0.1  0 0.02 0  0.1 0.02 0  0.1 0.02 0.1  0 0.02 0.1 ]\n\
+                 \"integer indices\" [ {down} {up} {up} {up} ] AttributeEnd\n"
             )
         })
         .collect();
