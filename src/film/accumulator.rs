@@ -3,7 +3,25 @@
 
 use super::exact::{FixedSum, LIMIT, SquareSum, UnitSum};
 use super::{PixelSample, PixelSums};
+use lumiris_lanes::sums::{self, Sums, TERM, Term};
+use lumiris_lanes::level;
 use lumiris_numbers::math::Rgb;
+
+/// Samples of which fewer are added one by one: that takes less time.
+const FEW: usize = 3;
+/// Digits between the parts of sums.
+const FIXED_SHIFT: u32 = (sums::HIGH[0] - sums::QUANTA[0]) as u32;
+const SQUARE_SHIFT: u32 = (sums::HIGH[1] - sums::QUANTA[1]) as u32;
+
+impl Term for PixelSample {
+    #[inline(always)]
+    fn numbers(&self) -> [f32; TERM] {
+        let Rgb { r, g, b } = self.radiance;
+        let Some(f) = &self.features else { return [r, g, b, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0] };
+        // Beside the albedo, the hit counts
+        [r, g, b, f.depth, f.albedo.r, f.albedo.g, f.albedo.b, 1.0, f.normal.x, f.normal.y, f.normal.z, 0.0]
+    }
+}
 
 /// Exact sums of radiance.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -88,6 +106,40 @@ impl PixelAccumulator {
         self.first(1, index, features.material + 1, features.object + 1);
     }
 
+    /// Adds samples one after the other, of which the first has the given index.
+    pub fn add_all(&mut self, index: u32, samples: &[PixelSample]) {
+        let mut index = index;
+        for samples in samples.chunks(sums::MOST) {
+            let sums = if samples.len() < FEW { None } else { sums::sums(level(), samples) };
+            match sums {
+                Some(sums) => self.add_sums(index, samples, &sums),
+                None => (index..).zip(samples).for_each(|(index, sample)| self.add(index, sample)),
+            }
+            index = index.wrapping_add(samples.len() as u32);
+        }
+    }
+
+    /// Adds samples, whose sums are given.
+    #[inline]
+    fn add_sums(&mut self, index: u32, samples: &[PixelSample], sums: &Sums) {
+        self.radiance.count = self.radiance.count.wrapping_add(samples.len() as u32);
+        let number = |of: &[[f64; 4]; 2], c: usize| [of[0][c], of[1][c]];
+        for c in 0..3 {
+            self.radiance.radiance[c].add_parts(number(&sums.numbers, c), FIXED_SHIFT);
+            self.squares[c].add_parts(number(&sums.squares, c), SQUARE_SHIFT);
+            self.albedo[c].add_quanta(sums.others[0][c]);
+            self.normal[c].add_quanta(sums.others[1][c]);
+        }
+        self.depth.add_parts(number(&sums.numbers, 3), FIXED_SHIFT);
+
+        let mut hits = UnitSum::default();
+        hits.add_quanta(sums.others[0][3]);
+        let first = (index..).zip(samples).find_map(|(index, sample)| Some((index, sample.features.as_ref()?)));
+        if let Some((index, features)) = first {
+            self.first(hits.value() as u32, index, features.material + 1, features.object + 1);
+        }
+    }
+
     /// Adds other samples. Records are those of the whole image, which all parts have.
     pub fn merge(&mut self, other: &PixelAccumulator) {
         self.radiance.merge(&other.radiance);
@@ -164,6 +216,44 @@ mod tests {
             sums.add(0, &PixelSample { radiance: Rgb::new(value, 1.0, 1.0), ..PixelSample::default() });
             let sums = sums.sums();
             assert_eq!((sums.count, sums.invalid, sums.mean(), sums.radiance_squared), (1, 1, [0.0; 3], [0.0; 3]));
+        }
+    }
+
+    #[test]
+    fn many_samples_at_once_have_the_sums_of_each_by_itself() {
+        let mut s = pcg32([7, 8, 7]);
+        let special = [f32::NAN, f32::INFINITY, -4.0, 4.0, 64.0, 5e11, LIMIT, 1e-45, -0.0];
+        for round in 0..2000 {
+            let exponents = [1.0, 8.0, 40.0][round % 3];
+            let mut number = |limit: f32| {
+                let [a, b, c] = s.random::<[f32; 3]>();
+                match round % 7 {
+                    // Halves of quanta
+                    0 => ((a * 64.0).floor() + 0.5) * [1.0_f32, 0.5][(b < 0.5) as usize] * 2.0_f32.powi(-29),
+                    1 => ((a * 64.0).floor() - 31.5) * 2.0_f32.powi(-56),
+                    2 if c < 0.01 => special[(b * special.len() as f32) as usize],
+                    _ => (b - 0.3).signum() * (1.0 + c) * ((exponents * (a - 1.0)).exp2() * limit),
+                }
+            };
+            let mut sample = |i| {
+                let features = Features {
+                    albedo: Rgb::new(number(2.0), number(1.0), number(0.5)),
+                    normal: Vec3::new(number(1.0), number(1.0), number(1.0)),
+                    depth: number(1e8),
+                    material: i,
+                    object: 2 * i,
+                };
+                let features = Some(features).filter(|f| i > 3 && f.normal.x < 0.7);
+                PixelSample { radiance: Rgb::new(number(31.0), number(1.0), number(1e-3)), features, ..PixelSample::default() }
+            };
+            let samples: Vec<PixelSample> = (0..1 + round as u32 % 300).map(&mut sample).collect();
+            let [mut each, mut all] = [PixelAccumulator::default(); 2];
+            (5..).zip(&samples).for_each(|(i, sample)| each.add(i, sample));
+            all.add_all(5, &samples);
+            assert_eq!(all, each, "{round}");
+            let sums = (samples.len() <= sums::MOST).then(|| sums::sums(level(), &samples));
+            let is_plain = !matches!(round % 7, 2) && exponents < 40.0;
+            assert!(!is_plain || sums.is_none_or(|sums| sums.is_some()), "{round}: not one by one");
         }
     }
 

@@ -11,6 +11,8 @@
 //!
 //! Sums of 2³² such terms do not overflow.
 
+use lumiris_lanes::sums;
+
 /// Magnitude from which on a term is too large for [`FixedSum`], and its square for [`SquareSum`].
 pub const LIMIT: f32 = 549_755_813_888.0;
 /// The same for albedos and normals.
@@ -21,6 +23,9 @@ const SMALL: f64 = 64.0;
 const FIXED_BITS: i32 = 56;
 const SQUARE_BITS: i32 = 80;
 const UNIT_SCALE: f64 = (1_u64 << 29) as f64;
+
+// Those of sums of many at once
+const _: () = assert!(sums::QUANTA[0] == -FIXED_BITS && sums::QUANTA[1] == -SQUARE_BITS && sums::QUANTA[2] == -29);
 
 /// m·2^shift for whole numbers, rounded to the nearest one.
 #[inline(always)]
@@ -79,6 +84,12 @@ impl FixedSum {
         self.0 = { self.0 }.wrapping_add(if x < 0.0 { -term } else { term });
     }
 
+    /// Adds whole numbers of quanta: 2^`shift` times one, and another.
+    #[inline(always)]
+    pub fn add_parts(&mut self, [high, low]: [f64; 2], shift: u32) {
+        self.0 = { self.0 }.wrapping_add((i128::from(high as i64) << shift) + i128::from(low as i64));
+    }
+
     /// Adds another sum.
     pub fn merge(&mut self, other: &FixedSum) {
         self.0 = { self.0 }.wrapping_add(other.0);
@@ -87,7 +98,8 @@ impl FixedSum {
     /// The sum.
     pub fn value(&self) -> f64 {
         let sum = self.0;
-        sum as f64 * power(-FIXED_BITS)
+        // Numbers of 64 bits are converted by the processor
+        i64::try_from(sum).map_or_else(|_| sum as f64, |sum| sum as f64) * power(-FIXED_BITS)
     }
 
     /// The sum in quanta.
@@ -132,6 +144,13 @@ impl SquareSum {
         }
     }
 
+    /// Adds whole numbers of quanta: 2^`shift` times one, and another.
+    #[inline(always)]
+    pub fn add_parts(&mut self, [high, low]: [f64; 2], shift: u32) {
+        let term = ((i128::from(high as i64) << shift) + i128::from(low as i64)) as u128;
+        self.add_limbs([term as u64, (term >> 64) as u64, 0]);
+    }
+
     /// Adds another sum.
     pub fn merge(&mut self, other: &SquareSum) {
         self.add_limbs(other.0);
@@ -165,6 +184,12 @@ impl UnitSum {
         // Rust's conversions saturate, and make 0 of NaN
         let quanta = f64::from(x.clamp(-UNIT_LIMIT, UNIT_LIMIT)) * UNIT_SCALE;
         self.0 = self.0.wrapping_add((quanta + 0.5_f64.copysign(quanta)) as i64);
+    }
+
+    /// Adds a whole number of quanta.
+    #[inline(always)]
+    pub fn add_quanta(&mut self, quanta: f64) {
+        self.0 = self.0.wrapping_add(quanta as i64);
     }
 
     /// Adds another sum.

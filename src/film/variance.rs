@@ -135,7 +135,8 @@ impl Film {
         }
         // Not while others wait for it: a thread that works on this may take up work that asks for it as well
         let bands = self.bands().map_init(Vec::new, |pixels, rows| self.measured_twice(rows, pixels));
-        let replicas = if self.replicas.is_empty() { Vec::new() } else { bands.collect::<Vec<_>>().concat() };
+        let tell = self.replicas.iter().any(|replica| replica.count > 1);
+        let replicas = if tell { bands.collect::<Vec<_>>().concat() } else { Vec::new() };
         let scale = VarianceScale::of(replicas);
         self.variance_scale.get_or_init(|| scale)
     }

@@ -13,7 +13,7 @@ use lumiris_lanes::{level, sampler};
 use lumiris_numbers::estimators::ocv::block_of;
 use lumiris_numbers::math::hash::pcg4d;
 use lumiris_numbers::math::{Ray, Vec2, Vec3};
-use lumiris_numbers::samplers::{SampleStream, SamplerKind};
+use lumiris_numbers::samplers::{NetPoint, SampleStream, SamplerKind};
 use std::ops::Range;
 
 /// Domains of a camera sample.
@@ -57,10 +57,11 @@ enum DirectNumbers {
 /// Memory for many samples at once.
 #[derive(Debug, Default)]
 pub struct Scratch {
-    /// Fit, pixel and index of each sample.
-    places: Vec<(u32, [u32; 2], u32)>,
+    /// The pixels, with the fits and indices of their samples.
+    pixels: Vec<(u32, [u32; 2], Range<u32>)>,
     streams: Vec<SampleStream>,
-    drawn: Vec<SampleStream>,
+    /// Points of which film positions are coordinates.
+    points: Vec<NetPoint>,
     u: [Column; 2],
     weight: Column,
     d: Columns3,
@@ -101,49 +102,66 @@ impl<'a> CameraSampler<'a> {
             }
             return;
         };
-        let Scratch { places, streams, drawn, u: [x, y], weight, d, spread } = scratch;
+        let Scratch { pixels: of_pixels, streams, points, u: [x, y], weight, d, spread } = scratch;
         let kind = self.job.settings().sampling.sampler;
-        places.clear();
+        of_pixels.clear();
         streams.clear();
-        drawn.clear();
+        points.clear();
         for (fit, pixel, samples) in pixels {
-            for sample in samples {
-                let stream = SampleStream::new(kind, pixel, sample, seed);
-                places.push((fit, pixel, sample));
-                streams.push(stream);
-                drawn.push(stream.domain(domain::FILM_AND_LENS));
-            }
+            let key = domain::FILM_AND_LENS;
+            SampleStream::append((kind, pixel, seed), samples.clone(), key, (streams, points));
+            of_pixels.push((fit, pixel, samples));
         }
 
-        let n = places.len();
+        // Film positions
+        let n = streams.len();
         let len = padded(n);
         reserve(&mut [x, y, weight, spread], len);
         d.reserve(len);
-        sampler::draw(level(), drawn, [&mut x[..n], &mut y[..n]]);
-        for (((_, pixel, _), weight), (x, y)) in places.iter().zip(&mut *weight).zip(x.iter_mut().zip(&mut *y)) {
-            let filter = self.filter.sample([*x, *y]);
-            let film = center(*pixel) + filter.offset;
-            (*x, *y, *weight) = (film.x, film.y, filter.weight);
+        if points.len() == n {
+            sampler::draw_points(level(), points, [&mut x[..n], &mut y[..n]]);
+        } else {
+            for ((x, y), stream) in x.iter_mut().zip(&mut *y).zip(&*streams) {
+                [*x, *y] = stream.domain(domain::FILM_AND_LENS).draw();
+            }
+        }
+        let mut first = 0;
+        for (_, pixel, samples) in &*of_pixels {
+            let (of_pixel, center) = (first..first + samples.len(), center(*pixel));
+            first = of_pixel.end;
+            let places = x[of_pixel.clone()].iter_mut().zip(&mut y[of_pixel.clone()]);
+            for ((x, y), weight) in places.zip(&mut weight[of_pixel]) {
+                let filter = self.filter.sample([*x, *y]);
+                let film = center + filter.offset;
+                (*x, *y, *weight) = (film.x, film.y, filter.weight);
+            }
         }
         let mut rays = PinholeRays { d: d.get_mut(len), spread: &mut spread[..len] };
         pinhole.rays(level(), [&x[..len], &y[..len]], &mut rays);
 
+        // What they have in common, and what each has
         let scene = &self.job.world.scene;
         let (time, scale) = (scene.camera.time(0.0), scene.film.scale);
-        out.extend(places.iter().zip(&*streams).enumerate().map(|(i, (&(fit, pixel, sample), &stream))| {
-            let ray = Ray { o: *o, d: d.vec3(i), t_max: f32::INFINITY, time };
-            CameraSample {
-                ray: CameraRay { ray, spread: spread[i], width0: 0.0, weight: 1.0 },
-                weight: weight[i] * scale,
-                stream,
-                direct: self.direct_stream(pixel, sample, seed).unwrap_or(stream),
-                sample_counts: self.chosen_counts(pixel, &stream).unwrap_or(self.sample_counts),
-                turn: self.turn(pixel, sample),
-                fit,
-                pixel,
-                is_replica: false,
-            }
-        }));
+        let (mut first, [dx, dy, dz]) = (0, d.get(len));
+        for &(fit, pixel, ref samples) in &*of_pixels {
+            let of_pixel = first..first + samples.len();
+            first = of_pixel.end;
+            out.extend(of_pixel.zip(samples.clone()).map(|(i, sample)| {
+                let (stream, d) = (streams[i], Vec3::new(dx[i], dy[i], dz[i]));
+                let ray = Ray { o: *o, d, t_max: f32::INFINITY, time };
+                CameraSample {
+                    ray: CameraRay { ray, spread: spread[i], width0: 0.0, weight: 1.0 },
+                    weight: weight[i] * scale,
+                    stream,
+                    direct: self.direct_stream(pixel, sample, seed).unwrap_or(stream),
+                    sample_counts: self.chosen_counts(pixel, &stream).unwrap_or(self.sample_counts),
+                    turn: self.turn(pixel, sample),
+                    fit,
+                    pixel,
+                    is_replica: false,
+                }
+            }));
+        }
     }
 
     /// One sample. The direct light of a progressive estimator is drawn block by block, each with a seed of its own.

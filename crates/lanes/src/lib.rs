@@ -10,7 +10,7 @@
 //!
 //! Reading order: [`lane`], [`columns`], [`curve`], [`sampler`], [`light`], [`area`], [`environment`], [`bsdf`],
 //! [`combine`], [`camera`], [`hits`], [`triangles`], [`vertex`], [`connections`],
-//! [`light_choice`].
+//! [`light_choice`], [`sums`].
 
 pub mod area;
 pub mod bsdf;
@@ -25,6 +25,7 @@ pub mod lane;
 pub mod light;
 pub mod light_choice;
 pub mod sampler;
+pub mod sums;
 pub mod triangles;
 pub mod vertex;
 

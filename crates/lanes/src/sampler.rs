@@ -8,7 +8,7 @@
 
 use fearless_simd::{Level, dispatch};
 use lumiris_numbers::math::ONE_MINUS_EPSILON;
-use lumiris_numbers::samplers::SampleStream;
+use lumiris_numbers::samplers::{NetPoint, SampleStream};
 
 /// Points that are worked on together.
 const CHUNK: usize = 64;
@@ -27,24 +27,19 @@ const COLUMNS: [[u32; 16]; 2] = [
 
 /// Draws N ≤ 4 numbers of each stream: `out[d][i]` is the d-th of stream `i`. All slices have the same length.
 pub fn draw<const N: usize>(level: Level, streams: &[SampleStream], mut out: [&mut [f32]; N]) {
-    let (mut index, mut seeds) = ([0; CHUNK], [[0; CHUNK]; 2]);
+    let none = NetPoint { index: 0, seed: 0, scramble: 0 };
+    let mut points = [none; CHUNK];
     for (chunk, streams) in streams.chunks(CHUNK).enumerate() {
         let first = chunk * CHUNK;
         let mut are_nets = true;
-        for (lane, stream) in streams.iter().enumerate() {
+        for (point, stream) in points.iter_mut().zip(streams) {
             match stream.net_point() {
-                Some(point) => {
-                    (index[lane], seeds[0][lane], seeds[1][lane]) = (point.index, point.seed, point.scramble);
-                }
+                Some(of_stream) => *point = of_stream,
                 None => are_nets = false,
             }
         }
         if are_nets {
-            let mut u = [[0.0; CHUNK]; N];
-            dispatch!(level, _simd => coordinates(&index, &seeds, &mut u));
-            for (out, u) in out.iter_mut().zip(&u) {
-                out[first..first + streams.len()].copy_from_slice(&u[..streams.len()]);
-            }
+            draw_chunk(level, &points[..streams.len()], first, &mut out);
         } else {
             for (lane, stream) in streams.iter().enumerate() {
                 for (out, u) in out.iter_mut().zip(stream.draw::<N>()) {
@@ -52,6 +47,27 @@ pub fn draw<const N: usize>(level: Level, streams: &[SampleStream], mut out: [&m
                 }
             }
         }
+    }
+}
+
+/// The first N ≤ 4 coordinates of each point: `out[d][i]` is the d-th of point `i`. All slices have the same length.
+pub fn draw_points<const N: usize>(level: Level, points: &[NetPoint], mut out: [&mut [f32]; N]) {
+    for (chunk, points) in points.chunks(CHUNK).enumerate() {
+        draw_chunk(level, points, chunk * CHUNK, &mut out);
+    }
+}
+
+/// At most [`CHUNK`] points, whose coordinates stand from `first` on.
+#[inline]
+fn draw_chunk<const N: usize>(level: Level, points: &[NetPoint], first: usize, out: &mut [&mut [f32]; N]) {
+    let (mut index, mut seeds) = ([0; CHUNK], [[0; CHUNK]; 2]);
+    for (lane, point) in points.iter().enumerate() {
+        (index[lane], seeds[0][lane], seeds[1][lane]) = (point.index, point.seed, point.scramble);
+    }
+    let mut u = [[0.0; CHUNK]; N];
+    dispatch!(level, _simd => coordinates(&index, &seeds, &mut u));
+    for (out, u) in out.iter_mut().zip(&u) {
+        out[first..first + points.len()].copy_from_slice(&u[..points.len()]);
     }
 }
 

@@ -11,6 +11,7 @@ mod lane;
 mod light;
 mod light_choice;
 mod sampler;
+mod sums;
 mod support;
 mod triangles;
 mod two_techniques;

@@ -14,6 +14,7 @@ use openqmc::bntables::{self, table_value};
 use openqmc::float::uint_to_float;
 use openqmc::owen::{scramble_and_reverse, shuffled_scrambled_sobol};
 use openqmc::rotate::rotate_bytes;
+use std::ops::Range;
 use strum::{EnumIter, EnumString, IntoStaticStr, VariantNames};
 
 /// The sequence.
@@ -169,6 +170,43 @@ impl SampleStream {
         })
     }
 
+    /// Appends the root streams of some samples of a pixel, and the points of their domains `key`, if their numbers are those
+    /// of points: where samples share a net, its hashes are computed once.
+    pub fn append(
+        (kind, pixel, seed): (SamplerKind, [u32; 2], u32),
+        samples: Range<u32>,
+        key: u32,
+        (roots, points): (&mut Vec<Self>, &mut Vec<NetPoint>),
+    ) {
+        let mut start = samples.start;
+        while start < samples.end {
+            let root = SampleStream::new(kind, pixel, start, seed);
+            let point = root.domain(key).net_point();
+            let end = match kind {
+                SamplerKind::Independent | SamplerKind::Stratified => start + 1,
+                // The index of a point has 16 digits
+                SamplerKind::Sobol | SamplerKind::SobolBlueNoise => (start | 0xffff).saturating_add(1).min(samples.end),
+            };
+            roots.push(root);
+            roots.extend((start + 1..end).map(|sample| root.at(sample as u16)));
+            if let Some(point) = point {
+                let flipped = |sample: u32| u32::from((sample ^ start) as u16);
+                points.extend((start..end).map(|sample| NetPoint { index: point.index ^ flipped(sample), ..point }));
+            }
+            start = end;
+        }
+    }
+
+    /// The place of another point of its net.
+    #[inline]
+    fn at(self, index: u16) -> Self {
+        SampleStream(match self.0 {
+            Kind::Independent { .. } => self.0,
+            Kind::Sobol(net) => Kind::Sobol(Net { index, ..net }),
+            Kind::SobolBlueNoise(net) => Kind::SobolBlueNoise(Net { index, ..net }),
+        })
+    }
+
     /// The domain `key` below this place.
     #[inline]
     pub fn domain(&self, key: u32) -> Self {
@@ -241,6 +279,22 @@ mod tests {
             let draw = |seed| SampleStream::new(kind, [3, 9], 17, seed).domain(4).split(2, 8, 5).draw::<4>();
             assert_eq!(draw(1), draw(1));
             assert_ne!(draw(1), draw(2));
+        }
+    }
+
+    #[test]
+    fn samples_of_a_pixel_have_the_streams_and_points_of_each_by_itself() {
+        for kind in SamplerKind::iter() {
+            for samples in [0..0, 5..6, 7..90, 65_500..65_600, u32::MAX - 9..u32::MAX] {
+                let (mut roots, mut points) = (Vec::new(), Vec::new());
+                SampleStream::append((kind, [70, 9], 3), samples.clone(), 4, (&mut roots, &mut points));
+                assert_eq!(roots.len(), samples.len());
+                for (i, sample) in samples.clone().enumerate() {
+                    let stream = SampleStream::new(kind, [70, 9], sample, 3);
+                    assert_eq!(roots[i].domain(6).draw::<4>(), stream.domain(6).draw::<4>(), "{kind:?} {sample}");
+                    assert_eq!(points.get(i).copied(), stream.domain(4).net_point(), "{kind:?} {sample}");
+                }
+            }
         }
     }
 
