@@ -5,7 +5,7 @@ use super::{light_paths, reuse};
 use crate::cameras::CameraRay;
 use crate::direct::Estimator;
 use crate::film::filter::FilterSampler;
-use crate::scene::{PixelSamples, RenderJob};
+use crate::scene::{PixelSamples, RenderJob, SampleCountMap};
 use crate::settings::{Proposals, SampleCounts};
 use lumiris_lanes::camera::{Pinhole, PinholeRays};
 use lumiris_lanes::columns::{Column, Columns3, padded, reserve};
@@ -41,6 +41,10 @@ pub struct CameraSampler<'a> {
     direct: DirectNumbers,
     /// Sample counts, unless chosen per pixel.
     sample_counts: SampleCounts,
+    /// The map that they are chosen by.
+    count_map: Option<&'a SampleCountMap>,
+    /// True if there is nothing of that: no other numbers of direct light, nothing shared, no map.
+    are_plain: bool,
 }
 
 /// The random numbers of direct light.
@@ -85,7 +89,21 @@ impl<'a> CameraSampler<'a> {
         };
         let (filter, sample_counts) = (scene.film.filter.sampler(), settings.integrator.sample_counts());
         let shared = job.pixel_samples.as_ref().filter(|_| reuse::edge(job) > 1 || light_paths::per_sample(job) > 0.0);
-        CameraSampler { job, first_sample, shared, filter, has_motion, pinhole, direct, sample_counts }
+        let is_chosen = settings.integrator.ris.proposals == Proposals::Optimal;
+        let count_map = job.sample_count_map.as_ref().filter(|_| is_chosen);
+        let are_plain = matches!(direct, DirectNumbers::Same) && shared.is_none() && count_map.is_none();
+        CameraSampler {
+            job,
+            first_sample,
+            filter,
+            shared,
+            has_motion,
+            pinhole,
+            direct,
+            sample_counts,
+            count_map,
+            are_plain,
+        }
     }
 
     /// Appends samples of some pixels, each with a range of its own and given with the fits of its samples.
@@ -146,21 +164,28 @@ impl<'a> CameraSampler<'a> {
         for &(fit, pixel, ref samples) in &*of_pixels {
             let of_pixel = first..first + samples.len();
             first = of_pixel.end;
+            let begin = out.len();
             out.extend(of_pixel.zip(samples.clone()).map(|(i, sample)| {
-                let (stream, d) = (streams[i], Vec3::new(dx[i], dy[i], dz[i]));
-                let ray = Ray { o: *o, d, t_max: f32::INFINITY, time };
+                let ray = Ray { o: *o, d: Vec3::new(dx[i], dy[i], dz[i]), t_max: f32::INFINITY, time };
                 CameraSample {
                     ray: CameraRay { ray, spread: spread[i], width0: 0.0, weight: 1.0 },
                     weight: weight[i] * scale,
-                    stream,
-                    direct: self.direct_stream(pixel, sample, seed).unwrap_or(stream),
-                    sample_counts: self.chosen_counts(pixel, &stream).unwrap_or(self.sample_counts),
-                    turn: self.turn(pixel, sample),
+                    stream: streams[i],
+                    direct: streams[i],
+                    sample_counts: self.sample_counts,
+                    turn: sample,
                     fit,
                     pixel,
                     is_replica: false,
                 }
             }));
+            if !self.are_plain {
+                for (of_pixel, sample) in out[begin..].iter_mut().zip(samples.clone()) {
+                    of_pixel.direct = self.direct_stream(pixel, sample, seed).unwrap_or(of_pixel.stream);
+                    of_pixel.sample_counts = self.counts(pixel, &of_pixel.stream);
+                    of_pixel.turn = self.turn(pixel, sample);
+                }
+            }
         }
     }
 
@@ -183,7 +208,7 @@ impl<'a> CameraSampler<'a> {
             weight: filter.weight * ray.weight * scene.film.scale,
             stream,
             direct: stream,
-            sample_counts: self.chosen_counts(pixel, &stream).unwrap_or(self.sample_counts),
+            sample_counts: self.counts(pixel, &stream),
             turn: self.turn(pixel, sample),
             fit: 0,
             pixel,
@@ -214,12 +239,11 @@ impl<'a> CameraSampler<'a> {
         }
     }
 
-    /// Sample counts, if they are chosen per pixel.
+    /// Sample counts at the first vertex.
     #[inline]
-    fn chosen_counts(&self, pixel: [u32; 2], stream: &SampleStream) -> Option<SampleCounts> {
-        let map = self.job.sample_count_map.as_ref()?;
-        let is_chosen = self.job.settings().integrator.ris.proposals == Proposals::Optimal;
-        is_chosen.then(|| map.sample_counts(pixel, stream.domain(domain::SAMPLE_COUNTS).draw::<2>()))
+    fn counts(&self, pixel: [u32; 2], stream: &SampleStream) -> SampleCounts {
+        let of_map = |map: &SampleCountMap| map.sample_counts(pixel, stream.domain(domain::SAMPLE_COUNTS).draw::<2>());
+        self.count_map.map_or(self.sample_counts, of_map)
     }
 }
 

@@ -43,6 +43,7 @@ pub fn sums<T: Term>(level: Level, terms: &[T]) -> Option<Sums> {
 }
 
 /// 2^exponent.
+#[inline(always)]
 const fn power(exponent: i32) -> f64 {
     f64::from_bits(((1023 + exponent) as u64) << 52)
 }
