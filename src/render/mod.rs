@@ -13,6 +13,7 @@ pub mod memory;
 pub mod output;
 mod pace;
 pub mod parts;
+pub mod phases;
 mod run;
 mod shared_cells;
 mod tiles;
@@ -30,6 +31,7 @@ use crate::scene::RenderJob;
 use crate::settings::Settings;
 use cell_progress::CellProgress;
 use parts::{Checkpoints, PartError, StoredTile};
+use phases::Phase;
 use run::Run;
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;
@@ -108,6 +110,8 @@ pub struct Rendering {
     pub light: Option<LightPathStats>,
     /// Wall-clock time.
     pub elapsed: Duration,
+    /// Processor time of its tiles and of the noise on the way, by phases.
+    pub phases: Vec<Phase>,
     /// True if every pixel has all its samples.
     pub complete: bool,
     /// Threads used.

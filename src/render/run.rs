@@ -4,6 +4,7 @@ use super::cell_progress::CellProgress;
 use super::control_variates;
 use super::pace::{of_first_samples, pass_in_time};
 use super::parts::{Checkpoints, PartError, StoredTile};
+use super::phases::WorkerTimes;
 use super::tiles::{Tile, Tiles, batches, bounds_of_tiles, empty_layers, film, position, replica_choice};
 use super::worker::{AnyWorker, Workers};
 use super::{BATCH_PATHS, Continuation, Progress, RenderError, RenderSettings, Rendering, TileObserver};
@@ -17,6 +18,7 @@ use crate::integrators::camera_samples::{self, CameraSampler};
 use crate::integrators::cells::{self, REPLICA_CELL};
 use crate::integrators::path::CameraSample;
 use crate::integrators::{PathStats, Statistics, integrator, light_layers, reuse};
+use crate::planning::processor_time;
 use crate::scene::{FilmSettings, RenderJob};
 use lumiris_numbers::estimators::ocv::block_of;
 use lumiris_numbers::math::hash::pcg4d;
@@ -109,7 +111,7 @@ impl<'a> Run<'a> {
         let end = self.end();
         let begin = tiles.tiles.iter().map(|t| t.done).min().unwrap_or(end);
         let (mut first, mut noise, mut observed) = (begin, None, self.start + NOISE_INTERVAL);
-        let mut stats = PathStats::default();
+        let (mut stats, mut times) = (PathStats::default(), WorkerTimes::default());
         while first < end && !self.stopped(first - begin) {
             let served = end.min(first.saturating_add(integrator.prepare(first)?));
             let workers = Workers::new(&*integrator, self.features(), light_layers::count(self.job));
@@ -125,10 +127,13 @@ impl<'a> Run<'a> {
                 }
                 let now = Instant::now();
                 if now >= observed && first < end && !self.is_late() {
+                    let processor = processor_time::of_process();
                     noise = Some(self.film(&tiles.tiles).summary().noise.median);
+                    times.noise += processor_time::of_process().saturating_sub(processor);
                     observed = Instant::now() + NOISE_INTERVAL.max(now.elapsed() * NOISE_REST);
                 }
             }
+            times.merge(&workers.times());
         }
 
         // Some samples are wrong: they are neither shown nor stored
@@ -137,6 +142,7 @@ impl<'a> Run<'a> {
         }
         let complete = tiles.tiles.iter().all(|t| t.done >= end);
         let keeps_sums = keeps_sums || checkpoints.is_some();
+        let phases = times.phases(&stats);
         let Statistics { paths: stats, cache, photons, light, records } = integrator.statistics(stats);
         add_records(&records, &mut tiles.tiles);
         let mut film = self.film(&tiles.tiles);
@@ -145,7 +151,8 @@ impl<'a> Run<'a> {
             checkpoints.finish(&tiles);
         }
         let sums = keeps_sums.then_some(tiles);
-        Ok(Rendering { film, stats, cache, photons, light, elapsed: self.start.elapsed(), complete, threads, sums })
+        let elapsed = self.start.elapsed();
+        Ok(Rendering { film, stats, cache, photons, light, elapsed, phases, complete, threads, sums })
     }
 
     /// Camera samples of all tiles, as if every pixel had the same number.
@@ -373,7 +380,9 @@ impl<'a> Run<'a> {
         let seed = self.job.settings().sampling.seed;
         let of_pixel = |index: usize| position(bounds, index as u32);
         for (pixels, samples) in self.batches(bounds.area(), of_pixel, pass) {
+            let start = Instant::now();
             self.camera_samples(bounds, pixels.clone(), &samples, &mut worker.scratch, &mut worker.samples);
+            worker.times.camera_samples += start.elapsed();
             let of_pixels = pixels.clone().map(of_pixel).map(|pixel| (pixel, self.samples_of(pixel, &samples)));
             worker.trace((self.job, &self.camera), fits, (of_pixels, seed));
             let pixels = pixels.map(|index| (index, self.samples_of(of_pixel(index), &samples)));
@@ -412,10 +421,12 @@ impl<'a> Run<'a> {
         let fit = |replica: usize| (bounds.area() + replica) as u32;
         for (replicas, pass) in self.batches(pixels.len(), |i| pixels[i], pass) {
             let samples_of = |i: usize| self.samples_of(pixels[i], &pass);
+            let start = Instant::now();
             worker.samples.clear();
             let of_fits = replicas.clone().map(|i| (fit(i), pixels[i], samples_of(i)));
             self.camera.samples(of_fits, seed, &mut worker.scratch, &mut worker.samples);
             worker.samples.iter_mut().for_each(|sample| sample.is_replica = true);
+            worker.times.camera_samples += start.elapsed();
             let of_pixels = replicas.clone().map(|i| (pixels[i], samples_of(i)));
             worker.trace((self.job, &self.camera), fits, (of_pixels, seed));
             let mut results = worker.results.iter();

@@ -1,6 +1,7 @@
 //! What the threads of a rendering hold: a tracer each, with the memory of a batch.
 
 use super::looks::Looks;
+use super::phases::WorkerTimes;
 use super::tiles::Tile;
 use crate::direct::Fits;
 use crate::film::accumulator::PixelAccumulator;
@@ -11,6 +12,7 @@ use crate::integrators::{Integrator, PathStats, Tracer};
 use crate::scene::{FilmSettings, RenderJob};
 use std::ops::Range;
 use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::time::Instant;
 
 /// Buffers of one thread.
 pub(super) struct Worker<T> {
@@ -27,18 +29,20 @@ pub(super) struct Worker<T> {
     /// Memory to pack them.
     pub(super) packing: Vec<u8>,
     looks: Looks,
+    pub(super) times: WorkerTimes,
 }
 
 impl<T> Worker<T> {
     pub(super) fn new(tracer: T) -> Self {
-        let (samples, scratch, results, sums, of_tile, layers, packing, looks) = Default::default();
-        Worker { tracer, samples, scratch, results, sums, of_tile, layers, packing, looks }
+        let (samples, scratch, results, sums, of_tile, layers, packing, looks, times) = Default::default();
+        Worker { tracer, samples, scratch, results, sums, of_tile, layers, packing, looks, times }
     }
 }
 
 impl AnyWorker<'_> {
     /// Takes the sums of a tile.
     pub(super) fn read(&mut self, tile: &Tile) {
+        let start = Instant::now();
         let area = tile.bounds.area();
         self.layers.resize_with(tile.layers.len(), Vec::new);
         let layers = self.layers.iter_mut().zip(&tile.layers);
@@ -46,6 +50,7 @@ impl AnyWorker<'_> {
             sums.resize(area, PixelAccumulator::default());
             packed.read(0..area, sums);
         }
+        self.times.film += start.elapsed();
     }
 
     /// Begins sums of so many pixels, without layers, that [`Self::add_to`] adds to tiles.
@@ -56,6 +61,7 @@ impl AnyWorker<'_> {
 
     /// Adds the sums of the pixels of `bounds` to those of a tile, as far as it has them.
     pub(super) fn add_to(&mut self, tile: &mut Tile, bounds: &PixelBounds) {
+        let start = Instant::now();
         let Worker { sums, of_tile, packing, .. } = self;
         of_tile.resize(tile.bounds.area(), PixelAccumulator::default());
         tile.sums.read(0..tile.bounds.area(), of_tile);
@@ -63,6 +69,7 @@ impl AnyWorker<'_> {
             of_tile[to].iter_mut().zip(&sums[from]).for_each(|(sum, more)| sum.merge(more));
         }
         tile.set_sums(of_tile, packing);
+        self.times.film += start.elapsed();
     }
 
     /// Traces the samples, whose pixels are given in order with the indices of their samples, and their looks; the results have
@@ -73,6 +80,7 @@ impl AnyWorker<'_> {
         fits: &mut Fits,
         (pixels, seed): (impl Iterator<Item = ([u32; 2], Range<u32>)>, u32),
     ) {
+        let start = Instant::now();
         let Worker { tracer, samples, results, looks, .. } = self;
         tracer.trace(job, samples, fits, results);
         looks.replace((job, camera), (samples, seed), pixels, (results, tracer.light_layers()));
@@ -82,6 +90,7 @@ impl AnyWorker<'_> {
                 (result.radiance, result.offset) = (film.balanced(result.radiance), film.balanced(result.offset));
             }
         }
+        self.times.tracing += start.elapsed();
     }
 
     /// The counts and times since the last call.
@@ -93,28 +102,33 @@ impl AnyWorker<'_> {
 
     /// Adds the results to the sums of their pixels, which are given in order with the indices of their samples.
     pub(super) fn add(&mut self, film: &FilmSettings, pixels: impl Iterator<Item = (usize, Range<u32>)>) {
+        let start = Instant::now();
         let Worker { tracer, results, sums, layers, .. } = self;
         let count = layers.len();
         let of_layers = tracer.light_layers();
-        let mut results = results.iter().enumerate();
+        let mut first = 0;
         for (pixel, samples) in pixels {
-            for (i, (k, result)) in samples.zip(results.by_ref()) {
-                sums[pixel].add(i, result);
-                // Its own layers are `count` numbers
-                for (sums, &radiance) in layers.iter_mut().zip(&of_layers[k * count..]) {
-                    let radiance = film.balanced(radiance);
+            let of_pixel = first..first + samples.len();
+            first = of_pixel.end;
+            sums[pixel].add_all(samples.start, &results[of_pixel.clone()]);
+            for (layer, sums) in layers.iter_mut().enumerate() {
+                for (i, k) in samples.clone().zip(of_pixel.clone()) {
+                    let radiance = film.balanced(of_layers[k * count + layer]);
                     sums[pixel].add(i, &PixelSample { radiance, ..PixelSample::default() });
                 }
             }
         }
+        self.times.film += start.elapsed();
     }
 
     /// Returns the sums of a tile.
     pub(super) fn write(&mut self, tile: &mut Tile) {
+        let start = Instant::now();
         tile.set_sums(&self.sums, &mut self.packing);
         for (layer, sums) in self.layers.iter().enumerate() {
             tile.set_layer(layer, sums, &mut self.packing);
         }
+        self.times.film += start.elapsed();
     }
 }
 
@@ -144,9 +158,17 @@ impl<'a> Workers<'a> {
             tracer.keep_light_layers(self.light_layers);
             Worker { looks: Looks::new(self.light_layers), ..Worker::new(tracer) }
         });
-        let result = work(&mut worker);
+        let (result, times) = WorkerTimes::of(|| work(&mut worker));
+        worker.times.merge(&times);
         self.idle().push(worker);
         result
+    }
+
+    /// Where the time of all of them has gone.
+    pub(super) fn times(&self) -> WorkerTimes {
+        let mut times = WorkerTimes::default();
+        self.idle().iter().for_each(|worker| times.merge(&worker.times));
+        times
     }
 
     fn idle(&self) -> MutexGuard<'_, Vec<AnyWorker<'a>>> {

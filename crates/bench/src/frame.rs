@@ -11,6 +11,7 @@ use lumiris::accel::embree::bare::{Bare, Packed};
 use lumiris::direct::Estimator;
 use lumiris::film::PixelSample;
 use lumiris::film::accumulator::PixelAccumulator;
+use lumiris::film::packed::PackedSums;
 use lumiris::geometry::AlphaSource;
 use lumiris::integrators::path::{CameraSample, Recording};
 use lumiris::integrators::{PathStats, PathTracer, Tracer};
@@ -34,7 +35,7 @@ pub struct FrameReport {
     pub bare_trace_ns_per_camera_sample: f64,
     /// The second by the first.
     pub tracing_share: f64,
-    /// Time of the stages per camera sample; what remains are camera rays' making and the film.
+    /// Time of the stages per camera sample, which are all of it: `paths` is what tracing takes beside its stages.
     pub stages: Vec<FrameStage>,
     /// The rays that were traced.
     pub rays: Vec<BareRays>,
@@ -114,11 +115,13 @@ pub fn measure_frame(job: &RenderJob, tile_size: u32, rays: usize, turns: u32) -
     let pixels = (0..batches.count()).map(|batch| batches.pixels(batch)).sum::<usize>();
     let camera_samples = pixels * batches.samples_per_pixel();
 
-    let mut frame = Frame { job, batches, tracer: PathTracer::default(), samples: Vec::new(), results: Vec::new() };
+    let (tracer, samples, results, packed, times) = Default::default();
+    let mut frame = Frame { job, batches, tracer, samples, results, packed, times };
     frame.tracer.record();
     frame.render();
     let recording = frame.tracer.take_recording();
     frame.tracer.take_stats();
+    frame.times = Times::default();
 
     let (geometry, textures) = (Arc::clone(&job.world.scene.geometry), Arc::clone(&job.world.scene.textures));
     let bare = Bare::new(geometry, Some(textures as Arc<dyn AlphaSource>))?;
@@ -128,13 +131,13 @@ pub fn measure_frame(job: &RenderJob, tile_size: u32, rays: usize, turns: u32) -
     }
 
     let per_sample = |time: Duration| time.as_secs_f64() * 1e9 / camera_samples.max(1) as f64;
-    let mut stats: Vec<PathStats> = Vec::new();
+    let mut stats: Vec<(PathStats, Times)> = Vec::new();
     let (mut both, mut of_kinds) = (Vec::new(), vec![Vec::new(); kinds.len()]);
     for _ in 0..turns.max(1) {
         let start = Instant::now();
         frame.render();
         let ours = start.elapsed();
-        stats.push(frame.tracer.take_stats());
+        stats.push((frame.tracer.take_stats(), std::mem::take(&mut frame.times)));
         let mut sum = Duration::ZERO;
         for (kind, times) in kinds.iter().zip(&mut of_kinds) {
             let time = kind.time(&bare)?;
@@ -144,9 +147,13 @@ pub fn measure_frame(job: &RenderJob, tile_size: u32, rays: usize, turns: u32) -
         both.push([per_sample(ours), per_sample(sum)]);
     }
     let [ours, traced] = [0, 1].map(|slot| median(both.iter().map(|turn| turn[slot])));
-    let stage = |name, of: &dyn Fn(&PathStats) -> Duration| FrameStage {
+    let stage = |name, of: &dyn Fn(&PathStats, &Times) -> Duration| FrameStage {
         name,
-        ns_per_camera_sample: median(stats.iter().map(|s| per_sample(of(s)))),
+        ns_per_camera_sample: median(stats.iter().map(|(stats, times)| per_sample(of(stats, times)))),
+    };
+    let paths = |s: &PathStats, times: &Times| {
+        let direct = s.direct.t1 + s.direct.select + s.direct.t2;
+        times.tracing.saturating_sub(s.camera_time + s.bounce_time + s.shade_time + direct)
     };
     Ok(FrameReport {
         camera_samples,
@@ -154,12 +161,15 @@ pub fn measure_frame(job: &RenderJob, tile_size: u32, rays: usize, turns: u32) -
         bare_trace_ns_per_camera_sample: traced,
         tracing_share: traced / ours,
         stages: vec![
-            stage("camera_rays", &|s| s.camera_time),
-            stage("bounce_rays", &|s| s.bounce_time),
-            stage("shade", &|s| s.shade_time),
-            stage("t1_propose", &|s| s.direct.t1),
-            stage("select_resolve", &|s| s.direct.select),
-            stage("t2_trace", &|s| s.direct.t2),
+            stage("camera_samples", &|_, times| times.camera_samples),
+            stage("camera_rays", &|s, _| s.camera_time),
+            stage("bounce_rays", &|s, _| s.bounce_time),
+            stage("shade", &|s, _| s.shade_time),
+            stage("t1_propose", &|s, _| s.direct.t1),
+            stage("select_resolve", &|s, _| s.direct.select),
+            stage("t2_trace", &|s, _| s.direct.t2),
+            stage("paths", &paths),
+            stage("film", &|_, times| times.film),
         ],
         rays: kinds
             .iter()
@@ -186,6 +196,14 @@ fn kinds(recording: &Recording) -> Vec<Kind<'_>> {
     all.into_iter().filter(|kind| kind.rays() > 0).collect()
 }
 
+/// Times of a turn.
+#[derive(Default)]
+struct Times {
+    camera_samples: Duration,
+    tracing: Duration,
+    film: Duration,
+}
+
 /// The renderer on one thread, with its buffers.
 struct Frame<'a> {
     job: &'a RenderJob,
@@ -193,6 +211,9 @@ struct Frame<'a> {
     tracer: PathTracer,
     samples: Vec<CameraSample>,
     results: Vec<PixelSample>,
+    /// The sums of a batch, and memory to pack them.
+    packed: (PackedSums, Vec<u8>),
+    times: Times,
 }
 
 impl Frame<'_> {
@@ -200,15 +221,25 @@ impl Frame<'_> {
     fn render(&mut self) {
         let integrator = &self.job.settings().integrator;
         for batch in 0..self.batches.count() {
+            let start = Instant::now();
             self.batches.camera_samples(batch, &mut self.samples);
+            self.times.camera_samples += start.elapsed();
+
+            let start = Instant::now();
             let pixels = self.batches.pixels(batch);
             let mut fits = Estimator::at_vertex(integrator, 0).fits(self.job, pixels);
             self.tracer.trace(self.job, integrator, &self.samples, &mut fits, &mut self.results);
+            self.times.tracing += start.elapsed();
+
+            let start = Instant::now();
             let mut sums = vec![PixelAccumulator::default(); pixels];
             for (pixel, results) in sums.iter_mut().zip(self.results.chunks(self.batches.samples_per_pixel())) {
-                (0..).zip(results).for_each(|(index, result)| pixel.add(index, result));
+                pixel.add_all(0, results);
             }
-            black_box(&sums);
+            let (packed, scratch) = &mut self.packed;
+            packed.set(&sums, scratch);
+            black_box(packed);
+            self.times.film += start.elapsed();
         }
     }
 }

@@ -24,6 +24,12 @@ pub(super) fn api() -> Result<&'static sys::Api, ImageError> {
     Ok(api)
 }
 
+/// Loads OpenImageIO and all that it is linked with, unless that is done: the first image that is read or written does it as
+/// well, and waits for it.
+pub fn load() -> Result<(), ImageError> {
+    api().map(|_| ())
+}
+
 /// Calls a function of the shim; `Err` holds its code and message.
 pub(super) fn call(f: impl FnOnce(*mut c_char, usize) -> i32) -> Result<(), (i32, String)> {
     let mut message = [0 as c_char; 1024];

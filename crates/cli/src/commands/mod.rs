@@ -22,6 +22,8 @@ mod generate;
 mod info;
 mod info_file;
 mod interrupt;
+mod laps;
+mod libraries;
 mod look;
 mod memory;
 mod merge;

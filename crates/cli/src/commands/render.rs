@@ -4,6 +4,8 @@ use super::UsageError;
 use super::args::{RenderArgs, is_standard_input};
 use super::denoise_args::denoise;
 use super::interrupt::{self, During, INTERRUPTED};
+use super::laps::{self, Laps};
+use super::libraries::Loading;
 use super::memory;
 use super::part_args::is_part;
 use super::parts;
@@ -162,7 +164,10 @@ pub(super) fn render_one(args: &RenderArgs, session: &Session, start: Instant) -
     let mut film_file = parts::film_file(args, (&job, &plan, &files), &mut settings, stored)?;
     settings.time_limit = clock.left();
     let continuation = film_file.as_mut().map_or_else(Continuation::default, FilmFile::continuation);
+    laps::end("prepare", &[]);
+    let loading = Loading::begin(outputs.iter().any(|path| !is_part(path)));
     let rendering = render_shown((&job, &settings), (canvas.as_ref(), &bar), continuation, preparing)?;
+    laps::end("passes", &[&rendering.phases[..], &[loading.end()]].concat());
     if interrupt::is_stopped() && rendering.film.summary().samples[1] == 0 {
         return Err(RenderError::Stopped.into());
     }
@@ -170,9 +175,11 @@ pub(super) fn render_one(args: &RenderArgs, session: &Session, start: Instant) -
     let (written, denoising) =
         write_results(args, (&job, &plan, &rendering), (session, &settings), (film_file.as_mut(), outputs))?;
     drop(bar);
+    laps::end("output", &[]);
+    let laps = laps::take();
     let times = Times { setup, denoising, all: start.elapsed() };
-    report(args, (&job, &rendering), (&times, &written.paths));
-    let mut stats = stats(args, &job, &rendering, setup);
+    report(args, (&job, &rendering), (&times, &laps, &written.paths));
+    let mut stats = stats(args, &job, &rendering, (setup, &laps));
     stats["checkpoints"] = parts::stats(film_file.as_ref());
     Ok(Rendered {
         stats,
@@ -343,7 +350,12 @@ fn asked_aovs(args: &RenderArgs) -> anyhow::Result<Option<Vec<Aov>>> {
     Ok(Some(aovs))
 }
 
-fn stats(args: &RenderArgs, job: &RenderJob, rendering: &Rendering, setup: SetupTimes) -> serde_json::Value {
+fn stats(
+    args: &RenderArgs,
+    job: &RenderJob,
+    rendering: &Rendering,
+    (setup, laps): (SetupTimes, &Laps),
+) -> serde_json::Value {
     let s = &rendering.stats;
     let d = &s.direct;
     let textures = &job.world.scene.textures;
@@ -364,6 +376,7 @@ fn stats(args: &RenderArgs, job: &RenderJob, rendering: &Rendering, setup: Setup
         "seconds": {
             "load": setup.load, "build": setup.build, "prepare": setup.prepare, "render": seconds(rendering.elapsed),
         },
+        "cpu_seconds": laps.json(),
         "thread_seconds": {
             "camera_rays": seconds(s.camera_time), "bounce_rays": seconds(s.bounce_time), "shade": seconds(s.shade_time),
             "t1_propose": seconds(d.t1), "select_resolve": seconds(d.select), "t2_trace": seconds(d.t2),

@@ -2,6 +2,7 @@
 
 use super::args::RenderArgs;
 use super::interrupt::is_stopped;
+use super::laps::Laps;
 use super::progress;
 use super::settings::SetupTimes;
 use lumiris::film::Summary;
@@ -90,7 +91,7 @@ fn reached_text(target: f32, spp: u32, reached: &Reached, ended: Ended) -> Strin
 pub(super) fn report(
     args: &RenderArgs,
     (job, rendering): (&RenderJob, &Rendering),
-    (times, outputs): (&Times, &[PathBuf]),
+    (times, laps, outputs): (&Times, &Laps, &[PathBuf]),
 ) {
     if args.quiet {
         return;
@@ -108,6 +109,7 @@ pub(super) fn report(
         times.before(),
         progress::noise(&summary.noise)
     ));
+    progress::say(&laps.text());
     let Settings { sampling, .. } = job.settings();
     let reached = sampling.noise.and_then(|target| {
         let reached = Reached::of(&summary.blocks, target.into(), sampling.spp)?;

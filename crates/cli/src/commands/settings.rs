@@ -3,6 +3,7 @@
 use super::UsageError;
 use super::args::{SceneArgs, is_standard_input};
 use super::interrupt;
+use super::laps;
 use super::memory::MemoryLimit;
 use super::pictures::is_picture;
 use super::plan_file::PlanFile;
@@ -172,16 +173,19 @@ pub(super) fn load_job_of(
     stored: Option<&Stored>,
     time: Option<Duration>,
 ) -> anyhow::Result<(RenderJob, Setup)> {
+    laps::end("start", &[]);
     let start = Instant::now();
     let mut loaded = load_scene(args, files, stored, time)?;
     let (files, given) = (std::mem::take(&mut loaded.files), std::mem::take(&mut loaded.given));
     let load = start.elapsed().as_secs_f64();
+    laps::end("load", &[]);
     let start = Instant::now();
     let _building = interrupt::during(format!("building the ray tracers of {}", args.name()));
     progress::stage("building the ray tracers", None);
     let job = loaded
         .job(args.accel, args.packet_width)
         .with_context(|| format!("cannot build the ray tracer of {}", args.scene.display()))?;
+    laps::end("build", &[]);
     let times = SetupTimes { load, build: start.elapsed().as_secs_f64(), prepare: 0.0 };
     Ok((job, Setup { times, files, given }))
 }

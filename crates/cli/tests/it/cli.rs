@@ -27,6 +27,19 @@ fn lumiris_reading(text: &str, args: &[&str], folder: &Path) -> Output {
     child.wait_with_output().unwrap()
 }
 
+/// All processor time of the process has a name. The rest of what rendering takes, which is that of `passes`, is no large part of it
+/// even for an image of few samples.
+fn assert_phases(seconds: &serde_json::Value) {
+    let names = "start load build prepare camera_samples camera_rays bounce_rays shade t1_propose select_resolve t2_trace paths film \
+                 noise passes libraries output";
+    let of = |name: &str| seconds[name].as_f64().unwrap_or_else(|| panic!("{name} is missing"));
+    let (sum, all) = (names.split(' ').map(of).sum::<f64>(), of("all"));
+    assert!(sum > 0.98 * all && sum < 1.001 * all, "{sum} of {all}: {seconds}");
+    assert_eq!(seconds.as_object().unwrap().len(), names.split(' ').count() + 1, "{seconds}");
+    assert!(names.split(' ').filter(|name| *name != "bounce_rays").all(|name| of(name) >= 0.0) && of("film") > 0.0);
+    assert!(of("passes") < 0.5 * all, "{seconds}");
+}
+
 #[test]
 fn scenes_are_read_from_the_standard_input() {
     let folder = tempfile::tempdir().unwrap();
@@ -81,6 +94,7 @@ fn render_writes_every_image_and_the_statistics() {
     assert_eq!(replicas, 64 * 36);
     assert_eq!(stats["counts"]["camera_rays"], (64 * 36 + replicas) * 2);
     assert_eq!(stats["complete"], true);
+    assert_phases(&stats["cpu_seconds"]);
 }
 
 #[test]
