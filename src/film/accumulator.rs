@@ -3,8 +3,8 @@
 
 use super::exact::{FixedSum, LIMIT, SquareSum, UnitSum};
 use super::{PixelSample, PixelSums};
-use lumiris_lanes::sums::{self, Sums, TERM, Term};
 use lumiris_lanes::level;
+use lumiris_lanes::sums::{self, Sums, TERM, Term};
 use lumiris_numbers::math::Rgb;
 
 /// Samples of which fewer are added one by one: that takes less time.
@@ -244,7 +244,11 @@ mod tests {
                     object: 2 * i,
                 };
                 let features = Some(features).filter(|f| i > 3 && f.normal.x < 0.7);
-                PixelSample { radiance: Rgb::new(number(31.0), number(1.0), number(1e-3)), features, ..PixelSample::default() }
+                PixelSample {
+                    radiance: Rgb::new(number(31.0), number(1.0), number(1e-3)),
+                    features,
+                    ..PixelSample::default()
+                }
             };
             let samples: Vec<PixelSample> = (0..1 + round as u32 % 300).map(&mut sample).collect();
             let [mut each, mut all] = [PixelAccumulator::default(); 2];

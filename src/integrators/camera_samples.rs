@@ -157,28 +157,34 @@ impl<'a> CameraSampler<'a> {
         let mut rays = PinholeRays { d: d.get_mut(len), spread: &mut spread[..len] };
         pinhole.rays(level(), [&x[..len], &y[..len]], &mut rays);
 
-        // What they have in common, and what each has
+        // What they have in common, and what each has: written in place, since copies of a sample take longer than all else
         let scene = &self.job.world.scene;
-        let (time, scale) = (scene.camera.time(0.0), scene.film.scale);
+        let ray = Ray { o: *o, d: Vec3::ZERO, t_max: f32::INFINITY, time: scene.camera.time(0.0) };
         let (mut first, [dx, dy, dz]) = (0, d.get(len));
         for &(fit, pixel, ref samples) in &*of_pixels {
-            let of_pixel = first..first + samples.len();
-            first = of_pixel.end;
             let begin = out.len();
-            out.extend(of_pixel.zip(samples.clone()).map(|(i, sample)| {
-                let ray = Ray { o: *o, d: Vec3::new(dx[i], dy[i], dz[i]), t_max: f32::INFINITY, time };
-                CameraSample {
-                    ray: CameraRay { ray, spread: spread[i], width0: 0.0, weight: 1.0 },
-                    weight: weight[i] * scale,
-                    stream: streams[i],
-                    direct: streams[i],
-                    sample_counts: self.sample_counts,
-                    turn: sample,
-                    fit,
-                    pixel,
-                    is_replica: false,
-                }
-            }));
+            let Some(&stream) = streams.get(first) else { break };
+            let common = CameraSample {
+                ray: CameraRay { ray, spread: 0.0, width0: 0.0, weight: 1.0 },
+                weight: 0.0,
+                stream,
+                direct: stream,
+                sample_counts: self.sample_counts,
+                turn: 0,
+                fit,
+                pixel,
+                is_replica: false,
+            };
+            out.resize(begin + samples.len(), common);
+            for ((of_pixel, sample), i) in out[begin..].iter_mut().zip(samples.clone()).zip(first..) {
+                of_pixel.ray.ray.d = Vec3::new(dx[i], dy[i], dz[i]);
+                of_pixel.ray.spread = spread[i];
+                of_pixel.weight = weight[i] * scene.film.scale;
+                of_pixel.stream = streams[i];
+                of_pixel.direct = streams[i];
+                of_pixel.turn = sample;
+            }
+            first += samples.len();
             if !self.are_plain {
                 for (of_pixel, sample) in out[begin..].iter_mut().zip(samples.clone()) {
                     of_pixel.direct = self.direct_stream(pixel, sample, seed).unwrap_or(of_pixel.stream);

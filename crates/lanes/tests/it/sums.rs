@@ -53,7 +53,9 @@ fn sums_of_all_levels_are_those_of_whole_numbers() {
 fn what_may_not_be_exact_is_left_to_others() {
     for level in levels() {
         assert!(sums(level, &rows(MOST)).is_some() && sums(level, &rows(MOST + 1)).is_none());
-        for (i, value) in [(0, 64.0), (2, f32::NAN), (3, 1.1e9), (1, f32::INFINITY), (4, 4.0), (10, -5.0), (6, f32::NAN)] {
+        for (i, value) in
+            [(0, 64.0), (2, f32::NAN), (3, 1.1e9), (1, f32::INFINITY), (4, 4.0), (10, -5.0), (6, f32::NAN)]
+        {
             for at in 0..8 {
                 let mut rows = rows(8);
                 rows[at].0[i] = value;

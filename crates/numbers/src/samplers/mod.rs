@@ -187,24 +187,27 @@ impl SampleStream {
                 // The index of a point has 16 digits
                 SamplerKind::Sobol | SamplerKind::SobolBlueNoise => (start | 0xffff).saturating_add(1).min(samples.end),
             };
-            roots.push(root);
-            roots.extend((start + 1..end).map(|sample| root.at(sample as u16)));
+            // Copies that differ in one number each: a processor waits where a whole is read that was just written in parts
+            let count = (end - start) as usize;
+            let (first, first_point) = (roots.len(), points.len());
+            roots.resize(first + count, root);
+            roots[first..].iter_mut().zip(start..end).skip(1).for_each(|(root, sample)| root.set_index(sample as u16));
             if let Some(point) = point {
-                let flipped = |sample: u32| u32::from((sample ^ start) as u16);
-                points.extend((start..end).map(|sample| NetPoint { index: point.index ^ flipped(sample), ..point }));
+                points.resize(first_point + count, point);
+                let of_samples = points[first_point..].iter_mut().zip(start..end);
+                of_samples.for_each(|(point, sample)| point.index ^= u32::from((sample ^ start) as u16));
             }
             start = end;
         }
     }
 
-    /// The place of another point of its net.
+    /// Makes it the place of another point of its net.
     #[inline]
-    fn at(self, index: u16) -> Self {
-        SampleStream(match self.0 {
-            Kind::Independent { .. } => self.0,
-            Kind::Sobol(net) => Kind::Sobol(Net { index, ..net }),
-            Kind::SobolBlueNoise(net) => Kind::SobolBlueNoise(Net { index, ..net }),
-        })
+    fn set_index(&mut self, index: u16) {
+        match &mut self.0 {
+            Kind::Independent { .. } => {}
+            Kind::Sobol(net) | Kind::SobolBlueNoise(net) => net.index = index,
+        }
     }
 
     /// The domain `key` below this place.
