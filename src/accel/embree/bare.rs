@@ -82,7 +82,7 @@ impl Bare {
         let mut context = kernels::query_context(&self.world, rays, mode);
         for single in singles {
             if self.calls_back {
-                context.begin(single.ray.id as usize, 1);
+                context.begin(single.ray.id as usize);
             }
             // SAFETY: the scene is committed, the ray is finite and its id an index of the batch.
             unsafe { kernels::intersect1(self.root.raw(), &mut context, mode, single) };
@@ -95,7 +95,7 @@ impl Bare {
         let mut context = kernels::query_context(&self.world, rays, mode);
         for (valid, packet) in packets {
             if self.calls_back {
-                context.begin(packet.rays.id[0] as usize, N);
+                context.begin(packet.rays.id[0] as usize);
             }
             // SAFETY: the scene is committed, the lanes in `valid` are finite, ids are indices of the batch.
             unsafe { kernels::intersect_packet(self.root.raw(), &mut context, mode, valid, packet) };

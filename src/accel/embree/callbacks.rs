@@ -4,13 +4,13 @@
 //! ignored. Fields are addressed by their index in the header's order, which holds for any N, including 1.
 #![allow(unsafe_code)]
 
-use super::context::QueryContext;
+use super::context::{QueryContext, Ties};
 use super::world::{Refined, Reported, World};
 use crate::accel::{AlphaTest, Hit};
 use crate::geometry::hit::LocalHit;
 use crate::geometry::{GeometryId, Shape};
 use embree4_sys as sys;
-use lumiris_numbers::math::{Bounds3, Ray};
+use lumiris_numbers::math::{Bounds3, Ray, Vec4};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 
@@ -102,13 +102,31 @@ impl Lanes {
     }
 }
 
-/// Lanes of a callback that take part.
+/// Lanes of a callback that take part, of at most 64.
 ///
 /// # Safety
-/// `valid` has `n` elements.
+/// `valid` has `n` elements, −1 or 0.
+#[inline]
 unsafe fn active(valid: *const i32, n: usize) -> impl Iterator<Item = usize> {
-    // SAFETY: by the caller.
-    (0..n).filter(move |&lane| unsafe { *valid.add(lane) == -1 })
+    let mut lanes = 0_u64;
+    if n.is_multiple_of(4) {
+        // Four signs at once: often only one of 8 or 16 lanes takes part
+        for begin in (0..n).step_by(4) {
+            // SAFETY: by the caller.
+            let four = unsafe { valid.add(begin).cast::<[f32; 4]>().read_unaligned() };
+            lanes |= u64::from(Vec4::from_array(four).is_negative_bitmask()) << begin;
+        }
+    } else {
+        for lane in 0..n {
+            // SAFETY: by the caller.
+            lanes |= u64::from(unsafe { *valid.add(lane) } == -1) << lane;
+        }
+    }
+    std::iter::from_fn(move || {
+        let lane = lanes.trailing_zeros() as usize;
+        lanes &= lanes.wrapping_sub(1);
+        (lane < 64).then_some(lane)
+    })
 }
 
 /// Rejects the hits of triangles that an alpha mask lets through.
@@ -138,16 +156,21 @@ pub(super) unsafe extern "C" fn alpha_filter(arguments: *const sys::RTCFilterFun
     }
 }
 
-/// Records the hits of triangles.
+/// Takes the hits of triangles.
 pub(super) unsafe extern "C" fn first_filter(arguments: *const sys::RTCFilterFunctionNArguments) {
-    // SAFETY: Embree passes valid arguments: the context of this query, N lanes each.
+    // SAFETY: Embree passes valid arguments: the context of this query, N lanes each, which nothing else refers to.
     unsafe {
         let arguments = &*arguments;
         let query = &mut *arguments.context.cast::<QueryContext<'_>>();
         let n = arguments.N as usize;
         let (rays, hits) = (Lanes { words: arguments.ray.cast(), n }, Lanes { words: arguments.hit.cast(), n });
         for lane in active(arguments.valid, n) {
-            match query.offer(rays.get_u32(ID, lane), reported(rays, hits, lane)) {
+            let id = rays.get_u32(ID, lane);
+            let end = match query.ties {
+                Ties::Noted => Some(query.note(id, rays.get(TFAR, lane))),
+                Ties::Settled => query.settle(id, &reported(rays, hits, lane)),
+            };
+            match end {
                 Some(end) => rays.set(TFAR, lane, end),
                 None => *arguments.valid.add(lane) = 0,
             }
@@ -213,7 +236,7 @@ pub(super) unsafe extern "C" fn intersect(arguments: *const sys::RTCIntersectFun
             let end = found.and_then(|hit| {
                 let (geometry, primitive, instance) = (arguments.geomID, arguments.primID, inst_id);
                 let hit = Reported { geometry, primitive, instance, t: hit.t, uv: hit.uv };
-                query.offer(rays.get_u32(ID, lane), hit)
+                query.offer(rays.get_u32(ID, lane), &hit)
             });
             *arguments.valid.add(lane) = if end.is_some() { -1 } else { 0 };
             let (Some(hit), Some(end)) = (found, end) else { continue };

@@ -11,12 +11,62 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 /// parameter is off, but for rays at less than some 0.1° to a triangle.
 const TIE: f32 = 1.0 / (1 << 12) as f32;
 
+/// What is done with hits whose parameters nearly agree.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Ties {
+    /// Noted: Embree stores the hits, and rays with a tie are traced again.
+    Noted,
+    /// Settled by exact hits: the callbacks store the hits.
+    Settled,
+}
+
 /// The part of a query that Embree sees.
 #[cfg(embree3)]
 pub(super) type RtcContext = sys::RTCIntersectContext;
 /// The part of a query that Embree sees.
 #[cfg(embree4)]
 pub(super) type RtcContext = sys::RTCRayQueryContext;
+
+/// What Embree reports of a block of rays.
+pub(super) struct ReportedBlock {
+    pub geometry: [u32; BLOCK],
+    pub primitive: [u32; BLOCK],
+    pub instance: [u32; BLOCK],
+    pub t: [f32; BLOCK],
+    pub uv: [[f32; BLOCK]; 2],
+}
+
+impl ReportedBlock {
+    const NONE: ReportedBlock = ReportedBlock {
+        geometry: [u32::MAX; BLOCK],
+        primitive: [u32::MAX; BLOCK],
+        instance: [u32::MAX; BLOCK],
+        t: [f32::INFINITY; BLOCK],
+        uv: [[0.0; BLOCK]; 2],
+    };
+
+    /// The hit of a ray; its geometry is `u32::MAX` if there is none.
+    #[inline]
+    pub(super) fn get(&self, lane: usize) -> Reported {
+        let [u, v] = &self.uv;
+        Reported {
+            geometry: self.geometry[lane],
+            primitive: self.primitive[lane],
+            instance: self.instance[lane],
+            t: self.t[lane],
+            uv: [u[lane], v[lane]],
+        }
+    }
+
+    #[inline]
+    pub(super) fn set(&mut self, lane: usize, hit: &Reported) {
+        self.geometry[lane] = hit.geometry;
+        self.primitive[lane] = hit.primitive;
+        self.instance[lane] = hit.instance;
+        self.t[lane] = hit.t;
+        (self.uv[0][lane], self.uv[1][lane]) = (hit.uv[0], hit.uv[1]);
+    }
+}
 
 /// The context of a query; Embree passes the address of its first member to the callbacks.
 #[repr(C)]
@@ -27,56 +77,94 @@ pub(super) struct QueryContext<'a> {
     pub rays: &'a RayBatch,
     /// Index of the block's first ray.
     pub base: u32,
+    /// What is done with ties.
+    pub ties: Ties,
     /// The smallest parameter reported for each ray of the block.
     pub best_t: [f32; BLOCK],
+    /// Not 0 for rays of the block with a tie, where these are noted.
+    pub tied: [u32; BLOCK],
     /// The hit of each ray of the block.
-    pub first: [Reported; BLOCK],
+    pub first: ReportedBlock,
     /// The payload of a panic in a callback, resumed when Embree has returned.
     pub panic: Option<Box<dyn Any + Send>>,
 }
 
 impl<'a> QueryContext<'a> {
-    pub(super) fn new(rtc: RtcContext, world: &'a World, rays: &'a RayBatch) -> Self {
-        let (best_t, first) = ([f32::INFINITY; BLOCK], [Reported::NONE; BLOCK]);
-        QueryContext { rtc, world, rays, base: 0, best_t, first, panic: None }
-    }
-
-    /// Begins with a block of at most [`BLOCK`] rays.
-    #[inline]
-    pub(super) fn begin(&mut self, base: usize, count: usize) {
-        self.base = base as u32;
-        self.best_t[..count].fill(f32::INFINITY);
-        for first in &mut self.first[..count] {
-            first.geometry = u32::MAX;
+    pub(super) fn new(rtc: RtcContext, world: &'a World, rays: &'a RayBatch, ties: Ties) -> Self {
+        QueryContext {
+            rtc,
+            world,
+            rays,
+            base: 0,
+            ties,
+            best_t: [f32::INFINITY; BLOCK],
+            tied: [0; BLOCK],
+            first: ReportedBlock::NONE,
+            panic: None,
         }
     }
 
-    /// Records a hit of the ray `id`; returns the new end of the ray, or `None` if another hit is nearer. The end is
+    /// Begins with the block of rays from `base` on.
+    #[inline]
+    pub(super) fn begin(&mut self, base: usize) {
+        self.base = base as u32;
+        self.best_t = [f32::INFINITY; BLOCK];
+        self.tied = [0; BLOCK];
+        self.first.geometry = [u32::MAX; BLOCK];
+    }
+
+    /// The place of the ray `id` in the block.
+    #[inline]
+    fn lane(&self, id: u32) -> usize {
+        id.wrapping_sub(self.base) as usize % BLOCK
+    }
+
+    /// Takes a hit of the ray `id`; returns the new end of the ray, or `None` if another hit is nearer. The end is
     /// slightly beyond the hit, so that ties are found whichever of the hits comes first.
     #[inline]
-    pub(super) fn offer(&mut self, id: u32, hit: Reported) -> Option<f32> {
-        let lane = (id - self.base) as usize % BLOCK;
+    pub(super) fn offer(&mut self, id: u32, hit: &Reported) -> Option<f32> {
+        match self.ties {
+            Ties::Noted => Some(self.note(id, hit.t)),
+            Ties::Settled => self.settle(id, hit),
+        }
+    }
+
+    /// Notes whether a hit of the ray `id` ties with one before; returns the new end of the ray.
+    #[inline]
+    pub(super) fn note(&mut self, id: u32, t: f32) -> f32 {
+        let lane = self.lane(id);
+        let (best, is_first) = (self.best_t[lane], t < self.best_t[lane] * (1.0 - TIE));
+        self.tied[lane] |= u32::from(!is_first);
+        self.best_t[lane] = best.min(t);
+        self.best_t[lane] * (1.0 + TIE)
+    }
+
+    /// Stores a hit of the ray `id` if it is the first; then returns the new end of the ray.
+    #[inline]
+    pub(super) fn settle(&mut self, id: u32, hit: &Reported) -> Option<f32> {
+        let lane = self.lane(id);
         let best = self.best_t[lane];
         if hit.t < best * (1.0 - TIE) {
             self.best_t[lane] = hit.t;
         } else {
             self.best_t[lane] = best.min(hit.t);
-            if !self.wins_tie(id, lane, &hit) {
+            if !self.wins_tie(id, lane, hit) {
                 return None;
             }
         }
-        self.first[lane] = hit;
+        self.first.set(lane, hit);
         Some(self.best_t[lane] * (1.0 + TIE))
     }
 
     /// Whether the exact hits put `hit` before the lane's first.
     #[cold]
     fn wins_tie(&mut self, id: u32, lane: usize, hit: &Reported) -> bool {
-        let mut wins = self.first[lane].geometry == u32::MAX;
+        let first = self.first.get(lane);
+        let mut wins = first.geometry == u32::MAX;
         self.guard(|query| {
             if !wins {
-                let (ray, first) = (query.rays.get(id as usize), &query.first[lane]);
-                wins = query.world.refine(&ray, hit).precedes(&query.world.refine(&ray, first));
+                let ray = query.rays.get(id as usize);
+                wins = query.world.refine(&ray, hit).precedes(&query.world.refine(&ray, &first));
             }
         });
         wins

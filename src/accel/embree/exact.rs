@@ -1,10 +1,16 @@
 //! Exact hits of a block of rays: their triangles are collected, and tested side by side.
 
-use super::world::{Reported, World};
+use super::context::ReportedBlock;
+use super::world::World;
 use crate::accel::{Hit, RayBatch};
 use crate::geometry::{GeometryId, Shape, TriangleMesh};
 use lumiris_lanes::hits::{self, BLOCK, Hits, Pairs};
 use lumiris_lanes::level;
+use lumiris_numbers::math::Vec3;
+use std::ops::Range;
+
+/// Rays that are looked at together: those beside each other often hit the same triangle.
+const GROUP: usize = 8;
 
 /// Rays of a block with the triangles that Embree reported.
 pub(super) struct ExactHits {
@@ -26,44 +32,91 @@ impl Default for ExactHits {
 }
 
 impl ExactHits {
-    /// Determines the hits of the rays from `base` on, one for each of at most [`BLOCK`] hits that Embree reported.
-    pub(super) fn find(&mut self, world: &World, rays: &RayBatch, base: usize, reported: &[Reported]) {
-        let count = reported.len().min(BLOCK);
-        let range = base..base + count;
-        let Pairs { o, d, t_max, corners } = &mut self.pairs;
+    /// Determines the hits of at most [`BLOCK`] rays, one for each that Embree reported.
+    pub(super) fn find(&mut self, world: &World, rays: &RayBatch, range: Range<usize>, reported: &ReportedBlock) {
+        let count = range.len().min(BLOCK);
+        let Pairs { o, d, t_max, .. } = &mut self.pairs;
         let columns = [&rays.ox, &rays.oy, &rays.oz, &rays.dx, &rays.dy, &rays.dz];
         for (row, column) in o.iter_mut().chain(d.iter_mut()).zip(columns) {
             row[..count].copy_from_slice(&column[range.clone()]);
         }
-        t_max[..count].copy_from_slice(&rays.t_max[range]);
+        t_max[..count].copy_from_slice(&rays.t_max[range.clone()]);
 
         // The indices of all, then their corners: each of the two is a cache miss, and those of different rays overlap
         let mut triangles: [Option<(&TriangleMesh, [u32; 3])>; BLOCK] = [None; BLOCK];
-        for (lane, reported) in reported[..count].iter().enumerate() {
-            let mesh = (reported.geometry != u32::MAX).then(|| {
-                let instance = world.instance(reported.instance);
-                let geometry = world.geometry(reported.geometry, instance);
-                (self.geometries[lane], self.instances[lane]) = (geometry, instance);
-                &world.set.geometries[geometry as usize].shape
-            });
-            if let Some(Shape::Mesh(mesh)) = mesh {
-                triangles[lane] = Some((mesh, mesh.indices[reported.primitive as usize]));
+        for begin in (0..count).step_by(GROUP) {
+            if is_same(&reported.geometry, begin)
+                & is_same(&reported.primitive, begin)
+                & is_same(&reported.instance, begin)
+            {
+                let triangle = self.triangle(world, reported, begin);
+                let (geometry, instance) = (self.geometries[begin], self.instances[begin]);
+                self.geometries[begin..begin + GROUP].fill(geometry);
+                self.instances[begin..begin + GROUP].fill(instance);
+                match triangle {
+                    Some((mesh, vertices)) => self.set_corners::<GROUP>(begin, mesh.corners(vertices)),
+                    None => self.pairs.t_max[begin..begin + GROUP].fill(f32::NEG_INFINITY),
+                }
             } else {
-                t_max[lane] = f32::NEG_INFINITY;
+                for lane in begin..(begin + GROUP).min(count) {
+                    let triangle = self.triangle(world, reported, lane);
+                    if triangle.is_none() {
+                        self.pairs.t_max[lane] = f32::NEG_INFINITY;
+                    }
+                    triangles[lane] = triangle;
+                }
             }
         }
         for (lane, triangle) in triangles[..count].iter().enumerate() {
-            let Some((mesh, vertices)) = triangle else { continue };
-            for (rows, p) in corners.iter_mut().zip(mesh.corners(*vertices)) {
-                (rows[0][lane], rows[1][lane], rows[2][lane]) = p.into();
-            }
-            if self.instances[lane] != Hit::NO_INSTANCE {
-                let ray = world.group_ray(&rays.get(base + lane), self.instances[lane]);
-                (o[0][lane], o[1][lane], o[2][lane]) = ray.o.into();
-                (d[0][lane], d[1][lane], d[2][lane]) = ray.d.into();
+            if let Some((mesh, vertices)) = triangle {
+                self.set_corners::<1>(lane, mesh.corners(*vertices));
             }
         }
+        if !world.instances.is_empty() {
+            self.enter_instances(world, rays, range);
+        }
         hits::exact(level(), &self.pairs, count, &mut self.hits);
+    }
+
+    /// The mesh and the vertices of the triangle that was reported for a ray; also stores its geometry and instance.
+    #[inline(always)]
+    fn triangle<'a>(
+        &mut self,
+        world: &'a World,
+        reported: &ReportedBlock,
+        lane: usize,
+    ) -> Option<(&'a TriangleMesh, [u32; 3])> {
+        if reported.geometry[lane] == u32::MAX {
+            self.instances[lane] = Hit::NO_INSTANCE;
+            return None;
+        }
+        let instance = world.instance(reported.instance[lane]);
+        let geometry = world.geometry(reported.geometry[lane], instance);
+        (self.geometries[lane], self.instances[lane]) = (geometry, instance);
+        match &world.set.geometries[geometry as usize].shape {
+            Shape::Mesh(mesh) => Some((mesh, mesh.indices[reported.primitive[lane] as usize])),
+            _ => None,
+        }
+    }
+
+    /// Gives N lanes the same triangle.
+    #[inline]
+    fn set_corners<const N: usize>(&mut self, begin: usize, corners: [Vec3; 3]) {
+        for (rows, p) in self.pairs.corners.iter_mut().zip(corners) {
+            for (row, value) in rows.iter_mut().zip(p.to_array()) {
+                row[begin..begin + N].fill(value);
+            }
+        }
+    }
+
+    /// Takes the rays that hit something in an instance into its space.
+    fn enter_instances(&mut self, world: &World, rays: &RayBatch, range: Range<usize>) {
+        let Pairs { o, d, .. } = &mut self.pairs;
+        for (lane, i) in range.enumerate().filter(|&(lane, _)| self.instances[lane] != Hit::NO_INSTANCE) {
+            let ray = world.group_ray(&rays.get(i), self.instances[lane]);
+            (o[0][lane], o[1][lane], o[2][lane]) = ray.o.into();
+            (d[0][lane], d[1][lane], d[2][lane]) = ray.d.into();
+        }
     }
 
     /// The hit of a ray of the block, on the primitive that was reported; `None` where [`World::refine`] must decide, or
@@ -76,11 +129,18 @@ impl ExactHits {
     }
 }
 
+/// True if a group of lanes has the same value.
+#[inline]
+fn is_same(row: &[u32; BLOCK], begin: usize) -> bool {
+    let group = &row[begin..begin + GROUP];
+    group.iter().fold(0, |differ, value| differ | (value ^ group[0])) == 0
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::geometry::triangle::{RayPrecomputed, TriangleHit, intersect_triangle};
-    use lumiris_numbers::math::{Ray, Vec3};
+    use lumiris_numbers::math::Ray;
     use lumiris_test_support::random::{RngExt, pcg32};
 
     #[test]

@@ -2,10 +2,11 @@
 #![allow(unsafe_code)]
 
 use super::callbacks::first_filter;
-use super::context::{QueryContext, RtcContext};
+use super::context::{QueryContext, RtcContext, Ties};
 use super::world::World;
 use crate::accel::RayBatch;
 use embree4_sys as sys;
+use lumiris_lanes::hits::BLOCK;
 
 /// Words per hit beyond the eight that every version has: `instPrimID`, where it exists.
 const EXTRA_HIT_WORDS: usize = if size_of::<sys::RTCRayHit8>() == 640 { 0 } else { 1 };
@@ -13,8 +14,8 @@ const EXTRA_HIT_WORDS: usize = if size_of::<sys::RTCRayHit8>() == 640 { 0 } else
 /// The kind of query.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum QueryKind {
-    /// Nearest hits, collected by the filter function of the query.
-    First,
+    /// Nearest hits, of which the filter function of the query notes or settles ties.
+    First(Ties),
     /// Nearest hits as Embree determines them.
     Nearest,
     /// Whether anything is hit.
@@ -104,11 +105,25 @@ impl<const N: usize> RayHitPacket<N> {
             extra: [none; EXTRA_HIT_WORDS],
         }
     }
+
+    /// Stores the hits in the block of a query, of which the first ray is that of `lane`.
+    #[inline]
+    pub(super) fn store(&self, query: &mut QueryContext<'_>, lane: usize) {
+        const { assert!(BLOCK.is_multiple_of(N)) };
+        let (first, best_t, lanes) = (&mut query.first, &query.best_t, lane..lane + N);
+        first.geometry[lanes.clone()].copy_from_slice(&self.geometry);
+        first.primitive[lanes.clone()].copy_from_slice(&self.primitive);
+        first.instance[lanes.clone()].copy_from_slice(&self.instance);
+        first.t[lanes.clone()].copy_from_slice(&best_t[lanes.clone()]);
+        first.uv[0][lanes.clone()].copy_from_slice(&self.u);
+        first.uv[1][lanes].copy_from_slice(&self.v);
+    }
 }
 
 /// The context of queries on a batch.
 pub(super) fn query_context<'a>(world: &'a World, rays: &'a RayBatch, mode: Mode) -> QueryContext<'a> {
-    QueryContext::new(rtc_context(mode), world, rays)
+    let ties = if let QueryKind::First(ties) = mode.query { ties } else { Ties::Noted };
+    QueryContext::new(rtc_context(mode), world, rays, ties)
 }
 
 #[cfg(embree3)]
@@ -117,7 +132,7 @@ fn rtc_context(mode: Mode) -> RtcContext {
     if mode.coherent {
         context.flags = sys::RTCIntersectContextFlags::RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
     }
-    if mode.query == QueryKind::First {
+    if matches!(mode.query, QueryKind::First(_)) {
         context.filter = Some(first_filter);
     }
     context
@@ -135,7 +150,8 @@ fn rtc_context(_mode: Mode) -> RtcContext {
 fn query_flags(mode: Mode) -> sys::RTCRayQueryFlags {
     use sys::RTCRayQueryFlags as Flags;
     let coherent = if mode.coherent { Flags::RTC_RAY_QUERY_FLAG_COHERENT.0 } else { 0 };
-    let filter = if mode.query == QueryKind::First { Flags::RTC_RAY_QUERY_FLAG_INVOKE_ARGUMENT_FILTER.0 } else { 0 };
+    let filter =
+        if matches!(mode.query, QueryKind::First(_)) { Flags::RTC_RAY_QUERY_FLAG_INVOKE_ARGUMENT_FILTER.0 } else { 0 };
     Flags(coherent | filter)
 }
 

@@ -13,11 +13,12 @@
 //! 1. (t, u, v) of a hit are computed from the vertices by the same function as in [`super::bvh`], in the group's
 //!    space. The two tracers, and processors with other vector units, give the same bits for the same triangle.
 //! 2. Of hits whose parameters as Embree reports them differ by less than 2⁻¹², the exact one that comes first is
-//!    taken, and of equal ones the smallest (instance, geometry, primitive), again as in [`super::bvh`]. To see them
-//!    all, a filter takes every hit and leaves the end of the ray that little beyond it. Without this the first of a
-//!    tie is a matter of the order of traversal: among rays at vertices of a closed mesh, packets with the coherence
-//!    flag gave other triangles than single rays for 10 %, at edges for 0.2 %, camera rays on coplanar triangles for 13
-//!    %.
+//!    taken, and of equal ones the smallest (instance, geometry, primitive), again as in [`super::bvh`]. A filter sees
+//!    every hit that Embree takes for the nearest so far, and leaves the end of the ray that little beyond it. In
+//!    packets it only notes which rays have two such hits, and these few are traced again by single rays, whose filter
+//!    compares exact hits. Without this the first of a tie is a matter of the order of traversal: among rays at
+//!    vertices of a closed mesh, packets with the coherence flag gave other triangles than single rays for 10 %, at
+//!    edges for 0.2 %, camera rays on coplanar triangles for 13 %.
 //! 3. Packets are traced for first hits of coherent rays and for occlusion. For other first hits Embree 3.13 traces the
 //!    rays of a packet one by one anyway.
 //! 4. Scenes with moving instances are traced by single rays. Embree interpolates and inverts their matrices in another
@@ -38,9 +39,9 @@
 //! # Cost
 //!
 //! Against a bare loop over Embree with packets filled in advance (`benches/embree.rs`: 10⁶ triangles of the size of a
-//! pixel, 10⁶ rays, one thread): occlusion in packets 0.97–1.04 of its speed, single rays 0.83–0.92, coherent packets
-//! 0.70–0.78, which are still twice as fast as single rays. Of the some 25 ns more per coherent ray, exact hits take
-//! 12, mostly waiting for the vertices that shading needs next, and the filter 9.
+//! pixel, 10⁶ rays, one thread): occlusion in packets 0.97–1.04 of its speed, single rays 0.83–0.92. First hits of the
+//! rays of a rendering: 0.44–0.66 in coherent packets, 0.68–0.91 for bounces. A filter that only notes ties costs less
+//! than a nanosecond per coherent ray; the rest is loading rays, exact hits, and storing them (docs/measurements/wavefront).
 
 pub mod bare;
 mod callbacks;

@@ -2,7 +2,7 @@
 #![allow(unsafe_code)]
 
 use super::EmbreeAccel;
-use super::context::QueryContext;
+use super::context::{QueryContext, Ties};
 use super::exact::ExactHits;
 use super::kernels::{self, Mode, QueryKind, RayHitPacket, RayPacket, Valid};
 use super::world::{Refined, Reported};
@@ -15,14 +15,14 @@ use std::ops::Range;
 /// Maximum number of retries to leave the surface that a ray starts on.
 const MAX_RETRIES: u32 = 64;
 
-const FIRST_SINGLE: Mode = Mode { query: QueryKind::First, coherent: false };
+const FIRST_SINGLE: Mode = Mode { query: QueryKind::First(Ties::Settled), coherent: false };
 pub(super) const ANY_SINGLE: Mode = Mode { query: QueryKind::Any, coherent: false };
 
 impl EmbreeAccel {
     pub(super) fn intersect_batch(&self, rays: &RayBatch, coherence: Coherence, hits: &mut Vec<Option<Hit>>) {
         hits.clear();
-        hits.resize(rays.len(), None);
-        let mode = Mode { query: QueryKind::First, coherent: self.is_coherent(coherence) };
+        hits.reserve(rays.len());
+        let mode = Mode { query: QueryKind::First(Ties::Noted), coherent: self.is_coherent(coherence) };
         match self.packet_width(coherence) {
             4 => self.intersect_packets::<4>(rays, mode, hits),
             8 => self.intersect_packets::<8>(rays, mode, hits),
@@ -49,23 +49,39 @@ impl EmbreeAccel {
         coherence == Coherence::Coherent && (self.packet_width(coherence) < 16 || self.has_only_triangles)
     }
 
-    fn intersect_singly(&self, rays: &RayBatch, hits: &mut [Option<Hit>]) {
+    fn intersect_singly(&self, rays: &RayBatch, hits: &mut Vec<Option<Hit>>) {
         self.intersect_blocks(rays, FIRST_SINGLE, hits, |context, block| {
             block.for_each(|i| self.trace_one(context, i, kernels::T_NEAR));
         });
     }
 
-    fn intersect_packets<const N: usize>(&self, rays: &RayBatch, mode: Mode, hits: &mut [Option<Hit>]) {
+    fn intersect_packets<const N: usize>(&self, rays: &RayBatch, mode: Mode, hits: &mut Vec<Option<Hit>>) {
         let mut packet = RayHitPacket::<N>::new(Visibility::PATH.0);
         self.intersect_blocks(rays, mode, hits, |context, block| {
-            for base in block.step_by(N) {
+            for base in block.clone().step_by(N) {
                 let valid = load(&mut packet.rays, rays, base);
                 packet.geometry = [sys::RTC_INVALID_GEOMETRY_ID; N];
                 packet.instance = [sys::RTC_INVALID_GEOMETRY_ID; N];
                 // SAFETY: the scene is committed, the lanes in `valid` are finite, ids are indices of the batch.
                 unsafe { kernels::intersect_packet(self.root.raw(), context, mode, &valid, &mut packet) };
+                packet.store(context, base - block.start);
+            }
+            if context.tied != [0; BLOCK] {
+                self.settle_ties(context, block);
             }
         });
+    }
+
+    /// Traces the rays of a block again that have a tie.
+    #[cold]
+    fn settle_ties(&self, context: &mut QueryContext<'_>, block: Range<usize>) {
+        let mut single = kernels::query_context(&self.world, context.rays, FIRST_SINGLE);
+        single.begin(block.start);
+        for (lane, i) in block.enumerate().filter(|&(lane, _)| context.tied[lane] != 0) {
+            self.trace_one(&mut single, i, kernels::T_NEAR);
+            context.first.set(lane, &single.first.get(lane));
+        }
+        single.finish();
     }
 
     /// Traces rays block by block: `trace` leaves what Embree reports of a block in the context.
@@ -73,24 +89,22 @@ impl EmbreeAccel {
         &self,
         rays: &RayBatch,
         mode: Mode,
-        hits: &mut [Option<Hit>],
+        hits: &mut Vec<Option<Hit>>,
         mut trace: impl FnMut(&mut QueryContext<'_>, Range<usize>),
     ) {
         let mut context = kernels::query_context(&self.world, rays, mode);
         let mut exact = ExactHits::default();
         for base in (0..rays.len()).step_by(BLOCK) {
             let count = BLOCK.min(rays.len() - base);
-            context.begin(base, count);
+            context.begin(base);
             trace(&mut context, base..base + count);
-            let reported = &context.first[..count];
-            exact.find(&self.world, rays, base, reported);
-            for ((lane, first), slot) in reported.iter().enumerate().zip(&mut hits[base..]) {
-                if let Some(hit) = exact.hit(lane, first.primitive) {
-                    *slot = Some(hit);
-                } else if first.geometry != u32::MAX {
-                    *slot = self.refine_one(rays, base + lane, *first);
-                }
-            }
+            let first = &context.first;
+            exact.find(&self.world, rays, base..base + count, first);
+            hits.extend((0..count).map(|lane| {
+                let is_hit = first.geometry[lane] != u32::MAX;
+                let found = exact.hit(lane, first.primitive[lane]);
+                if is_hit & found.is_none() { self.refine_one(rays, base + lane, first.get(lane)) } else { found }
+            }));
         }
         context.finish();
     }
@@ -122,9 +136,9 @@ impl EmbreeAccel {
             if exact != Refined::Behind {
                 break;
             }
-            context.begin(i, 1);
+            context.begin(i);
             self.trace_one(&mut context, i, first.t.next_up().max(kernels::T_NEAR));
-            first = context.first[0];
+            first = context.first.get(0);
             if first.geometry == u32::MAX {
                 break;
             }
@@ -201,40 +215,39 @@ pub(super) fn load<const N: usize>(packet: &mut RayPacket<N>, rays: &RayBatch, b
         (&mut packet.time, &rays.time),
     ];
     for (lanes, values) in fields {
-        if count == N {
-            lanes.copy_from_slice(&values[base..base + N]);
-        } else {
-            lanes[..count].copy_from_slice(&values[base..base + count]);
+        match values[base..].first_chunk::<N>() {
+            Some(values) => *lanes = *values,
+            None => lanes[..count].copy_from_slice(&values[base..]),
         }
     }
-    // As `can_trace`, row by row
-    let (mut zero, mut has_direction) = ([0.0; N], [false; N]);
-    for row in packet.o.iter().chain(&packet.d) {
-        for lane in 0..N {
-            zero[lane] += row[lane] * 0.0;
-        }
-    }
-    for row in &packet.d {
-        for lane in 0..N {
-            has_direction[lane] |= row[lane] != 0.0;
-        }
-    }
+    // As `can_trace`, all lanes by the same steps
+    let ([ox, oy, oz], [dx, dy, dz]) = (&packet.o, &packet.d);
     let mut valid = Valid([0; N]);
+    for lane in 0..N {
+        let zero = ox[lane] * 0.0 + oy[lane] * 0.0 + oz[lane] * 0.0 + dx[lane] * 0.0 + dy[lane] * 0.0 + dz[lane] * 0.0;
+        let length = dx[lane].abs() + dy[lane].abs() + dz[lane].abs();
+        let can_trace = (zero == 0.0) & (packet.tfar[lane] > 0.0) & (length > 0.0) & (lane < count);
+        valid.0[lane] = -i32::from(can_trace);
+    }
     for lane in 0..N {
         packet.time[lane] = unit_time(packet.time[lane]);
         packet.id[lane] = (base + lane) as u32;
-        let can_trace = (zero[lane] == 0.0) & (packet.tfar[lane] > 0.0) & has_direction[lane];
-        valid.0[lane] = -i32::from(can_trace & (lane < count));
     }
     if valid.0 != [-1; N] {
-        // Where the processor has no packets of this width, Embree 3.13 traces all lanes, `valid` or not.
-        for lane in (0..N).filter(|&lane| valid.0[lane] == 0) {
-            (packet.o[0][lane], packet.o[1][lane], packet.o[2][lane]) = (0.0, 0.0, 0.0);
-            (packet.d[0][lane], packet.d[1][lane], packet.d[2][lane]) = (0.0, 0.0, 1.0);
-            packet.tfar[lane] = f32::NEG_INFINITY;
-        }
+        empty_others(packet, &valid);
     }
     valid
+}
+
+/// Empties the rays that cannot be traced: where the processor has no packets of this width, Embree 3.13 traces all
+/// lanes, `valid` or not.
+#[cold]
+fn empty_others<const N: usize>(packet: &mut RayPacket<N>, valid: &Valid<N>) {
+    for lane in (0..N).filter(|&lane| valid.0[lane] == 0) {
+        (packet.o[0][lane], packet.o[1][lane], packet.o[2][lane]) = (0.0, 0.0, 0.0);
+        (packet.d[0][lane], packet.d[1][lane], packet.d[2][lane]) = (0.0, 0.0, 1.0);
+        packet.tfar[lane] = f32::NEG_INFINITY;
+    }
 }
 
 /// True if the ray is finite, has a direction and is not empty. Anything else may confuse the traversal.

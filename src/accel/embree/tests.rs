@@ -183,6 +183,38 @@ fn packets_of_any_width_answer_as_single_rays_do() {
     assert_widths_agree_everywhere(20_003, c"");
 }
 
+/// `side` by `side` quads in a plane, of two triangles each along one of the two diagonals.
+fn grid(side: u32, other_diagonal: bool) -> TriangleMesh {
+    let point = |i: u32| {
+        let (x, y) = ((i % (side + 1)) as f32 / side as f32 - 0.5, (i / (side + 1)) as f32 / side as f32 - 0.5);
+        Vec3::new(x, y, 0.31 * x - 0.17 * y)
+    };
+    let quad = |i: u32| {
+        let (a, b) = (i / side * (side + 1) + i % side, (i / side + 1) * (side + 1) + i % side);
+        if other_diagonal { [[a, a + 1, b], [b, a + 1, b + 1]] } else { [[a, a + 1, b + 1], [a, b + 1, b]] }
+    };
+    TriangleMesh::new((0..(side + 1).pow(2)).map(point).collect(), (0..side * side).flat_map(quad).collect()).unwrap()
+}
+
+#[test]
+fn of_surfaces_that_lie_on_each_other_the_first_by_exact_parameter_and_ids_is_hit() {
+    let coincident = [grid(7, false), grid(7, true), grid(1, false), grid(7, false)];
+    let set = only_root(coincident.map(Shape::Mesh).to_vec());
+    let batches =
+        [camera_rays(128), aimed_rays(&grid(7, false), 2_003, 5, false), aimed_rays(&grid(7, true), 2_003, 6, true)];
+    assert_widths_agree("coincident grids", &set, &batches, c"");
+
+    let reference = intersect(&Bvh::new(Arc::clone(&set), None), &batches[0], Coherence::Packets);
+    let of_geometry = |id: u32| reference.iter().flatten().filter(|hit| hit.geometry == id).count();
+    assert!((0..3).all(|id| of_geometry(id) > 100) && of_geometry(3) == 0, "{:?}", [0, 1, 2, 3].map(of_geometry));
+    for (width, coherence) in WIDTHS.into_iter().flat_map(|w| COHERENCES.map(|c| (w, c))) {
+        let found = intersect(&embree(&set, width), &batches[0], coherence);
+        let differing = (0..found.len())
+            .find(|&i| bits(&found[i]) != bits(&reference[i]) && !is_at_edge([&found[i], &reference[i]]));
+        assert_eq!(differing.map(|i| (found[i], reference[i])), None, "width {width}, {coherence:?}");
+    }
+}
+
 #[test]
 fn packets_answer_as_single_rays_do_in_the_kernels_of_older_processors() {
     for config in [c"isa=avx2", c"isa=avx", c"isa=sse4.2"] {

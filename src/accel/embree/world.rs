@@ -47,12 +47,6 @@ pub(super) struct World {
     group_from_world: Vec<Option<Affine3A>>,
 }
 
-impl Reported {
-    /// Nothing.
-    pub(super) const NONE: Reported =
-        Reported { geometry: u32::MAX, primitive: u32::MAX, instance: u32::MAX, t: f32::INFINITY, uv: [0.0; 2] };
-}
-
 impl Refined {
     /// True if this is to be taken rather than `other`: it is a hit, and first, or of hits at the same place the one
     /// with the smallest (instance, geometry, primitive), as in the Rust tracer.
