@@ -14,12 +14,13 @@
 use super::dielectric::Dielectric;
 use super::fresnel::{fr_dielectric, reflect, refract};
 use super::microfacet::{SMOOTH_ALPHA, TrowbridgeReitz};
+use lumiris_lanes::kernels::coated;
+use lumiris_lanes::kernels::coated::COSINES;
 use lumiris_numbers::math::{Vec3, sqr, warp};
 use rayon::prelude::*;
 use std::f32::consts::FRAC_PI_2;
+use std::sync::Arc;
 
-/// Nodes over √cos θ.
-const COSINES: usize = 128;
 /// Rows of a table over the roughness.
 const ALPHAS: usize = 32;
 /// Rows of a table over the azimuth, 0..π/2.
@@ -56,10 +57,9 @@ impl Hemispherical {
     }
 }
 
-#[derive(Clone, Debug)]
 struct Row {
     /// (T, R) at √cos θ = i/(COSINES − 1).
-    directional: Vec<[f32; 2]>,
+    directional: Vec<f32>,
     hemispherical: Hemispherical,
 }
 
@@ -69,11 +69,38 @@ pub struct CoatTable {
     eta: f32,
     thickness: f32,
     axis: Axis,
-    rows: Vec<Row>,
+    /// R_in and T̄ of the rows.
+    hemispherical: Vec<Hemispherical>,
+    /// Rows of (T, R), also those of other tables.
+    directional: Arc<[f32]>,
+    /// The first row of this table.
+    first: usize,
     smooth: Hemispherical,
 }
 
 impl CoatTable {
+    fn new(eta: f32, thickness: f32, axis: Axis, rows: &[Row]) -> Self {
+        let hemispherical = rows.iter().map(|row| row.hemispherical).collect();
+        let directional = rows.iter().flat_map(|row| &row.directional).copied().collect();
+        let smooth = smooth_integrals(eta, thickness);
+        CoatTable { eta, thickness, axis, hemispherical, directional, first: 0, smooth }
+    }
+
+    /// Lets all tables have their rows in one array, so that points of different coats are rows of one kernel.
+    pub fn join(tables: &mut [CoatTable]) {
+        let all: Arc<[f32]> = tables.iter().flat_map(|table| table.directional.iter().copied()).collect();
+        let mut first = 0;
+        for table in tables {
+            (table.directional, table.first) = (Arc::clone(&all), first);
+            first += table.hemispherical.len();
+        }
+    }
+
+    /// The rows of (T, R) of this table and of those it was joined with.
+    pub fn directional_rows(&self) -> &[f32] {
+        &self.directional
+    }
+
     /// For one roughness, which is exact for anisotropic ones too.
     pub fn for_roughness(eta: f32, thickness: f32, distribution: TrowbridgeReitz) -> Self {
         let thickness = thickness.max(0.0);
@@ -86,7 +113,7 @@ impl CoatTable {
             let azimuth = |i| FRAC_PI_2 * i as f32 / (AZIMUTHS - 1) as f32;
             (Axis::Azimuth, (0..AZIMUTHS).map(|i| Row::new(&interface, thickness, azimuth(i))).collect())
         };
-        CoatTable { eta, thickness, axis, rows, smooth: smooth_integrals(eta, thickness) }
+        CoatTable::new(eta, thickness, axis, &rows)
     }
 
     /// For all isotropic roughnesses up to alpha 1, where the roughness is textured.
@@ -97,7 +124,7 @@ impl CoatTable {
             Row::new(&Dielectric { eta, distribution: TrowbridgeReitz::new(alpha, alpha) }, thickness, 0.0)
         };
         let rows = if eta == 1.0 { Vec::new() } else { (0..ALPHAS).into_par_iter().map(row).collect() };
-        CoatTable { eta, thickness, axis: Axis::Alpha, rows, smooth: smooth_integrals(eta, thickness) }
+        CoatTable::new(eta, thickness, Axis::Alpha, &rows)
     }
 
     /// Index of refraction of the layer relative to the outside.
@@ -118,38 +145,27 @@ impl CoatTable {
     }
 
     /// T and R of the outside direction `w`, in the upper hemisphere, for a rough interface.
+    #[inline]
     pub fn directional(&self, w: Vec3, row: f32) -> [f32; 2] {
         let row = match self.axis {
             Axis::Fixed | Axis::Alpha => row,
             Axis::Azimuth => w.y.abs().atan2(w.x.abs()) * ((AZIMUTHS - 1) as f32 / FRAC_PI_2),
         };
-        let x = w.z.clamp(0.0, 1.0).sqrt() * (COSINES - 1) as f32;
-        let (i, row_i) = ((x as usize).min(COSINES - 2), row as usize);
-        let (t, row_t) = (x - i as f32, row - row_i as f32);
-        let of_row = |row: &Row| {
-            let (a, b) = (row.directional[i], row.directional[i + 1]);
-            [a[0] + (b[0] - a[0]) * t, a[1] + (b[1] - a[1]) * t]
-        };
-        let below = of_row(&self.rows[row_i.min(self.rows.len() - 1)]);
-        if row_t == 0.0 || row_i + 1 >= self.rows.len() {
-            return below;
-        }
-        let above = of_row(&self.rows[row_i + 1]);
-        [below[0] + (above[0] - below[0]) * row_t, below[1] + (above[1] - below[1]) * row_t]
+        coated::rough_directional(&self.directional, self.place(row), w.z)
     }
 
-    /// T and R at equal steps of √cos θ from 0 to 1, of the rows about `row`, and the place between them; `None` if
-    /// they depend on the azimuth.
-    pub(super) fn directional_rows(&self, row: f32) -> Option<([&[[f32; 2]]; 2], f32)> {
-        match self.axis {
-            Axis::Azimuth => None,
-            Axis::Fixed | Axis::Alpha => {
-                let i = (row as usize).min(self.rows.len() - 1);
-                let above = (i + 1).min(self.rows.len() - 1);
-                let t = if above == i { 0.0 } else { row - i as f32 };
-                Some(([&self.rows[i].directional, &self.rows[above].directional], t))
-            }
-        }
+    /// The row at `row`, among all rows of [`Self::directional_rows`], and the place between it and the next.
+    #[inline]
+    pub(super) fn place(&self, row: f32) -> [f32; 2] {
+        let i = (row as usize).min(self.hemispherical.len().saturating_sub(1));
+        let t = if i + 1 < self.hemispherical.len() { row - i as f32 } else { 0.0 };
+        [(self.first + i) as f32, t]
+    }
+
+    /// True if T and R depend on the azimuth.
+    #[inline]
+    pub(super) fn has_azimuths(&self) -> bool {
+        self.axis == Axis::Azimuth
     }
 
     /// Thickness of the layer.
@@ -160,20 +176,20 @@ impl CoatTable {
     /// R_in and T̄ of a rough interface.
     pub fn hemispherical(&self, row: f32) -> Hemispherical {
         match self.axis {
-            Axis::Fixed => self.rows[0].hemispherical,
+            Axis::Fixed => self.hemispherical[0],
             // The trapezoidal mean over the quarter turn.
             Axis::Azimuth => {
                 let mut mean = Hemispherical::default();
-                for pair in self.rows.windows(2) {
-                    let middle = pair[0].hemispherical.lerp(pair[1].hemispherical, 0.5);
+                for pair in self.hemispherical.windows(2) {
+                    let middle = pair[0].lerp(pair[1], 0.5);
                     mean.internal += middle.internal / (AZIMUTHS - 1) as f32;
                     mean.transmittance += middle.transmittance / (AZIMUTHS - 1) as f32;
                 }
                 mean
             }
             Axis::Alpha => {
-                let i = (row as usize).min(self.rows.len() - 2);
-                self.rows[i].hemispherical.lerp(self.rows[i + 1].hemispherical, row - i as f32)
+                let i = (row as usize).min(self.hemispherical.len() - 2);
+                self.hemispherical[i].lerp(self.hemispherical[i + 1], row - i as f32)
             }
         }
     }
@@ -181,12 +197,7 @@ impl CoatTable {
     /// T and R of an outside direction of cosine `cos` for a smooth interface.
     #[inline]
     pub fn smooth_directional(&self, cos: f32) -> [f32; 2] {
-        let fresnel = fr_dielectric(cos, self.eta);
-        let cos_t = (1.0 - (1.0 - sqr(cos)).max(0.0) / sqr(self.eta)).max(0.0).sqrt();
-        if fresnel >= 1.0 || cos_t == 0.0 {
-            return [0.0, fresnel];
-        }
-        [(1.0 - fresnel) * (-self.thickness / cos_t).exp(), fresnel]
+        coated::smooth_directional(cos, self.eta, self.thickness)
     }
 
     /// R_in and T̄ of a smooth interface.
@@ -200,7 +211,7 @@ impl Row {
     fn new(interface: &Dielectric, thickness: f32, phi: f32) -> Self {
         let outside = |cos: f32| scatter(interface, warp::direction(cos, phi), thickness);
         let directional = (0..COSINES)
-            .map(|i| {
+            .flat_map(|i| {
                 let s = outside(sqr(i as f32 / (COSINES - 1) as f32).max(1e-6));
                 [s.transmitted, s.reflected]
             })

@@ -11,11 +11,14 @@
 //! and R_in. Both sides of the surface are coated.
 
 use super::coat_table::{CoatTable, Hemispherical};
-use super::dielectric::{Dielectric, Select};
-use super::fresnel::reflect;
-use super::{BsdfSample, Lobe, TrowbridgeReitz};
-use lumiris_lanes::bsdf::Transmittance;
-use lumiris_numbers::math::{Rgb, Vec3, sqr, warp};
+use super::dielectric::Dielectric;
+use super::kernel::{evaluate, of_drawn};
+use super::{BsdfSample, TrowbridgeReitz};
+use lumiris_lanes::kernels::BsdfKernel;
+use lumiris_lanes::kernels::coated::{self, flip, rough_direction, rough_value};
+use lumiris_lanes::kernels::{Coated, Drawn, Kernel, SmoothCoated, lobe};
+use lumiris_numbers::math::v3::V3;
+use lumiris_numbers::math::{Rgb, Vec3, sqr};
 use std::f32::consts::{FRAC_1_PI, PI};
 
 /// Coated Lambertian reflection without scattering in the coat.
@@ -44,6 +47,12 @@ impl<'a> CoatedDiffuse<'a> {
             rho * (1.0 - ratio.powi(bounces.min(1 << 16) as i32)) / (1.0 - ratio)
         }) * (FRAC_1_PI / sqr(interface.eta));
         CoatedDiffuse { interface, table, row, base, mean_transmittance: transmittance }
+    }
+
+    /// The albedo of the base over T(wo).
+    #[inline]
+    fn base_weight(&self) -> f32 {
+        self.base.average() * (PI * self.mean_transmittance)
     }
 
     /// T and R of `w`.
@@ -82,14 +91,7 @@ impl<'a> CoatedDiffuse<'a> {
     /// Probability of sampling the interface; `wo` is in the upper hemisphere.
     #[inline]
     fn p_interface(&self, wo: Vec3) -> f32 {
-        self.p_interface_of(self.directional(wo))
-    }
-
-    /// The same by T and R of `wo`.
-    #[inline]
-    fn p_interface_of(&self, [t, r]: [f32; 2]) -> f32 {
-        let base = self.base.average() * (PI * self.mean_transmittance * t);
-        if r + base > 0.0 { r / (r + base) } else { 0.0 }
+        coated::p_interface(self.base_weight(), self.directional(wo))
     }
 
     /// True if the interface reflects like a mirror.
@@ -98,43 +100,46 @@ impl<'a> CoatedDiffuse<'a> {
         self.interface.is_specular()
     }
 
-    /// How many directions are evaluated at once; `None` if one by one, where the roughness is anisotropic.
-    pub(super) fn lanes(&self, wo: Vec3) -> Option<lumiris_lanes::bsdf::Model<'_>> {
-        let wo = if wo.z < 0.0 { -wo } else { wo };
-        let (transmittance, interface) = if self.interface.is_specular() {
-            (Transmittance::Smooth(self.table.eta(), self.table.thickness()), None)
-        } else {
-            let (rows, t) = self.table.directional_rows(self.row)?;
-            (Transmittance::Table(rows, t), Some(self.interface.lanes()))
-        };
-        let base = (self.base * self.directional(wo)[0]).to_array();
-        Some(lumiris_lanes::bsdf::Model::Coated { interface, base, p_interface: self.p_interface(wo), transmittance })
-    }
-
-    /// Value without cosine (1/sr), without the mirror of a smooth interface.
-    pub fn f(&self, wo: Vec3, wi: Vec3) -> Rgb {
-        self.f_and_pdf(wo, wi).0
-    }
-
-    /// Density of the non-specular part of [`Self::sample`] per steradian.
-    pub fn pdf(&self, wo: Vec3, wi: Vec3) -> f32 {
-        self.f_and_pdf(wo, wi).1
-    }
-
-    /// [`Self::f`] and [`Self::pdf`].
+    /// The kernel; `None` if T and R depend on the azimuth.
     #[inline]
-    pub(super) fn f_and_pdf(&self, wo: Vec3, wi: Vec3) -> (Rgb, f32) {
-        let upper = super::to_upper(wo, wi);
-        upper.map_or((Rgb::BLACK, 0.0), |(wo, wi)| self.f_and_pdf_upper(wo, wi, self.directional(wo)))
+    pub(super) fn kernel(&self) -> Option<Kernel> {
+        if self.interface.is_specular() {
+            return Some(Kernel::SmoothCoated);
+        }
+        (!self.table.has_azimuths()).then_some(Kernel::Coated)
     }
 
-    /// The same in the upper hemisphere, by T and R of `wo`.
+    /// The parameters of its kernel.
     #[inline]
-    fn f_and_pdf_upper(&self, wo: Vec3, wi: Vec3, of_wo: [f32; 2]) -> (Rgb, f32) {
-        let (value, pdf) = self.interface.value_and_pdf(wo, wi, Select::Reflection);
-        let f = Rgb::splat(value) + self.base * (of_wo[0] * self.directional(wi)[0]);
-        let p = self.p_interface_of(of_wo);
-        (f, p * pdf + (1.0 - p) * warp::pdf_cosine_hemisphere(wi))
+    pub(super) fn params(&self) -> [f32; 9] {
+        let ([r, g, b], weight) = (self.base.to_array(), self.base_weight());
+        let Dielectric { eta, distribution } = self.interface;
+        if self.interface.is_specular() {
+            return [r, g, b, weight, eta, self.table.thickness(), 0.0, 0.0, 0.0];
+        }
+        let [row, t] = self.table.place(self.row);
+        [r, g, b, weight, eta, distribution.alpha_x, distribution.alpha_y, row, t]
+    }
+
+    /// Tables of the kernel.
+    #[inline]
+    pub(super) fn tables(&self) -> &'a [f32] {
+        self.table.directional_rows()
+    }
+
+    /// f·|cos θi| and density (1/sr), without the mirror of a smooth interface.
+    #[inline]
+    pub(super) fn f_cos_and_pdf(&self, wo: Vec3, wi: Vec3) -> (Rgb, f32) {
+        let p = self.params();
+        match self.kernel() {
+            Some(Kernel::SmoothCoated) => evaluate::<SmoothCoated>(&p, &[], wo, wi),
+            Some(_) => evaluate::<Coated>(&p, self.tables(), wo, wi),
+            None => super::to_upper(wo, wi).map_or((Rgb::BLACK, 0.0), |(wo, wi)| {
+                let value = rough_value(&p, (wo.into(), wi.into()), self.directional(wo), self.directional(wi)[0]);
+                let value = value.kept(true);
+                (Rgb::from_array(value.f_cos), value.pdf)
+            }),
+        }
     }
 
     /// Probability of sampling the interface, see [`super::Bsdf::first_lobe`].
@@ -145,29 +150,29 @@ impl<'a> CoatedDiffuse<'a> {
     /// Density of the interface alone, times its probability, see [`super::Bsdf::pdf_first_lobe`].
     pub(super) fn pdf_first_lobe(&self, wo: Vec3, wi: Vec3) -> f32 {
         let Some((wo, wi)) = super::to_upper(wo, wi) else { return 0.0 };
-        self.p_interface(wo) * self.interface.pdf_select(wo, wi, Select::Reflection)
+        if self.interface.is_specular() {
+            return 0.0;
+        }
+        self.p_interface(wo) * coated::interface(&self.params(), wo.into(), wi.into()).0
     }
 
     /// The interface or the cosine, in proportion to the albedos.
     pub fn sample(&self, wo: Vec3, uc: f32, u: [f32; 2]) -> Option<BsdfSample> {
-        let flip = if wo.z < 0.0 { -1.0 } else { 1.0 };
-        let wo = wo * flip;
-        let of_wo = self.directional(wo);
-        let p = self.p_interface_of(of_wo);
-        let (wi, lobe) = if uc >= p {
-            (warp::sample_cosine_hemisphere(u), Lobe::DIFFUSE)
-        } else if self.interface.is_specular() {
-            let wi = Vec3::new(-wo.x, -wo.y, wo.z);
-            let f = Rgb::splat(of_wo[1] / wi.z);
-            let lobe = Lobe::SPECULAR | Lobe::REFLECTION;
-            return Some(BsdfSample { f, wi: wi * flip, pdf: p, lobe, eta: 1.0 });
-        } else {
-            (reflect(wo, self.interface.distribution.sample_m(wo, u)), Lobe::GLOSSY)
-        };
-        if wi.z <= 0.0 {
-            return None;
-        }
-        let (f, pdf) = self.f_and_pdf_upper(wo, wi, of_wo);
-        Some(BsdfSample { f, wi: wi * flip, pdf, lobe: lobe | Lobe::REFLECTION, eta: 1.0 })
+        let (p, u) = (self.params(), [uc, u[0], u[1]]);
+        of_drawn(match self.kernel() {
+            Some(Kernel::SmoothCoated) => SmoothCoated::sample(&p, &[], wo.into(), u),
+            Some(_) => Coated::sample(&p, self.tables(), wo.into(), u),
+            None => self.sample_by_azimuth(&p, wo.into(), u),
+        })
+    }
+
+    fn sample_by_azimuth(&self, p: &[f32], wo: V3<f32>, u: [f32; 3]) -> Drawn<f32> {
+        let flip = flip(wo);
+        let wo = wo.times(flip);
+        let of_wo = self.directional(wo.into());
+        let (wi, is_interface) = rough_direction(p, wo, of_wo, u);
+        let value = rough_value(p, (wo, wi), of_wo, self.directional(wi.into())[0]);
+        let kind = coated::kind(is_interface, lobe::GLOSSY, flip);
+        Drawn::new(wi.times(flip), value, kind, 1.0).kept(wo.z > 0.0 && wi.z > 0.0)
     }
 }

@@ -105,16 +105,8 @@ fn sample_lobes(wo: Vec3, uc: f32, u: [f32; 2]) -> (Vec3, Lobe) {
 
 fn pdf_lobes(wo: Vec3, wi: Vec3) -> f32 {
     COSINE_WEIGHT * warp::pdf_cosine_hemisphere(wi)
-        + MIRROR_WEIGHT * pdf_reflect(&MIRROR, wo, wi)
-        + RETRO_WEIGHT * pdf_reflect(&RETRO, wo, turn(wi))
-}
-
-/// Density of reflection by the normals visible from `wo` (per steradian of `wi`); both are in the upper hemisphere.
-fn pdf_reflect(distribution: &TrowbridgeReitz, wo: Vec3, wi: Vec3) -> f32 {
-    match (wo + wi).try_normalize() {
-        Some(m) => distribution.pdf_m(wo, m) / (4.0 * wo.dot(m).abs()),
-        None => 0.0,
-    }
+        + MIRROR_WEIGHT * MIRROR.pdf_reflection(wo, wi)
+        + RETRO_WEIGHT * RETRO.pdf_reflection(wo, turn(wi))
 }
 
 /// Half a turn about the normal.

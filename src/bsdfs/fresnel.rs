@@ -1,68 +1,24 @@
-//! Reflection, refraction and the Fresnel reflectance of smooth interfaces, unpolarised [Born and Wolf 1999, §1.5].
+//! Reflection, refraction and the Fresnel reflectance of smooth interfaces for single directions, see
+//! [`lumiris_lanes::kernels::fresnel`].
 //!
 //! η is the index of refraction of the side that `-n` points to, relative to the side that `+n` points to.
 
-use lumiris_numbers::math::{Rgb, Vec3, safe_sqrt, sqr};
+use lumiris_lanes::kernels::fresnel;
+pub use lumiris_lanes::kernels::fresnel::{fr_complex, fr_dielectric};
+use lumiris_numbers::math::{Rgb, Vec3};
 
 /// Mirror of `w` about `n`; both point away from the surface.
 #[inline]
 pub fn reflect(w: Vec3, n: Vec3) -> Vec3 {
-    n * (2.0 * w.dot(n)) - w
+    fresnel::reflect(w.into(), n.into()).into()
 }
 
 /// Direction to which `w` refracts at a surface with normal `n`, and η along that path (`eta`, or its inverse if `w`
 /// lies on the side of `-n`). `None` at total internal reflection.
 #[inline]
 pub fn refract(w: Vec3, n: Vec3, eta: f32) -> Option<(Vec3, f32)> {
-    let cos_i = w.dot(n);
-    let (cos_i, eta, n) = if cos_i < 0.0 { (-cos_i, 1.0 / eta, -n) } else { (cos_i, eta, n) };
-    let sin2_t = (1.0 - sqr(cos_i)).max(0.0) / sqr(eta);
-    if sin2_t >= 1.0 {
-        return None;
-    }
-    let cos_t = safe_sqrt(1.0 - sin2_t);
-    Some((w * (-1.0 / eta) + n * (cos_i / eta - cos_t), eta))
-}
-
-/// Reflectance of a dielectric interface for the cosine of incidence `cos_i`, which is negative for light that comes
-/// from the side of `-n`. 1 at total internal reflection.
-#[inline]
-pub fn fr_dielectric(cos_i: f32, eta: f32) -> f32 {
-    let (cos_i, eta) = if cos_i < 0.0 { (-cos_i, 1.0 / eta) } else { (cos_i, eta) };
-    let cos_i = cos_i.min(1.0);
-    let sin2_t = (1.0 - sqr(cos_i)) / sqr(eta);
-    if sin2_t >= 1.0 {
-        return 1.0;
-    }
-    let cos_t = safe_sqrt(1.0 - sin2_t);
-    let parallel = (eta * cos_i - cos_t) / (eta * cos_i + cos_t);
-    let perpendicular = (cos_i - eta * cos_t) / (cos_i + eta * cos_t);
-    0.5 * (sqr(parallel) + sqr(perpendicular))
-}
-
-/// Reflectance of an interface to an absorbing medium of complex index η + ik.
-#[inline]
-pub fn fr_complex(cos_i: f32, eta: f32, k: f32) -> f32 {
-    let cos_i = cos_i.clamp(0.0, 1.0);
-    let (cos2, eta2, k2) = (sqr(cos_i), sqr(eta), sqr(k));
-    let sin2 = 1.0 - cos2;
-
-    // a² + b² and a of the refracted wave vector a + ib.
-    let t0 = eta2 - k2 - sin2;
-    let a2_plus_b2 = safe_sqrt(sqr(t0) + 4.0 * eta2 * k2);
-    let a = safe_sqrt(0.5 * (a2_plus_b2 + t0));
-    let t1 = a2_plus_b2 + cos2;
-    let t2 = 2.0 * a * cos_i;
-    let t3 = cos2 * a2_plus_b2 + sqr(sin2);
-    let t4 = t2 * sin2;
-    // Only at grazing incidence on no interface at all (η = 1, k = 0) do the sums vanish; reflect all as the limit
-    // does.
-    if t1 + t2 <= 0.0 || t3 + t4 <= 0.0 {
-        return 1.0;
-    }
-    let perpendicular = (t1 - t2) / (t1 + t2);
-    let parallel = perpendicular * (t3 - t4) / (t3 + t4);
-    (0.5 * (perpendicular + parallel)).clamp(0.0, 1.0)
+    let (refracted, inverse, passes) = fresnel::refract(w.into(), n.into(), eta);
+    passes.then(|| (refracted.into(), 1.0 / inverse))
 }
 
 /// [`fr_complex`] of each channel.
@@ -74,6 +30,7 @@ pub fn fr_conductor(cos_i: f32, eta: Rgb, k: Rgb) -> Rgb {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use lumiris_numbers::math::{safe_sqrt, sqr};
 
     #[test]
     fn normal_incidence_has_its_closed_form() {

@@ -14,7 +14,7 @@
 
 use super::dielectric::{Dielectric, Select, Transport};
 use super::fresnel::{fr_conductor, fr_dielectric, reflect};
-use super::{BsdfSample, Conductor, Diffuse, Lobe, TrowbridgeReitz};
+use super::{BsdfSample, Conductor, Diffuse, KernelBsdf as _, Lobe, TrowbridgeReitz};
 use lumiris_numbers::estimators::mis::{Heuristic, Technique};
 use lumiris_numbers::math::hash::{HashStream, hash_floats};
 use lumiris_numbers::math::{Frame, Rgb, Vec3, safe_sqrt, sqr, warp};
@@ -53,8 +53,8 @@ impl Base {
 
     fn sample(&self, wo: Vec3, u: [f32; 2]) -> Option<BsdfSample> {
         match self {
-            Base::Diffuse(d) => d.sample(wo, u),
-            Base::Conductor(c) => c.sample(wo, u),
+            Base::Diffuse(d) => d.sample(wo, 0.0, u),
+            Base::Conductor(c) => c.sample(wo, 0.0, u),
         }
     }
 }
@@ -249,8 +249,7 @@ impl Layered {
             pdf += lobes.interface * self.top.pdf_select(wo, wi, Select::Reflection);
         }
         if let (Base::Conductor(c), true) = (&self.base, lobes.base > 0.0) {
-            let m = (wo + wi).normalize();
-            pdf += lobes.base * self.base_lobe(c).pdf_m(wo, m) / (4.0 * wo.dot(m));
+            pdf += lobes.base * self.base_lobe(c).pdf_reflection(wo, wi);
         }
         pdf
     }

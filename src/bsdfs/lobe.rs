@@ -1,5 +1,6 @@
 //! Samples of a BSDF, and the lobes that they are of.
 
+use lumiris_lanes::kernels::lobe;
 use lumiris_numbers::math::{Rgb, Vec3};
 use std::ops::BitOr;
 
@@ -8,16 +9,28 @@ use std::ops::BitOr;
 pub struct Lobe(u8);
 
 impl Lobe {
+    /// Of a sum of flags of [`lobe`].
+    #[inline]
+    pub const fn of_flags(flags: u8) -> Lobe {
+        Lobe(flags)
+    }
+
+    /// The sum of its flags.
+    #[inline]
+    pub const fn flags(self) -> u8 {
+        self.0
+    }
+
     /// To the side of `wo`.
-    pub const REFLECTION: Lobe = Lobe(1);
+    pub const REFLECTION: Lobe = Lobe(lobe::REFLECTION);
     /// To the other side.
-    pub const TRANSMISSION: Lobe = Lobe(2);
+    pub const TRANSMISSION: Lobe = Lobe(lobe::TRANSMISSION);
     /// Lambertian or as wide.
-    pub const DIFFUSE: Lobe = Lobe(4);
+    pub const DIFFUSE: Lobe = Lobe(lobe::DIFFUSE);
     /// A rough peak.
-    pub const GLOSSY: Lobe = Lobe(8);
+    pub const GLOSSY: Lobe = Lobe(lobe::GLOSSY);
     /// A delta: `pdf` is a probability, and f and pdf of the methods leave it out.
-    pub const SPECULAR: Lobe = Lobe(16);
+    pub const SPECULAR: Lobe = Lobe(lobe::SPECULAR);
 
     /// True if all flags of `other` are set.
     #[inline]

@@ -1,14 +1,10 @@
 //! The GGX (Trowbridge-Reitz) distribution of microfacet normals with Smith's height-correlated shadowing.
 //!
-//! D(m) = 1 / (π αx αy (x²/αx² + y²/αy² + z²)²), Λ(w) = (√(1 + α²tan²θ) − 1)/2, G1 = 1/(1 + Λ),
-//! G = 1/(1 + Λ(wo) + Λ(wi)) [Walter et al. 2007; Heitz 2014]. Normals are sampled by the density of the normals
-//! visible from w, D_w(m) = G1(w) D(m) max(0, w·m)/cos θ, by spherical caps [Dupuy and Benyoub 2023].
+//! The formulas are in [`lumiris_lanes::kernels::facets`].
 
-use lumiris_numbers::math::{Vec3, sqr};
-use std::f32::consts::{PI, TAU};
-
-/// Alpha below which an interface counts as perfectly smooth.
-pub const SMOOTH_ALPHA: f32 = 1e-3;
+use lumiris_lanes::kernels::facets::Facets;
+pub use lumiris_lanes::kernels::facets::SMOOTH_ALPHA;
+use lumiris_numbers::math::Vec3;
 
 /// GGX distribution over the normals m with m.z > 0.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -41,69 +37,46 @@ impl TrowbridgeReitz {
         self.alpha_x.max(self.alpha_y) < SMOOTH_ALPHA
     }
 
+    #[inline]
+    fn facets(&self) -> Facets<f32> {
+        Facets { alpha_x: self.alpha_x, alpha_y: self.alpha_y }
+    }
+
     /// Density of microfacet area per steradian of `m`, per unit area of the macrosurface (1/sr).
     #[inline]
     pub fn d(&self, m: Vec3) -> f32 {
-        let s = sqr(m.x / self.alpha_x) + sqr(m.y / self.alpha_y) + sqr(m.z);
-        1.0 / (PI * self.alpha_x * self.alpha_y * sqr(s))
-    }
-
-    /// Smith's Λ: masked per visible microfacet area seen from `w`. Infinite at grazing.
-    #[inline]
-    pub fn lambda(&self, w: Vec3) -> f32 {
-        let z2 = sqr(w.z);
-        if z2 <= 0.0 {
-            return f32::INFINITY;
-        }
-        let a2_tan2 = (sqr(self.alpha_x * w.x) + sqr(self.alpha_y * w.y)) / z2;
-        0.5 * ((1.0 + a2_tan2).sqrt() - 1.0)
+        self.facets().d(m.into())
     }
 
     /// Fraction of the microfacets that face `w` and that `w` sees.
     #[inline]
     pub fn g1(&self, w: Vec3) -> f32 {
-        1.0 / (1.0 + self.lambda(w))
+        4.0 * w.z.abs() * Facets::g1_over_cos(w.z, self.facets().l(w.into()))
     }
 
     /// Fraction that both `wo` and `wi` see.
     #[inline]
     pub fn g(&self, wo: Vec3, wi: Vec3) -> f32 {
-        Self::g_of(self.lambda(wo), self.lambda(wi))
-    }
-
-    /// [`Self::g`] by Λ(wo) and Λ(wi).
-    #[inline]
-    pub(super) fn g_of(lambda_o: f32, lambda_i: f32) -> f32 {
-        1.0 / (1.0 + lambda_o + lambda_i)
+        let [l_o, l_i] = [wo, wi].map(|w| self.facets().l(w.into()));
+        4.0 * wo.z.abs() * Facets::g_cos(wo.z, wi.z, l_o, l_i)
     }
 
     /// Density of [`Self::sample_m`] per steradian of `m`; `m` is in the upper hemisphere.
     #[inline]
     pub fn pdf_m(&self, w: Vec3, m: Vec3) -> f32 {
-        Self::pdf_of(w, self.lambda(w), self.d(m), w.dot(m))
+        4.0 * Facets::g1_over_cos(w.z, self.facets().l(w.into())) * self.d(m) * w.dot(m).abs()
     }
 
-    /// [`Self::pdf_m`] by Λ(w), D(m) and w·m.
+    /// Density of reflection by the normals that `wo` sees (1/sr), on its side.
     #[inline]
-    pub(super) fn pdf_of(w: Vec3, lambda: f32, d: f32, w_m: f32) -> f32 {
-        if w.z == 0.0 {
-            return 0.0;
-        }
-        1.0 / (1.0 + lambda) / w.z.abs() * d * w_m.abs()
+    pub fn pdf_reflection(&self, wo: Vec3, wi: Vec3) -> f32 {
+        self.facets().pdf_reflection(wo.into(), wi.into())
     }
 
     /// A normal visible from `w` (or from `-w` if `w` is below the horizon), in the upper hemisphere.
     #[inline]
     pub fn sample_m(&self, w: Vec3, u: [f32; 2]) -> Vec3 {
-        // Stretch so that the distribution is a hemisphere.
-        let stretched = Vec3::new(w.x * self.alpha_x, w.y * self.alpha_y, w.z).normalize_or(Vec3::Z);
-        let h = if stretched.z < 0.0 { -stretched } else { stretched };
-        // A uniform point of the cap of directions that reflect `h` to the upper hemisphere.
-        let z = (1.0 - u[1]) * (1.0 + h.z) - h.z;
-        let sin_theta = (1.0 - z * z).clamp(0.0, 1.0).sqrt();
-        let (sin_phi, cos_phi) = (TAU * u[0]).sin_cos();
-        let m = Vec3::new(sin_theta * cos_phi, sin_theta * sin_phi, z) + h;
-        Vec3::new(m.x * self.alpha_x, m.y * self.alpha_y, m.z.max(1e-6)).normalize()
+        self.facets().sample_m(w.into(), u).into()
     }
 }
 
@@ -111,6 +84,7 @@ impl TrowbridgeReitz {
 mod tests {
     use super::*;
     use lumiris_numbers::math::warp;
+    use std::f32::consts::{PI, TAU};
 
     #[test]
     fn projected_microfacet_area_is_the_macro_area() {

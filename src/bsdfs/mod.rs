@@ -2,8 +2,8 @@
 //! surface. The models are those of pbrt-v4 [Pharr et al. 2023, ch. 9 and 14]; f of transmission is for radiance, that
 //! is scaled by 1/η².
 //!
-//! Reading order: [`lobe`], [`fresnel`], [`microfacet`], [`diffuse`], [`diffuse_transmission`], [`conductor`], [`dielectric`],
-//! [`thin_dielectric`], [`coat_table`], [`coated_diffuse`], [`layered`], `ggx_albedo`, [`sheen`], [`principled`], [`hair`], [`measured`]; [`phase`] in media; then what can only be evaluated: [`models`],
+//! Reading order: [`lobe`], [`fresnel`], [`microfacet`], [`kernel`], [`diffuse`], [`diffuse_transmission`], [`conductor`], [`dielectric`],
+//! [`thin_dielectric`], [`coat_table`], [`coated_diffuse`], [`layered`], [`sheen`], [`principled`], [`hair`], [`measured`]; [`phase`] in media; then what can only be evaluated: [`models`],
 //! [`default_lobes`], [`evaluated`], [`mod@resample`].
 
 pub mod coat_table;
@@ -15,8 +15,8 @@ pub mod diffuse;
 pub mod diffuse_transmission;
 pub mod evaluated;
 pub mod fresnel;
-mod ggx_albedo;
 pub mod hair;
+pub mod kernel;
 pub mod layered;
 pub mod lobe;
 pub mod measured;
@@ -39,6 +39,7 @@ pub use diffuse::Diffuse;
 pub use diffuse_transmission::DiffuseTransmission;
 pub use evaluated::Evaluated;
 pub use hair::Hair;
+pub use kernel::KernelBsdf;
 pub use layered::{Base, Layered};
 pub use lobe::{BsdfSample, Lobe};
 pub use measured::{Measured, MeasuredTables};
@@ -50,9 +51,9 @@ pub use resample::{Resampled, resample};
 pub use thin_dielectric::ThinDielectric;
 
 use dielectric::{Select, Transport};
-use lumiris_lanes::bsdf::Model as LaneModel;
+use kernel::{evaluate, without_cos};
+use lumiris_lanes::kernels;
 use lumiris_numbers::math::{Rgb, Vec3};
-use std::f32::consts::FRAC_1_PI;
 
 /// Most lobes that [`Bsdf::first_lobe`] tells apart.
 pub const MAX_LOBES: usize = 2;
@@ -120,65 +121,43 @@ impl<'a> Bsdf<'a> {
     /// Value without cosine (1/sr), without deltas. 0 at the horizon and never NaN or infinite.
     #[inline]
     pub fn f(&self, wo: Vec3, wi: Vec3) -> Rgb {
-        if (wo.z == 0.0 || wi.z == 0.0) && self.has_surface() {
-            return Rgb::BLACK;
-        }
-        let f = match self {
-            Bsdf::Diffuse(b) => b.f(wo, wi),
-            Bsdf::DiffuseTransmission(b) => b.f(wo, wi),
-            Bsdf::Conductor(b) => b.f(wo, wi),
-            Bsdf::Dielectric(b) => b.f(wo, wi),
-            Bsdf::Exit(_) if wo.z * wi.z > 0.0 => Rgb::BLACK,
-            Bsdf::Exit(b) => b.f(wo, wi),
-            Bsdf::ThinDielectric(_) => Rgb::BLACK,
-            Bsdf::CoatedDiffuse(b) => b.f(wo, wi),
-            Bsdf::Layered(b) => b.f(wo, wi),
-            Bsdf::Principled(b) => b.f(wo, wi),
-            Bsdf::Hair(b) => b.f(wo, wi),
-            Bsdf::Measured(b) => b.f(wo, wi),
-            Bsdf::Evaluated(b) => b.f(wo, wi),
-            Bsdf::Phase(b) => Rgb::splat(b.p(wo, wi)),
-        };
-        if f.is_finite() { f } else { Rgb::BLACK }
+        self.f_and_pdf(wo, wi).0
     }
 
     /// Density of the non-specular part of [`Self::sample`] per steradian.
     #[inline]
     pub fn pdf(&self, wo: Vec3, wi: Vec3) -> f32 {
-        if (wo.z == 0.0 || wi.z == 0.0) && self.has_surface() {
-            return 0.0;
-        }
-        let pdf = match self {
-            Bsdf::Diffuse(b) => b.pdf(wo, wi),
-            Bsdf::DiffuseTransmission(b) => b.pdf(wo, wi),
-            Bsdf::Conductor(b) => b.pdf(wo, wi),
-            Bsdf::Dielectric(b) => b.pdf(wo, wi),
-            Bsdf::Exit(b) => b.pdf_select(wo, wi, Select::Transmission),
-            Bsdf::ThinDielectric(_) => 0.0,
-            Bsdf::CoatedDiffuse(b) => b.pdf(wo, wi),
-            Bsdf::Layered(b) => b.pdf(wo, wi),
-            Bsdf::Principled(b) => b.pdf(wo, wi),
-            Bsdf::Hair(b) => b.pdf(wo, wi),
-            Bsdf::Measured(b) => b.pdf(wo, wi),
-            Bsdf::Evaluated(b) => b.pdf(wo, wi),
-            Bsdf::Phase(b) => b.p(wo, wi),
-        };
-        if pdf.is_finite() { pdf } else { 0.0 }
+        self.f_cos_and_pdf(wo, wi).1
     }
 
-    /// [`Self::f`] and [`Self::pdf`], which have much in common where there are microfacets.
+    /// [`Self::f`] and [`Self::pdf`].
     #[inline]
     pub fn f_and_pdf(&self, wo: Vec3, wi: Vec3) -> (Rgb, f32) {
-        if wo.z == 0.0 || wi.z == 0.0 {
-            return (self.f(wo, wi), self.pdf(wo, wi));
-        }
+        let (f_cos, pdf) = self.f_cos_and_pdf(wo, wi);
+        (if self.has_surface() { without_cos(f_cos, wi) } else { f_cos }, pdf)
+    }
+
+    /// [`Self::f`] times [`Self::cos`], and [`Self::pdf`]: the bits of the kernel if there is one.
+    #[inline]
+    pub fn f_cos_and_pdf(&self, wo: Vec3, wi: Vec3) -> (Rgb, f32) {
         let (f, pdf) = match self {
-            Bsdf::Conductor(b) => b.f_and_pdf(wo, wi),
-            Bsdf::Dielectric(b) => b.f_and_pdf(wo, wi),
-            Bsdf::CoatedDiffuse(b) => b.f_and_pdf(wo, wi),
-            _ => (self.f(wo, wi), self.pdf(wo, wi)),
+            Bsdf::Diffuse(b) => return b.f_cos_and_pdf(wo, wi),
+            Bsdf::DiffuseTransmission(b) => return b.f_cos_and_pdf(wo, wi),
+            Bsdf::Conductor(b) => return b.f_cos_and_pdf(wo, wi),
+            Bsdf::Dielectric(b) => return b.f_cos_and_pdf(wo, wi),
+            Bsdf::Exit(b) => return evaluate::<kernels::Exit>(&b.params(), &[], wo, wi),
+            Bsdf::CoatedDiffuse(b) => return b.f_cos_and_pdf(wo, wi),
+            Bsdf::Principled(b) => return b.f_cos_and_pdf(wo, wi),
+            Bsdf::ThinDielectric(_) => return (Rgb::BLACK, 0.0),
+            _ if (wo.z == 0.0 || wi.z == 0.0) && self.has_surface() => return (Rgb::BLACK, 0.0),
+            Bsdf::Layered(b) => (b.f(wo, wi), b.pdf(wo, wi)),
+            Bsdf::Hair(b) => (b.f(wo, wi), b.pdf(wo, wi)),
+            Bsdf::Measured(b) => (b.f(wo, wi), b.pdf(wo, wi)),
+            Bsdf::Evaluated(b) => (b.f(wo, wi), b.pdf(wo, wi)),
+            Bsdf::Phase(b) => (Rgb::splat(b.p(wo, wi)), b.p(wo, wi)),
         };
-        (if f.is_finite() { f } else { Rgb::BLACK }, if pdf.is_finite() { pdf } else { 0.0 })
+        let f_cos = f * self.cos(wi);
+        (if f_cos.is_finite() { f_cos } else { Rgb::BLACK }, if pdf.is_finite() { pdf } else { 0.0 })
     }
 
     /// Probability that [`Self::sample`] samples the first of at most two lobes, which it does if `uc` is less: the
@@ -288,41 +267,6 @@ impl<'a> Bsdf<'a> {
         if self.has_surface() { w.z.abs() } else { 1.0 }
     }
 
-    /// How f and pdf are evaluated for many directions at once, seen from `wo`; `None` if one by one: random walks,
-    /// coats of anisotropic roughness, and models that are only evaluated.
-    pub fn lanes(&self, wo: Vec3) -> Option<LaneModel<'_>> {
-        let black = [0.0; 3];
-        let lambertian = |reflection: Rgb, transmission: Rgb, p: [f32; 2]| {
-            // A value that is not finite is black as a whole.
-            let f = |rho: Rgb| if rho.is_finite() { (rho * FRAC_1_PI).to_array() } else { black };
-            LaneModel::Lambertian { reflection: f(reflection), transmission: f(transmission), p }
-        };
-        let none = lambertian(Rgb::BLACK, Rgb::BLACK, [0.0; 2]);
-        match self {
-            Bsdf::Diffuse(b) => Some(lambertian(b.reflectance, Rgb::BLACK, [1.0, 0.0])),
-            Bsdf::DiffuseTransmission(b) => {
-                let p = b.p_reflect().map_or([0.0; 2], |p| [p, 1.0 - p]);
-                Some(lambertian(b.reflectance, b.transmittance, p))
-            }
-            Bsdf::Conductor(b) if b.distribution.is_smooth() => Some(none),
-            Bsdf::Conductor(b) => {
-                let TrowbridgeReitz { alpha_x, alpha_y } = b.distribution;
-                Some(LaneModel::Conductor { alpha: [alpha_x, alpha_y], eta: b.eta.to_array(), k: b.k.to_array() })
-            }
-            Bsdf::Dielectric(b) | Bsdf::Exit(b) if b.is_specular() => Some(none),
-            Bsdf::Dielectric(b) => Some(LaneModel::Dielectric(b.lanes())),
-            Bsdf::ThinDielectric(_) => Some(none),
-            Bsdf::CoatedDiffuse(b) => b.lanes(wo),
-            Bsdf::Exit(_)
-            | Bsdf::Layered(_)
-            | Bsdf::Principled(_)
-            | Bsdf::Hair(_)
-            | Bsdf::Measured(_)
-            | Bsdf::Evaluated(_)
-            | Bsdf::Phase(_) => None,
-        }
-    }
-
     /// The index of refraction of light that passes, where another takes its place for one wavelength.
     #[inline]
     pub fn eta_mut(&mut self) -> Option<&mut f32> {
@@ -397,12 +341,12 @@ impl<'a> Bsdf<'a> {
             return None;
         }
         let sample = match self {
-            Bsdf::Diffuse(b) => b.sample(wo, u),
+            Bsdf::Diffuse(b) => b.sample(wo, uc, u),
             Bsdf::DiffuseTransmission(b) => b.sample(wo, uc, u),
-            Bsdf::Conductor(b) => b.sample(wo, u),
+            Bsdf::Conductor(b) => b.sample(wo, uc, u),
             Bsdf::Dielectric(b) => b.sample(wo, uc, u),
             Bsdf::Exit(b) => b.sample_select(wo, uc, u, Transport::Radiance, Select::Transmission),
-            Bsdf::ThinDielectric(b) => b.sample(wo, uc),
+            Bsdf::ThinDielectric(b) => b.sample(wo, uc, u),
             Bsdf::CoatedDiffuse(b) => b.sample(wo, uc, u),
             Bsdf::Layered(b) => b.sample(wo, uc, u),
             Bsdf::Principled(b) => b.sample(wo, uc, u),

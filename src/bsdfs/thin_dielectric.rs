@@ -1,9 +1,7 @@
-//! A thin dielectric sheet without refraction: the sum of all reflections between its two parallel faces,
-//! R' = R + T²R/(1 − R²), T' = 1 − R' [Pharr et al. 2023, §9.5.1].
+//! A thin dielectric sheet without refraction, see [`kernels::thin_dielectric`].
 
-use super::fresnel::fr_dielectric;
-use super::{BsdfSample, Lobe};
-use lumiris_numbers::math::{Rgb, Vec3, sqr};
+use super::KernelBsdf;
+use lumiris_lanes::kernels;
 
 /// Thin sheet: mirror and straight transmission.
 #[derive(Clone, Copy, Debug)]
@@ -12,26 +10,11 @@ pub struct ThinDielectric {
     pub eta: f32,
 }
 
-impl ThinDielectric {
-    /// Reflectance of the sheet for the cosine of incidence `cos`.
-    #[inline]
-    pub fn reflectance(&self, cos: f32) -> f32 {
-        let r = fr_dielectric(cos.abs(), self.eta);
-        if r < 1.0 { r + sqr(1.0 - r) * r / (1.0 - sqr(r)) } else { r }
-    }
+impl KernelBsdf for ThinDielectric {
+    type Formulas = kernels::ThinDielectric;
+    type Params = [f32; 1];
 
-    /// Mirror reflection with the probability of the reflectance, else straight on.
-    pub fn sample(&self, wo: Vec3, uc: f32) -> Option<BsdfSample> {
-        if wo.z == 0.0 {
-            return None;
-        }
-        let r = self.reflectance(wo.z);
-        let (wi, p, lobe) = if uc < r {
-            (Vec3::new(-wo.x, -wo.y, wo.z), r, Lobe::REFLECTION)
-        } else {
-            (-wo, 1.0 - r, Lobe::TRANSMISSION)
-        };
-        let f = Rgb::splat(p / wo.z.abs());
-        (p > 0.0).then(|| BsdfSample { f, wi, pdf: p, lobe: Lobe::SPECULAR | lobe, eta: 1.0 })
+    fn params(&self) -> [f32; 1] {
+        [self.eta]
     }
 }

@@ -70,13 +70,13 @@ pub(super) fn bsdf_candidate(
 
 /// What a direction of BSDF sampling points at.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct EmitterInDirection {
+pub(super) struct EmitterInDirection {
     /// Radiance.
-    pub(crate) li: Rgb,
+    pub(super) li: Rgb,
     /// Density of light sampling (1/sr).
-    pub(crate) p_light: f32,
+    pub(super) p_light: f32,
     /// The point on the light, the bound of its error, and its normal; `None` at infinity.
-    pub(crate) end: Option<(Vec3, Vec3, Vec3)>,
+    pub(super) end: Option<(Vec3, Vec3, Vec3)>,
 }
 
 /// What the samples of some points point at, whose rays among the emitters have met `hits`; `None` where that is dark.
@@ -110,7 +110,7 @@ pub(super) fn find_emitters(
 
 /// What the direction `wi` points at by meeting `hit`, where lights are chosen with probability `pmf`; `None` if that is
 /// dark.
-pub(crate) fn emitter_at(
+pub(super) fn emitter_at(
     job: &RenderJob,
     ctx: &LightCtx,
     wi: Vec3,

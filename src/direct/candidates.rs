@@ -1,12 +1,12 @@
 //! Candidates of T1: samples with their unshadowed integrands and the densities of all techniques.
 
 use super::domain;
-use super::point::ShadingPoint;
 use super::stats::DirectStats;
 use crate::lights::LightId;
 use lumiris_numbers::estimators::mc;
 use lumiris_numbers::estimators::mis::{Heuristic, Technique};
 use lumiris_numbers::math::{Ray, Rgb};
+use lumiris_numbers::samplers::SampleStream;
 
 /// Which technique drew a candidate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -84,7 +84,7 @@ impl Candidate {
 }
 
 /// The number of samples per technique at a point.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct SampleAllocation {
     pub light_draws: u32,
     pub bsdf_draws: u32,
@@ -99,9 +99,14 @@ impl SampleAllocation {
         SampleAllocation { light_draws: light, bsdf_draws: bsdf, n_light: light as f32, n_bsdf: bsdf as f32 }
     }
 
+    /// The same, where the BSDF sample may be drawn by the path.
+    pub(super) fn drawn_by_path(self, by_path: bool) -> Self {
+        if by_path { SampleAllocation { bsdf_draws: 0, ..self } } else { self }
+    }
+
     /// A single sample that chooses its technique at random: the expected numbers are one half each.
-    pub(super) fn one_of_both(point: &ShadingPoint<'_>) -> Self {
-        let light = point.stream.domain(domain::TECHNIQUE).draw::<1>()[0] < 0.5;
+    pub(super) fn one_of_both(stream: &SampleStream) -> Self {
+        let light = stream.domain(domain::TECHNIQUE).draw::<1>()[0] < 0.5;
         SampleAllocation { light_draws: u32::from(light), bsdf_draws: u32::from(!light), n_light: 0.5, n_bsdf: 0.5 }
     }
 }

@@ -1,9 +1,9 @@
 //! The domains of random numbers of a shading point: what is drawn from different ones is independent.
 
 /// Light samples.
-pub(crate) const LIGHT: u32 = 0;
+pub(super) const LIGHT: u32 = 0;
 /// BSDF samples.
-pub(crate) const BSDF: u32 = 1;
+pub(super) const BSDF: u32 = 1;
 /// Choice of the technique of a single sample.
 pub(super) const TECHNIQUE: u32 = 2;
 /// Allocation of samples to groups of lights.

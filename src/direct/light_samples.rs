@@ -43,8 +43,8 @@ pub(super) fn light_candidate(
     allocation: &SampleAllocation,
     drawn: (LightId, LightSample),
 ) -> Option<Candidate> {
-    // Without the path, what media send out would have no other technique near by: there it is left to the next segment
-    if !point.bsdf_by_path && job.lights.medium_of(drawn.0).is_some() {
+    // What media send out would have no other technique near by: it is left to the next segment of the path
+    if job.lights.medium_of(drawn.0).is_some() {
         return None;
     }
     // Infinite lights overlap: a direction belongs to all of them together

@@ -24,6 +24,7 @@
 
 mod bsdf_samples;
 pub mod candidates;
+pub mod columns;
 mod components;
 pub(crate) mod domain;
 pub mod estimators;
@@ -36,11 +37,12 @@ pub mod shadow_segments;
 pub mod stats;
 mod t1;
 mod transmittance;
+pub mod vertices;
 
 use crate::accel::RayBatch;
 use crate::lights::LightId;
 use crate::scene::RenderJob;
-pub(crate) use bsdf_samples::{EmitterInDirection, emitter_at};
+pub use columns::{ColumnStage, Techniques};
 use estimators::Batch;
 pub use estimators::Estimator;
 pub use fits::Fits;
@@ -48,6 +50,7 @@ use lumiris_numbers::math::{Rgb, Vec3};
 pub use point::{ShadingPoint, lobe_for_lights};
 pub use stats::DirectStats;
 use std::time::Instant;
+pub use vertices::Vertices;
 
 /// Estimates direct light; holds the buffers of one worker.
 #[derive(Debug, Default)]

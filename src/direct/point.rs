@@ -31,9 +31,6 @@ pub struct ShadingPoint<'a> {
     pub fit: u32,
     /// Index of the camera sample in its batch.
     pub sample: u32,
-    /// The path goes on in the direction of the only BSDF sample, and its next segment finds the emitter: the sample
-    /// counts in the weights of the others, and is not drawn here.
-    pub bsdf_by_path: bool,
     /// What rays that leave the point go through.
     pub media: Sides,
 }
@@ -50,10 +47,10 @@ pub fn lobe_for_lights(lights: &LightSampling, bsdf: &SurfaceBsdf<'_>, wo: Vec3)
 }
 
 impl ShadingPoint<'_> {
-    /// Number of light samples beside a BSDF sample that the path takes: all others, but none where every lobe is
-    /// specular.
-    pub fn light_samples_beside_path(&self) -> u32 {
-        if self.bsdf.bsdf.has_non_specular() { self.sample_counts.samples.saturating_sub(1) } else { 0 }
+    /// The shading normal on the side of the viewer.
+    pub fn viewer_normal(&self) -> Vec3 {
+        let z = self.bsdf.frame.z;
+        if z.dot(self.wo) < 0.0 { -z } else { z }
     }
 
     /// The context for sampling lights.

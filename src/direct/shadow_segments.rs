@@ -1,8 +1,9 @@
 //! T2: shadow segments, packed in the order of their shading points, and the resulting visibility bits.
 
 use super::candidates::Candidates;
+use super::domain;
 use super::point::ShadingPoint;
-use super::transmittance::Crossing;
+use super::transmittance::{Crossing, Departure};
 use crate::accel::{Coherence, RayBatch};
 use crate::lights::LightId;
 use crate::scene::RenderJob;
@@ -23,6 +24,8 @@ pub struct Segments {
     lights: Vec<LightId>,
     occluded: Vec<bool>,
     crossing: Crossing,
+    /// Number of segments of each point so far.
+    counts: Vec<u32>,
 }
 
 impl Segments {
@@ -65,8 +68,15 @@ impl Segments {
             job.world.accel.occluded(&self.rays, Coherence::Packets, &mut self.occluded);
             return [self.rays.len() as u64, 0];
         }
-        let Segments { rays, contributions, points: of, lights, occluded, crossing } = self;
-        crossing.start(job, (rays, of, lights), points);
+        let Segments { rays, contributions, points: of, lights, occluded, crossing, counts } = self;
+        counts.clear();
+        counts.resize(points.len(), 0);
+        crossing.start(job, rays, |i, d| {
+            let (point, count) = (&points[of[i] as usize], &mut counts[of[i] as usize]);
+            *count += 1;
+            let stream = point.stream.domain(domain::TRANSMITTANCE + *count - 1);
+            Departure { light: lights[i], medium: point.medium(d), stream }
+        });
         let traced = crossing.trace(job);
         occluded.clear();
         occluded.extend(crossing.transmittance().map(Rgb::is_black));

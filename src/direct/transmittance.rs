@@ -4,14 +4,13 @@
 //! The estimate has the expectation exp(−∫σ_t) and is independent of the sample that the segment belongs to, so the
 //! expectation of its contribution is that of the sample times T. Densities of directions do not know of it.
 
-use super::domain;
-use super::point::ShadingPoint;
 use crate::accel::{Coherence, Hit, RayBatch};
 use crate::lights::LightId;
 use crate::media::{MediumId, Numbers, Segment};
 use crate::scene::{RenderJob, SurfaceInteraction};
 use lumiris_numbers::math::ray::SEGMENT_END;
 use lumiris_numbers::math::{Ray, Rgb, Vec3};
+use lumiris_numbers::samplers::SampleStream;
 
 /// Surfaces that a segment may pass: it counts as occluded behind them.
 const MAX_PASSED: u32 = 64;
@@ -20,8 +19,6 @@ const MAX_PASSED: u32 = 64;
 #[derive(Debug, Default)]
 pub(super) struct Crossing {
     all: Vec<Crossed>,
-    /// Number of segments of each point so far.
-    counts: Vec<u32>,
     /// Those that are under way, their rays, and what these meet.
     active: Vec<u32>,
     rays: RayBatch,
@@ -44,31 +41,38 @@ struct Crossed {
     transmittance: Rgb,
 }
 
+/// How a segment begins.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Departure {
+    /// The light that it leads to.
+    pub(super) light: LightId,
+    /// What it goes through.
+    pub(super) medium: Option<MediumId>,
+    /// Its random numbers. They follow from its place among the segments of the same point, not of the batch.
+    pub(super) stream: SampleStream,
+}
+
 impl Crossing {
-    /// Begins with segments, each of one of the `points` to a light.
+    /// Begins with segments; `departure` has the index and the direction of each.
     pub(super) fn start(
         &mut self,
         job: &RenderJob,
-        (rays, of, lights): (&RayBatch, &[u32], &[LightId]),
-        points: &[ShadingPoint<'_>],
+        rays: &RayBatch,
+        mut departure: impl FnMut(usize, Vec3) -> Departure,
     ) {
         self.all.clear();
-        // Numbers follow from the place among the segments of the same point, not of the batch
-        self.counts.clear();
-        self.counts.resize(points.len(), 0);
-        for (i, &of) in of.iter().enumerate() {
-            let (ray, point) = (rays.get(i), &points[of as usize]);
-            let index = self.counts[of as usize];
-            self.counts[of as usize] += 1;
-            self.all.push(Crossed {
+        self.all.extend((0..rays.len()).map(|i| {
+            let ray = rays.get(i);
+            let Departure { light, medium, stream } = departure(i, ray.d);
+            Crossed {
                 ray,
                 end: ray.t_max.is_finite().then(|| ray.o + ray.d),
-                medium_of_end: job.lights.medium_of(lights[i]),
-                medium: point.medium(ray.d),
-                numbers: Numbers::new(point.stream.domain(domain::TRANSMITTANCE + index)),
+                medium_of_end: job.lights.medium_of(light),
+                medium,
+                numbers: Numbers::new(stream),
                 transmittance: Rgb::WHITE,
-            });
-        }
+            }
+        }));
     }
 
     /// What passes of each segment; black where it is occluded.

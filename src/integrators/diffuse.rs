@@ -6,8 +6,7 @@
 //! vertex where the lookup misses, or without such a part, continues as in `path`. So no light is counted twice or
 //! lost.
 
-use super::path::{Found, Shading};
-use super::segment::{PathState, Vertex};
+use super::path::{Arrived, Found, Shading};
 use crate::bsdfs::Lambertian;
 use crate::film::PixelSample;
 use crate::materials::SurfaceBsdf;
@@ -19,15 +18,16 @@ pub(super) fn shade<'w>(
     found: &Found<'_, 'w>,
     includes_direct: bool,
     out: &mut [PixelSample],
-    mut reflected: impl FnMut(&PathState, &Vertex<'w>, &Lambertian<'_>) -> Option<Rgb>,
+    mut reflected: impl FnMut(&Arrived<'_, 'w>, &Lambertian<'_>) -> Option<Rgb>,
 ) -> Vec<Shading<'w>> {
-    let shading = |(path, v): (&PathState, &Vertex<'w>)| {
-        let all = Some(v.bsdf);
-        let known = v.bsdf.lambertian(v.wo).and_then(|part| Some((reflected(path, v, &part)?, part.rest)));
+    let shading = |v: Arrived<'_, 'w>| {
+        let (path, bsdf) = (v.path, v.point.bsdf);
+        let all = Some(bsdf);
+        let known = bsdf.lambertian(v.point.wo).and_then(|part| Some((reflected(&v, &part)?, part.rest)));
         let Some((known, rest)) = known else { return Shading { lit: all, next: all } };
         out[path.sample as usize].radiance += path.beta * known;
-        let rest = rest.map(|bsdf| SurfaceBsdf { bsdf, ..v.bsdf });
+        let rest = rest.map(|rest| SurfaceBsdf { bsdf: rest, ..bsdf });
         Shading { lit: if includes_direct { rest } else { all }, next: rest }
     };
-    found.paths.iter().zip(found.vertices).map(shading).collect()
+    found.each().map(shading).collect()
 }

@@ -17,11 +17,9 @@ use crate::accel::Hit;
 use crate::bsdfs::dielectric::{Select, Transport};
 use crate::bsdfs::fresnel::fr_dielectric;
 use crate::bsdfs::{Bsdf, Dielectric, Phase};
-use crate::lights::LightCtx;
 use crate::materials::SurfaceBsdf;
 use crate::media::{End, Flight, Glimpse, Medium, Numbers, Segment, Sides};
 use crate::scene::{RenderJob, SurfaceInteraction};
-use lumiris_numbers::estimators::mis::Heuristic;
 use lumiris_numbers::math::{Ray, Rgb, Vec3};
 
 /// Events before roulette by throughput.
@@ -119,8 +117,7 @@ impl VertexSearch {
 /// The path from `o` on in the direction `wi`. No light is sampled at `o`, so the segment has the full weight of what it
 /// finds.
 fn go_on(path: PathState, o: Vec3, wi: Vec3, beta: Rgb) -> PathState {
-    let technique =
-        BsdfTechnique { ctx: LightCtx::at(o), n_light: 0.0, pdf: None, heuristic: Heuristic::Balance, survivor: None };
+    let technique = BsdfTechnique { row: BsdfTechnique::NO_ROW, pdf: None, survivor: None };
     let ray = Ray { o, d: wi, ..path.ray };
     PathState { ray, beta, passed: path.passed + 1, technique: Some(technique), ..path }
 }

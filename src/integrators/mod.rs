@@ -1,8 +1,8 @@
 //! Light transport: from camera rays to radiance.
 //!
 //! An [`Integrator`] is what all threads share while an image is rendered: it prepares what samples need, makes a
-//! [`Tracer`] for each thread, and reports. Reading order: `segment` is a path between two vertices, `vertices` finds
-//! the next ones, `interior` walks through materials on the way there, and [`path`] is the loop over them; `wavefront` has the vertices of `mc` and `mis` side by side.
+//! [`Tracer`] for each thread, and reports. Reading order: [`path`] is the loop over vertices, `segment` a path between two of
+//! them, `vertices` finds the next ones, `interior` walks through materials on the way there, and `scatter` extends the paths.
 //! Pixels that are neighbours may share paths ([`reuse`]; which ones: [`cells`]), and light paths bring caustics ([`light_paths`]). [`through_media`] says which settings know participating media. [`irradiance_cache`] and [`photon_map`] replace the light that Lambertian parts reflect (`diffuse`).
 
 pub mod camera_samples;
@@ -15,10 +15,10 @@ pub mod light_paths;
 pub mod path;
 pub mod photon_map;
 pub mod reuse;
+mod scatter;
 mod segment;
 pub mod through_media;
 mod vertices;
-mod wavefront;
 
 pub use irradiance_cache::{CacheIntegrator, CacheReport, IrradianceCache};
 pub use light_paths::LightPathStats;

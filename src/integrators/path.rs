@@ -14,22 +14,21 @@
 use super::cells::Groups;
 use super::light_paths::{LightImage, LightPilot};
 use super::reuse::{self, Place, Reuse};
+use super::scatter::{Continuation, Scatter};
 pub use super::segment::{CameraSample, PathStats};
-use super::segment::{PathState, Vertex, emptied, extend, extend_to_emitter};
+use super::segment::{Left, PathState};
 pub use super::vertices::Recording;
 use super::vertices::{Stage, VertexSearch};
-use super::wavefront::{Batch, Buffers, Estimate, Output};
 use super::{Integrator, Statistics, Tracer};
-use crate::bsdfs::{Bsdf, Diffuse};
-use crate::direct::{DirectStage, Estimator, Fits, ShadingPoint, lobe_for_lights};
+use crate::direct::columns::Sinks;
+use crate::direct::{ColumnStage, DirectStage, Estimator, Fits, ShadingPoint, Techniques, Vertices};
 use crate::film::{FeatureSet, PixelSample};
-use crate::lights::LightSampling;
 use crate::materials::SurfaceBsdf;
-use crate::media::Sides;
 use crate::photons::PhotonError;
 use crate::scene::RenderJob;
-use crate::settings::IntegratorSettings;
-use lumiris_numbers::math::Rgb;
+use crate::settings::{IntegratorSettings, SampleCounts};
+use lumiris_numbers::math::{Rgb, Vec3};
+use lumiris_numbers::samplers::SampleStream;
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -88,7 +87,27 @@ pub(super) struct Found<'a, 'w> {
     /// Their index along the paths, from 0.
     pub(super) vertex: u32,
     pub(super) paths: &'a [PathState],
-    pub(super) vertices: &'a [Vertex<'w>],
+    pub(super) vertices: &'a Vertices<'w>,
+}
+
+/// A vertex by itself.
+pub(super) struct Arrived<'a, 'w> {
+    pub(super) path: &'a PathState,
+    pub(super) point: ShadingPoint<'w>,
+    /// Its random numbers.
+    pub(super) stream: SampleStream,
+}
+
+impl<'a, 'w> Found<'a, 'w> {
+    /// The vertices one by one.
+    pub(super) fn each(&self) -> impl Iterator<Item = Arrived<'a, 'w>> {
+        let (paths, vertices) = (self.paths, self.vertices);
+        (0..vertices.len()).map(move |i| {
+            let path = &paths[vertices.path[i] as usize];
+            let point = vertices.point(i, SampleCounts::default(), [path.sample, 0]);
+            Arrived { path, point, stream: vertices.streams[i] }
+        })
+    }
 }
 
 /// What an integrator does at vertices where it is not path tracing: it adds to the samples what is known of the light
@@ -123,11 +142,12 @@ pub const BATCH_PATHS: usize = 4096;
 pub struct PathTracer {
     pub(super) search: VertexSearch,
     next: Vec<PathState>,
-    /// Memory of the shading points of earlier batches.
-    spare_points: Vec<ShadingPoint<'static>>,
+    scatter: Scatter,
     radiance: Vec<Rgb>,
     direct: DirectStage,
-    buffers: Option<Box<Buffers>>,
+    columns: ColumnStage,
+    /// Memory of the vertices of earlier batches.
+    spare: [Vertices<'static>; 4],
     /// Paths that samples of a batch share.
     reuse: Reuse,
     /// The vertex whose estimator all have, if not each its own.
@@ -138,17 +158,15 @@ pub struct PathTracer {
     pub outcomes: Option<Vec<Outcome>>,
 }
 
-/// The vertices of a batch of paths, as the loop passes them on.
-struct Step<'s, 'w> {
-    settings: &'s IntegratorSettings,
-    estimator: Estimator,
+/// What the steps at the vertices of a batch read.
+struct Step<'s> {
+    job: &'s RenderJob,
+    samples: &'s [CameraSample],
     /// Index along the paths.
     vertex: u32,
-    /// Paths go on from here, if only to see what media send out.
-    continues: bool,
-    vertices: Vec<Vertex<'w>>,
-    /// Of each vertex, if the integrator decides that.
-    shadings: Option<Vec<Shading<'w>>>,
+    estimator: Estimator,
+    /// The samples of direct light, if all of them are traced.
+    techniques: Option<Techniques>,
 }
 
 impl PathTracer {
@@ -208,39 +226,55 @@ impl PathTracer {
     ) {
         let depth = settings.depth();
         let is_emissive = job.world.scene.media.is_emissive();
+        // Samples that are listed are those of the stages; what an integrator does itself is not in the paths of others
+        let (is_listed, is_plain) = (self.outcomes.is_some(), own.is_none() && self.outcomes.is_none());
+        let [mut vertices, mut left, mut lit, mut next] = std::mem::take(&mut self.spare).map(Vertices::emptied);
+        let mut drawn = None;
         fits.begin_batch(samples.len());
-        let is_plain = own.is_none() && self.outcomes.is_none();
         self.reuse.begin(settings.path_reuse.filter(|_| is_plain), samples.len());
         for vertex in 0..=depth {
-            let count = self.search.active.len();
-            if count == 0 {
+            if self.search.active.is_empty() {
                 break;
             }
-            let estimate = Estimate::new(settings, vertex).filter(|_| is_plain && !job.shadows_pass());
-            let mut batch = estimate.map(|e| Batch::new(self.buffers.take().unwrap_or_default(), e, count));
-            let stage = Stage { job, vertex, depth, samples, out: &mut *out, batch: batch.as_mut() };
-            let vertices = self.search.find(stage);
-            let found = Found { vertex, paths: &self.search.active, vertices: &vertices };
-            let shadings = own.as_mut().map(|own| own(&found, out));
+
+            // Trace, add β·L_e of what is met, and arrive at the vertices
+            let from = Left { vertices: &left, techniques: drawn };
+            self.search.find(Stage { job, vertex, depth, samples, left: from, out, vertices: &mut vertices });
+
+            // The samples there. Light samples alone do not find all that media send out: beyond the last vertex there is another
+            // segment for it
             let estimator = Estimator::at_vertex(settings, self.estimator_of.unwrap_or(vertex));
-            // Light samples alone do not find all that media send out: beyond the last vertex there is another segment for it
             let continues = vertex + 1 < depth || is_emissive && vertex < depth;
-            let step = Step { settings, estimator, vertex, continues, vertices, shadings };
-            let points = self.points(&job.lights, &step, samples);
-            self.share(&step, out);
-            self.light_points(job, &step, &points, fits, out);
-            self.extend_paths(&step, &points);
-            if let Some(mut batch) = batch {
-                let (stats, direct) = (&mut self.search.stats, &mut self.direct.stats);
-                let segments = self.search.recording.as_mut().map(|r| r.segments_at(vertex));
-                let (samples, next, reuse) = (&mut *out, &mut self.next, self.reuse.active());
-                let (layers, guide) = (&mut self.search.layers, self.search.guide.as_deref());
-                batch.shade(job, &mut Output { samples, fits, next, stats, direct, segments, reuse, layers, guide });
-                self.buffers = Some(batch.into_buffers());
+            let techniques = Techniques::of(&estimator, continues && own.is_none()).filter(|_| !is_listed);
+            let step = Step { job, samples, vertex, estimator, techniques };
+
+            // What the integrator knows of the light, and what neighbours share of the path
+            let own = own.as_mut().map(|own| {
+                let found = Found { vertex, paths: &self.search.active, vertices: &vertices };
+                let shadings = own(&found, out);
+                lit.clear();
+                lit.select(&vertices, &job.lights, |i| shadings[i].lit);
+                next.clear();
+                next.select(&vertices, &job.lights, |i| shadings[i].next);
+            });
+            let (lit, next) = if own.is_some() { (&lit, &next) } else { (&vertices, &vertices) };
+            self.share(vertex, &vertices, out);
+
+            // Add β·L_d
+            self.light(&step, lit, fits, out);
+
+            // Scatter
+            self.next.clear();
+            if continues {
+                let start = Instant::now();
+                let how = Continuation { settings, vertex, techniques, only_specular: self.only_specular };
+                self.scatter.extend(&how, next, &self.search.active, &mut self.next);
+                self.search.stats.shade_time += start.elapsed();
             }
             std::mem::swap(&mut self.search.active, &mut self.next);
-            self.spare_points = emptied(points);
-            self.search.recycle(step.vertices);
+            std::mem::swap(&mut left, &mut vertices);
+            vertices.clear();
+            drawn = techniques;
         }
         if let Some(reuse) = self.reuse.active() {
             let start = Instant::now();
@@ -248,110 +282,113 @@ impl PathTracer {
             self.direct.stats.t2 += start.elapsed();
         }
         fits.end_batch(samples.iter().map(|s| (s.fit, s.weight)));
+        self.spare = [vertices, left, lit, next].map(Vertices::emptied);
     }
 
-    /// The points whose direct light is estimated.
-    fn points<'w>(
-        &mut self,
-        lights: &LightSampling,
-        step: &Step<'_, 'w>,
-        samples: &[CameraSample],
-    ) -> Vec<ShadingPoint<'w>> {
-        let sample_counts = step.estimator.sample_counts();
-        // Outcomes are those of all samples of a first vertex
-        let may_continue = step.continues && step.shadings.is_none() && (step.vertex > 0 || self.outcomes.is_none());
-        let point = |(v, path): (&Vertex<'w>, &PathState)| {
-            let sample = &samples[path.sample as usize];
-            let sample_counts = if step.vertex == 0 { sample.sample_counts } else { sample_counts };
-            let bsdf_by_path = may_continue
-                && matches!(step.estimator, Estimator::Mis(mis) if mis.has_one_bsdf_sample(sample_counts.samples))
-                && !v.bsdf.bsdf.is_only_evaluated();
-            ShadingPoint {
-                bsdf_by_path,
-                lobe: lobe_for_lights(lights, &v.bsdf, v.wo),
-                sample: path.sample,
-                ..v.shading_point(path.ray.time, sample_counts, sample.fit)
-            }
-        };
-        let mut points: Vec<ShadingPoint<'_>> = emptied(std::mem::take(&mut self.spare_points));
-        let all = step.vertices.iter().zip(&self.search.active).map(point);
-        match &step.shadings {
-            None => points.extend(all),
-            Some(shadings) => points.extend(all.zip(shadings).filter_map(|(point, s)| {
-                let bsdf = s.lit?;
-                Some(ShadingPoint { bsdf, lobe: lobe_for_lights(lights, &bsdf, point.wo), ..point })
-            })),
-        }
-        points
-    }
-
-    /// Lets the paths at Lambertian vertices that are not in columns be shared.
-    fn share(&mut self, step: &Step<'_, '_>, out: &mut [PixelSample]) {
+    /// Lets the paths at Lambertian vertices be shared.
+    fn share(&mut self, vertex: u32, vertices: &Vertices<'_>, out: &mut [PixelSample]) {
         let Some(reuse) = self.reuse.active() else { return };
-        for (path, v) in self.search.active.iter_mut().zip(&step.vertices) {
-            let Bsdf::Diffuse(Diffuse { reflectance }) = v.bsdf.bsdf else { continue };
-            if v.media != Sides::default() {
-                continue;
-            }
-            let at = Place::new((v.surface.p, v.surface.p_error), (v.bsdf.n, v.bsdf.frame.z), v.wo);
+        let start = Instant::now();
+        let surface = &vertices.surface;
+        for i in vertices.bsdfs.len()..vertices.len() {
+            let path = &mut self.search.active[vertices.path[i] as usize];
+            let point = (surface.p.vec3(i), surface.p_error.vec3(i));
+            let at = Place::new(point, (surface.n.vec3(i), surface.ns.vec3(i)), surface.wo.vec3(i));
             let radiance = &mut out[path.sample as usize].radiance;
-            path.beta = reuse.arrive((path.sample, step.vertex, v.is_next), at, (path.beta, reflectance), radiance);
+            let arrival = (path.sample, vertex, path.passed == 0);
+            path.beta = reuse.arrive(arrival, at, (path.beta, surface.rho.rgb(i)), radiance);
+        }
+        self.search.stats.shade_time += start.elapsed();
+    }
+
+    /// Adds the direct light of vertices.
+    fn light(&mut self, step: &Step<'_>, vertices: &Vertices<'_>, fits: &mut Fits, out: &mut [PixelSample]) {
+        match &step.techniques {
+            Some(techniques) => self.light_columns(step, techniques, vertices, fits, out),
+            None => self.light_points(step, vertices, fits, out),
         }
     }
 
-    /// Adds the direct light of the vertices of the active paths.
-    fn light_points(
+    /// Adds the direct light of vertices whose samples are all traced.
+    fn light_columns(
         &mut self,
-        job: &RenderJob,
-        step: &Step<'_, '_>,
-        points: &[ShadingPoint<'_>],
+        step: &Step<'_>,
+        techniques: &Techniques,
+        vertices: &Vertices<'_>,
         fits: &mut Fits,
         out: &mut [PixelSample],
     ) {
-        self.direct.estimate(job, &step.estimator, points, fits, &mut self.radiance);
-        let active = &self.search.active;
+        let job = step.job;
+        let VertexSearch { active, layers, guide, recording, .. } = &mut self.search;
+        let path = |row: usize| &active[vertices.path[row] as usize];
+        let rest = guide.as_ref().map(|guide| {
+            move |row: usize, light, n, wi: Vec3| {
+                let chain = path(row).chain;
+                if chain.is_caustic() { chain.rest(guide.density(light, n, -wi)) } else { 1.0 }
+            }
+        });
+        let are_kept = layers.are_kept();
+        let mut visible = |row: usize, light: Option<_>, wi, contribution| {
+            let (path, p) = (path(row), vertices.surface.p.vec3(row));
+            match light {
+                Some(light) => layers.add(&job.lights, path.sample, (light, p, wi), path.beta * contribution),
+                None => layers.add_infinite(&job.lights, path.sample, (p, wi), path.beta * contribution),
+            }
+        };
+        let mut sinks = Sinks {
+            rest: rest.as_ref().map(|rest| rest as _),
+            visible: if are_kept { Some(&mut visible) } else { None },
+            segments: recording.as_mut().map(|r| r.segments_at(step.vertex)),
+        };
+        self.columns.estimate(job, techniques, vertices, &mut sinks, &mut self.direct.stats);
+
+        let start = Instant::now();
+        for row in 0..vertices.len() {
+            let (path, radiance) = (path(row), self.columns.radiance(row));
+            out[path.sample as usize].radiance += path.beta * radiance;
+            if techniques.has_controls {
+                let value = job.world.scene.film.balanced(radiance).to_array();
+                fits.set_controls(path.sample, value, self.columns.controls(job, row));
+            }
+        }
+        self.direct.stats.select += start.elapsed();
+    }
+
+    /// Adds the direct light of vertices by the stages of an estimator that selects among its samples.
+    fn light_points(&mut self, step: &Step<'_>, vertices: &Vertices<'_>, fits: &mut Fits, out: &mut [PixelSample]) {
+        let (job, active) = (step.job, &self.search.active);
+        // In the order of the paths: fits are sums over the points of a pixel
+        let mut rows = vec![u32::MAX; active.len()];
+        vertices.path.iter().zip(0..).for_each(|(&path, row)| rows[path as usize] = row);
+        rows.retain(|&row| row != u32::MAX);
+        let path = |point: usize| &active[vertices.path[rows[point] as usize] as usize];
+        let counts = step.estimator.sample_counts();
+        let point = |(point, &row): (usize, &u32)| {
+            let sample = &step.samples[path(point).sample as usize];
+            let counts = if step.vertex == 0 { sample.sample_counts } else { counts };
+            vertices.point(row as usize, counts, [path(point).sample, sample.fit])
+        };
+        let points: Vec<ShadingPoint<'_>> = rows.iter().enumerate().map(point).collect();
+        self.direct.estimate(job, &step.estimator, &points, fits, &mut self.radiance);
+
         if let Some(r) = &mut self.search.recording {
             r.segments_at(step.vertex).push(self.direct.segments().clone());
         }
         if let Some(outcomes) = self.outcomes.as_mut().filter(|_| step.vertex == 0) {
             outcomes.extend(self.direct.outcomes().map(|(point, unshadowed, is_free)| {
                 let contribution = if is_free { unshadowed } else { Rgb::BLACK };
-                Outcome { sample: active[point as usize].sample, unshadowed, contribution }
+                Outcome { sample: path(point as usize).sample, unshadowed, contribution }
             }));
         }
-        let is_lit = |i: usize| step.shadings.as_ref().is_none_or(|shadings| shadings[i].lit.is_some());
-        let lit = active.iter().enumerate().filter(|&(i, _)| is_lit(i)).map(|(_, path)| path);
-        for (path, &radiance) in lit.clone().zip(&self.radiance) {
-            out[path.sample as usize].radiance += path.beta * radiance;
+        for (point, &radiance) in self.radiance.iter().enumerate() {
+            out[path(point).sample as usize].radiance += path(point).beta * radiance;
         }
-        let layers = &mut self.search.layers;
-        if layers.are_kept() {
-            let lit: Vec<&PathState> = lit.collect();
+        if self.search.layers.are_kept() {
             for (point, (light, wi), contribution) in self.direct.visible() {
-                let (path, p) = (lit[point as usize], points[point as usize].light_ctx().p);
-                layers.add(&job.lights, path.sample, (light, p, wi), path.beta * contribution);
+                let (path, p) = (path(point as usize), points[point as usize].light_ctx().p);
+                self.search.layers.add(&job.lights, path.sample, (light, p, wi), path.beta * contribution);
             }
         }
-    }
-
-    /// Fills `self.next` with the paths that go on.
-    fn extend_paths(&mut self, step: &Step<'_, '_>, points: &[ShadingPoint<'_>]) {
-        let start = Instant::now();
-        self.next.clear();
-        let Step { settings, vertex, .. } = *step;
-        let paths = self.search.active.iter().zip(&step.vertices);
-        match &step.shadings {
-            _ if !step.continues => {}
-            None => self.next.extend(paths.zip(points).filter_map(|((path, v), point)| match &step.estimator {
-                Estimator::Mis(mis) if point.bsdf_by_path => extend_to_emitter(path, v, point, vertex, (settings, mis)),
-                _ => Some(extend(path, v, vertex, settings)?.0),
-            })),
-            Some(shadings) => self.next.extend(paths.zip(shadings).filter_map(|((path, v), s)| {
-                let (next, lobe) = extend(path, &Vertex { bsdf: s.next?, ..*v }, vertex, settings)?;
-                (!self.only_specular || lobe.is_specular()).then_some(next)
-            })),
-        }
-        self.search.stats.shade_time += start.elapsed();
     }
 }
 

@@ -2,19 +2,15 @@
 
 use super::light_paths::{Chain, Guide};
 use crate::accel::Hit;
-use crate::bsdfs::Lobe;
 use crate::cameras::CameraRay;
-use crate::direct::estimators::mis::Mis;
-use crate::direct::{DirectStats, ShadingPoint};
+use crate::direct::{DirectStats, Techniques, Vertices};
 use crate::film::{FeatureSet, Features};
-use crate::geometry::SurfaceHit;
-use crate::lights::{GlossyLobe, LightCtx, LightHit};
+use crate::lights::{LightCtx, LightHit};
 use crate::materials::SurfaceBsdf;
-use crate::media::{MediumId, Sides};
+use crate::media::MediumId;
 use crate::scene::{RenderJob, SurfaceInteraction};
 use crate::settings::{IntegratorSettings, SampleCounts};
-use lumiris_numbers::estimators::mis::{Heuristic, Technique};
-use lumiris_numbers::math::ray::offset_origin;
+use lumiris_numbers::estimators::mis::Technique;
 use lumiris_numbers::math::{Ray, Rgb, Vec3};
 use lumiris_numbers::samplers::SampleStream;
 use std::time::Duration;
@@ -136,35 +132,15 @@ pub(super) struct PathState {
     pub(super) chain: Chain,
 }
 
-/// What a path keeps at a vertex of what it brought there.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Carried {
-    /// Index of the camera sample.
-    pub(super) sample: u32,
-    pub(super) beta: Rgb,
-    pub(super) eta_scale: f32,
-    /// Width of a pixel at the vertex, and its growth per unit length.
-    pub(super) width: f32,
-    pub(super) spread: f32,
-    pub(super) time: f32,
-    /// See [`PathState`].
-    pub(super) passed: u32,
-    /// See [`PathState`].
-    pub(super) wavelength: Option<f32>,
-    /// See [`PathState`].
-    pub(super) chain: Chain,
-}
-
 impl PathState {
-    /// At a vertex with the throughput `beta`, where a pixel has the given width.
-    #[inline]
-    pub(super) fn carried(&self, beta: Rgb, width: f32) -> Carried {
-        let PathState { sample, eta_scale, spread, passed, wavelength, chain, ray: Ray { time, .. }, .. } = *self;
-        Carried { sample, beta, eta_scale, width, spread, time, passed, wavelength, chain }
-    }
-
     /// What the path carries of the emission of a surface, with the weight of the technique that found it.
-    pub(super) fn emission(&self, job: &RenderJob, interaction: &SurfaceInteraction, guide: Option<&Guide>) -> Rgb {
+    pub(super) fn emission(
+        &self,
+        job: &RenderJob,
+        left: &Left<'_, '_>,
+        interaction: &SurfaceInteraction,
+        guide: Option<&Guide>,
+    ) -> Rgb {
         let lights = &job.lights;
         if interaction.hit.instance != Hit::NO_INSTANCE {
             return Rgb::BLACK;
@@ -172,7 +148,7 @@ impl PathState {
         let Some(light) = lights.light_of(interaction.hit.geometry, interaction.hit.primitive) else {
             return Rgb::BLACK;
         };
-        if self.technique.is_some_and(|technique| lights.lights[light as usize].is_dark_from(technique.ctx.p)) {
+        if self.technique.is_some() && lights.lights[light as usize].is_dark_from(left.ctx(self).p) {
             return Rgb::BLACK;
         }
         let s = &interaction.surface;
@@ -182,7 +158,7 @@ impl PathState {
             l *= self.chain.rest(guide.density(light, s.n, interaction.wo));
         }
         match &self.technique {
-            Some(technique) if !l.is_black() => l * technique.weight(|ctx| lights.pdf(ctx, light, self.ray.d, &hit)),
+            Some(_) if !l.is_black() => l * left.weight(self, |ctx| lights.pdf(ctx, light, self.ray.d, &hit)),
             _ => l,
         }
     }
@@ -258,66 +234,45 @@ impl PathState {
 /// BSDF sampling at the last vertex, as multiple importance sampling weights it against light sampling there.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct BsdfTechnique {
-    /// Where light sampling stood.
-    pub(super) ctx: LightCtx,
-    /// Number of light samples.
-    pub(super) n_light: f32,
+    /// The row of that vertex; [`Self::NO_ROW`] if no light was sampled there.
+    pub(super) row: u32,
     /// Density of the direction; `None` for a specular lobe, which no other technique samples.
     pub(super) pdf: Option<f32>,
-    pub(super) heuristic: Heuristic,
     /// Throughput of the path beyond the first surface, if roulette lets it go on.
     pub(super) survivor: Option<Rgb>,
 }
 
 impl BsdfTechnique {
-    /// The weight of what it found, where light sampling has the density `p_light`.
-    pub(super) fn weight(&self, p_light: impl FnOnce(&LightCtx) -> f32) -> f32 {
-        self.pdf.map_or(1.0, |p| {
-            let light = Technique { n: self.n_light, p: p_light(&self.ctx) };
-            self.heuristic.weight(Technique { n: 1.0, p }, light)
-        })
-    }
+    /// Of a point where no light was sampled.
+    pub(super) const NO_ROW: u32 = u32::MAX;
 }
 
-impl Carried {
-    /// Throughput and squared relative index of refraction of the path in a direction; `None` if it carries nothing.
+/// What the paths of a batch have left: the last vertices, and the samples that were drawn there.
+pub(super) struct Left<'a, 'w> {
+    pub(super) vertices: &'a Vertices<'w>,
+    pub(super) techniques: Option<Techniques>,
+}
+
+impl Left<'_, '_> {
+    /// Where light was sampled at the last vertex of a path.
     #[inline]
-    pub(super) fn beyond(&self, direction: &Direction) -> Option<(Rgb, f32)> {
-        let beta = self.beta * direction.weight;
-        let eta_scale = self.eta_scale * direction.eta * direction.eta;
-        (!beta.is_black() && beta.is_finite()).then_some((beta, eta_scale))
+    pub(super) fn ctx(&self, path: &PathState) -> LightCtx {
+        match path.technique {
+            Some(technique) if technique.row != BsdfTechnique::NO_ROW => {
+                self.vertices.surface.lit_points().get(technique.row as usize)
+            }
+            _ => LightCtx::at(path.ray.o),
+        }
     }
 
-    /// What light paths could have found as well, in a direction beyond a vertex of geometric normal `n`.
+    /// The weight of what a path has found by its BSDF sample, where light sampling has the density `p_light`.
     #[inline]
-    pub(super) fn chain_beyond(&self, n: Vec3, direction: &Direction) -> Chain {
-        if self.chain.is_caustic() {
-            return self.chain;
-        }
-        let pdf = direction.pdf.filter(|_| !direction.lobe.is_specular());
-        self.chain.beyond_first(pdf, n.dot(direction.wi))
-    }
-
-    /// The path from the origin `o` on in the direction `wi`, with what [`Self::beyond`] says.
-    #[inline]
-    pub(super) fn segment(&self, o: Vec3, wi: Vec3, beta: Rgb, eta_scale: f32) -> PathState {
-        let Carried { sample, width, spread, time, wavelength, chain, .. } = *self;
-        let ray = Ray { o, d: wi, t_max: f32::INFINITY, time };
-        PathState {
-            sample,
-            ray,
-            beta,
-            eta_scale,
-            width,
-            spread,
-            passed: 0,
-            travelled: 0.0,
-            technique: None,
-            medium: None,
-            wavelength,
-            is_ghost: false,
-            chain,
-        }
+    pub(super) fn weight(&self, path: &PathState, p_light: impl FnOnce(&LightCtx) -> f32) -> f32 {
+        let Some(techniques) = &self.techniques else { return 1.0 };
+        path.technique.and_then(|technique| technique.pdf).map_or(1.0, |p| {
+            let light = Technique { n: techniques.light_samples(), p: p_light(&self.ctx(path)) };
+            techniques.heuristic.weight(Technique { n: 1.0, p }, light)
+        })
     }
 }
 
@@ -336,138 +291,4 @@ pub(super) fn survive(
         return Some(beta);
     }
     (stream.draw_random(domain::ROULETTE) < survival).then(|| beta / survival)
-}
-
-/// How a path continues.
-pub(super) struct Direction {
-    pub(super) wi: Vec3,
-    /// Factor of the throughput.
-    pub(super) weight: Rgb,
-    /// Relative index of refraction.
-    pub(super) eta: f32,
-    pub(super) lobe: Lobe,
-    /// Density of the direction; `None` if it was resampled.
-    pub(super) pdf: Option<f32>,
-}
-
-/// A direction by BSDF sampling.
-pub(super) fn sampled_direction(bsdf: &SurfaceBsdf<'_>, wo: Vec3, [uc, u0, u1]: [f32; 3]) -> Option<Direction> {
-    let sample = bsdf.sample(wo, uc, [u0, u1])?;
-    let weight = sample.f * (bsdf.cos(sample.wi) / sample.pdf);
-    Some(Direction { wi: sample.wi, weight, eta: sample.eta, lobe: sample.lobe, pdf: Some(sample.pdf) })
-}
-
-/// A vertex that scatters.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Vertex<'w> {
-    pub(super) surface: SurfaceHit,
-    pub(super) bsdf: SurfaceBsdf<'w>,
-    pub(super) wo: Vec3,
-    pub(super) stream: SampleStream,
-    pub(super) direct: SampleStream,
-    /// The path has passed no surface since its last vertex.
-    pub(super) is_next: bool,
-    /// What rays that leave it go through.
-    pub(super) media: Sides,
-}
-
-impl<'w> Vertex<'w> {
-    /// Origin of a ray that leaves the vertex in direction `w`.
-    fn origin(&self, w: Vec3) -> Vec3 {
-        offset_origin(self.surface.p, self.surface.p_error, self.bsdf.n, w)
-    }
-
-    /// The segment in a direction, with what it goes through.
-    fn segment(&self, carried: &Carried, direction: &Direction, beta: Rgb, eta_scale: f32) -> PathState {
-        let wi = direction.wi;
-        let medium = self.media.towards(self.bsdf.n.dot(wi));
-        let chain = carried.chain_beyond(self.bsdf.n, direction);
-        PathState { medium, chain, ..carried.segment(self.origin(wi), wi, beta, eta_scale) }
-    }
-
-    /// The shading normal on the side of the viewer.
-    pub(super) fn viewer_normal(&self) -> Vec3 {
-        let z = self.bsdf.frame.z;
-        if z.dot(self.wo) < 0.0 { -z } else { z }
-    }
-
-    pub(super) fn shading_point(&self, time: f32, sample_counts: SampleCounts, fit: u32) -> ShadingPoint<'w> {
-        ShadingPoint {
-            p: self.surface.p,
-            p_error: self.surface.p_error,
-            wo: self.wo,
-            bsdf: self.bsdf,
-            lobe: GlossyLobe::NONE,
-            time,
-            stream: self.direct.domain(domain::DIRECT),
-            sample_counts,
-            fit,
-            sample: 0,
-            bsdf_by_path: false,
-            media: self.media,
-        }
-    }
-}
-
-/// The next path segment by BSDF sampling and Russian roulette, with the lobe that it took; `None` if the path ends.
-pub(super) fn extend(
-    path: &PathState,
-    v: &Vertex<'_>,
-    vertex: u32,
-    settings: &IntegratorSettings,
-) -> Option<(PathState, Lobe)> {
-    let direction = next_direction(v, settings)?;
-    let carried = path.carried(path.beta, path.width);
-    let (beta, eta_scale) = carried.beyond(&direction)?;
-    let beta = survive(beta, eta_scale, &v.stream, vertex + 1, settings)?;
-    Some((v.segment(&carried, &direction, beta, eta_scale), direction.lobe))
-}
-
-/// The next path segment by BSDF sampling, which looks for the emitter of the sample as well. Roulette ends it only behind
-/// that; `None` if the direction carries no light.
-pub(super) fn extend_to_emitter(
-    path: &PathState,
-    v: &Vertex<'_>,
-    point: &ShadingPoint<'_>,
-    vertex: u32,
-    (settings, mis): (&IntegratorSettings, &Mis),
-) -> Option<PathState> {
-    let direction = next_direction(v, settings)?;
-    let carried = path.carried(path.beta, path.width);
-    let (beta, eta_scale) = carried.beyond(&direction)?;
-    debug_assert!(direction.pdf.is_some(), "a resampled direction has no weight against light sampling");
-    let technique = BsdfTechnique {
-        ctx: point.light_ctx(),
-        n_light: point.light_samples_beside_path() as f32,
-        pdf: direction.pdf.filter(|_| !direction.lobe.is_specular()),
-        heuristic: mis.heuristic,
-        survivor: survive(beta, eta_scale, &v.stream, vertex + 1, settings),
-    };
-    let next = v.segment(&carried, &direction, beta, eta_scale);
-    Some(PathState { technique: Some(technique), ..next })
-}
-
-/// A direction by BSDF sampling; of a BSDF that can only be evaluated, by resampling M proposals.
-fn next_direction(v: &Vertex<'_>, settings: &IntegratorSettings) -> Option<Direction> {
-    if v.bsdf.bsdf.is_only_evaluated() {
-        let count = settings.bsdf_proposals.max(1);
-        let proposal = |i| v.stream.split(domain::BSDF, count, i).draw::<3>();
-        let [u_choice] = v.stream.domain(domain::RESAMPLE).draw::<1>();
-        let r = v.bsdf.resample(v.wo, count, proposal, u_choice)?;
-        return Some(Direction {
-            wi: r.wi,
-            weight: r.f * (v.bsdf.cos(r.wi) * r.weight),
-            eta: r.eta,
-            lobe: r.lobe,
-            pdf: None,
-        });
-    }
-    sampled_direction(&v.bsdf, v.wo, v.stream.domain(domain::BSDF).draw::<3>())
-}
-
-/// An empty vector in the memory of `old`, whose items have the same layout and may borrow from something else.
-pub(super) fn emptied<T, U>(mut old: Vec<T>) -> Vec<U> {
-    const { assert!(size_of::<T>() == size_of::<U>() && align_of::<T>() == align_of::<U>()) };
-    old.clear();
-    old.into_iter().map(|_| unreachable!("the vector is empty")).collect()
 }

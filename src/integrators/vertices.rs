@@ -3,9 +3,10 @@
 
 use super::light_layers::LayerSums;
 use super::light_paths::{Chain, Guide};
-use super::segment::{CameraSample, Carried, PathState, PathStats, Vertex, domain, emptied};
-use super::wavefront::Batch;
+use super::segment::{CameraSample, Left, PathState, PathStats, domain};
 use crate::accel::{Coherence, Hit, RayBatch};
+use crate::direct::Vertices;
+use crate::direct::vertices::{Arrival, Single};
 use crate::film::{FeatureSet, Features, PixelSample};
 use crate::geometry::{Shape, SurfaceHit};
 use crate::lights::LightCtx;
@@ -14,7 +15,7 @@ use crate::materials::dispersion::sample_wavelength;
 use crate::media::{End, Flight, Glimpse, Numbers, Segment, Sides};
 use crate::scene::{RenderJob, SurfaceInteraction};
 use lumiris_numbers::math::{Rgb, Vec3};
-use lumiris_numbers::samplers::SampleStream;
+use lumiris_numbers::samplers::{Domain, SampleStream};
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -48,10 +49,44 @@ pub(super) struct Stage<'a, 'w> {
     pub(super) vertex: u32,
     pub(super) depth: u32,
     pub(super) samples: &'a [CameraSample],
+    /// What the paths come from.
+    pub(super) left: Left<'a, 'w>,
     /// Takes what the paths see.
     pub(super) out: &'a mut [PixelSample],
-    /// Takes the vertices that it can.
-    pub(super) batch: Option<&'a mut Batch<'w>>,
+    /// Takes the vertices.
+    pub(super) vertices: &'a mut Vertices<'w>,
+}
+
+impl Stage<'_, '_> {
+    /// How a path arrives that gets the given index.
+    #[inline]
+    fn arrival(&self, path: &PathState, index: usize, numbers: &mut VertexNumbers) -> Arrival {
+        let sample = &self.samples[path.sample as usize];
+        Arrival { path: index as u32, time: path.ray.time, streams: numbers.of(sample) }
+    }
+}
+
+/// The random numbers of vertices, and of their direct light.
+#[derive(Debug)]
+struct VertexNumbers([Domain; 3]);
+
+impl Default for VertexNumbers {
+    fn default() -> Self {
+        VertexNumbers::new(0)
+    }
+}
+
+impl VertexNumbers {
+    fn new(vertex: u32) -> Self {
+        let key = domain::VERTEX + vertex;
+        VertexNumbers([Domain::new(key), Domain::new(key), Domain::new(domain::DIRECT)])
+    }
+
+    #[inline]
+    fn of(&mut self, sample: &CameraSample) -> [SampleStream; 2] {
+        let VertexNumbers([of_vertex, outer, inner]) = self;
+        [of_vertex.of(&sample.stream), inner.of(&outer.of(&sample.direct))]
+    }
 }
 
 /// Paths on their way to the next vertex.
@@ -64,8 +99,7 @@ pub(super) struct VertexSearch {
     escaped: Vec<u32>,
     rays: RayBatch,
     hits: Vec<Option<Hit>>,
-    /// Memory of the vertices of earlier batches.
-    spare: Vec<Vertex<'static>>,
+    numbers: VertexNumbers,
     /// Counts and times.
     pub(super) stats: PathStats,
     /// Omits emission towards the camera, and all features except the depth.
@@ -104,17 +138,11 @@ impl VertexSearch {
         }));
     }
 
-    /// Keeps the memory of vertices that are done with for those of the next batch.
-    pub(super) fn recycle(&mut self, vertices: Vec<Vertex<'_>>) {
-        self.spare = emptied(vertices);
-    }
-
     /// Traces the active paths to their next vertex, adds what they see at the first one, and keeps those that hit
-    /// something that scatters. The answer's items belong to the paths that `self.active` then holds; those that the
-    /// batch takes are not among them.
-    pub(super) fn find<'w>(&mut self, mut at: Stage<'_, 'w>) -> Vec<Vertex<'w>> {
-        let mut vertices: Vec<Vertex<'w>> = emptied(std::mem::take(&mut self.spare));
+    /// something that scatters: `at.vertices` belong to the paths that `self.active` then holds.
+    pub(super) fn find(&mut self, mut at: Stage<'_, '_>) {
         self.kept.clear();
+        self.numbers = VertexNumbers::new(at.vertex);
         let mut coherence = if at.vertex == 0 { Coherence::Coherent } else { Coherence::Incoherent };
         while !self.active.is_empty() {
             self.trace(at.job, at.vertex, coherence);
@@ -124,23 +152,39 @@ impl VertexSearch {
             self.escaped.clear();
             let (mut active, hits) = (std::mem::take(&mut self.active), std::mem::take(&mut self.hits));
             for (k, (path, hit)) in active.iter_mut().zip(&hits).enumerate() {
-                if path.medium.is_some() && self.fly(&mut at, path, hit.as_ref(), &mut vertices) {
+                if path.medium.is_some() && self.fly(&mut at, path, hit.as_ref()) {
                     continue;
                 }
                 match hit {
                     Some(hit) if self.take_plain(&mut at, path, hit) => {}
-                    Some(hit) => self.take(&mut at, path, hit, &mut vertices),
+                    Some(hit) => self.take(&mut at, path, hit),
                     None if self.looks_for_emitters(at.vertex, path) => self.escaped.push(k as u32),
                     None => {}
                 }
             }
             (self.active, self.hits) = (active, hits);
-            self.add_infinite(at.job, at.out);
+            self.add_infinite(&mut at);
             std::mem::swap(&mut self.active, &mut self.passing);
             self.stats.shade_time += start.elapsed();
         }
+        let start = Instant::now();
         std::mem::swap(&mut self.active, &mut self.kept);
-        vertices
+        at.vertices.finish(&at.job.lights);
+        if at.vertex == 0 {
+            self.set_normals(&mut at);
+        }
+        self.stats.shade_time += start.elapsed();
+    }
+
+    /// The shading normals at plain vertices as features of their camera samples.
+    fn set_normals(&self, at: &mut Stage<'_, '_>) {
+        let Vertices { path, surface, .. } = &*at.vertices;
+        for i in at.vertices.plain() {
+            if let Some(features) = &mut at.out[self.active[path[i] as usize].sample as usize].features {
+                let (z, wo) = (surface.ns.vec3(i), surface.wo.vec3(i));
+                features.normal = if z.dot(wo) < 0.0 { -z } else { z };
+            }
+        }
     }
 
     #[inline]
@@ -152,34 +196,43 @@ impl VertexSearch {
     /// this is none.
     #[inline]
     fn take_plain(&mut self, at: &mut Stage<'_, '_>, path: &PathState, hit: &Hit) -> bool {
-        let Some(batch) = at.batch.as_mut().filter(|_| path.medium.is_none()) else { return false };
+        let is_last = at.vertex >= at.depth;
         let Some(rho) = at.job.plain_reflectance(hit) else { return false };
-        let Some(beta) = path.beta_beyond_emitter() else { return true };
+        if path.medium.is_some() || path.is_ghost || is_last && at.vertex == 0 {
+            return false;
+        }
+        let Some(beta) = path.beta_beyond_emitter().filter(|_| !is_last) else { return true };
         let distance = hit.t * path.ray.d.length();
         if at.vertex == 0 && self.features != FeatureSet::None {
             let features = &mut at.out[path.sample as usize].features;
             features.get_or_insert_with(|| path.plain_features(at.job, hit, distance, rho));
         }
-        if at.vertex < at.depth {
-            let mut carried = path.carried(beta, path.width + path.spread * distance);
-            let (sample, d) = (&at.samples[path.sample as usize], path.ray.d);
-            carried.chain = if self.begins_chain(at.vertex, path) {
-                Chain::at_first(facing_normal(at.job, hit, d).dot(d), carried.width)
-            } else {
-                Chain::NONE
-            };
-            batch.push_hit(at.job, (&carried, d), hit, rho, [sample.stream, sample.direct]);
-        }
+        let Shape::Mesh(mesh) = &at.job.world.scene.geometry.geometries[hit.geometry as usize].shape else {
+            return false;
+        };
+        let (d, width) = (path.ray.d, path.width + path.spread * distance);
+        let chain = if self.begins_chain(at.vertex, path) {
+            Chain::at_first(facing_normal(at.job, hit, d).dot(d), width)
+        } else {
+            Chain::NONE
+        };
+        at.vertices.push_plain(
+            at.arrival(path, self.kept.len(), &mut self.numbers),
+            (mesh, hit.primitive, hit.uv),
+            d,
+            rho,
+        );
+        self.kept.push(PathState { beta, width, chain, ..*path });
         true
     }
 
-    /// Takes any other hit, and adds its vertex, if the path goes on from one that the batch does not take.
+    /// Takes any other hit, and adds its vertex, if the path goes on from one.
     #[inline]
-    fn take<'w>(&mut self, at: &mut Stage<'_, 'w>, path: &PathState, hit: &Hit, vertices: &mut Vec<Vertex<'w>>) {
+    fn take(&mut self, at: &mut Stage<'_, '_>, path: &PathState, hit: &Hit) {
         let interaction = SurfaceInteraction::new(at.job, &path.ray, (path.width, path.spread), hit);
         let (sample, out) = (&at.samples[path.sample as usize], &mut at.out[path.sample as usize]);
         if self.looks_for_emitters(at.vertex, path) {
-            let emission = path.emission(at.job, &interaction, self.guide.as_deref());
+            let emission = path.emission(at.job, &at.left, &interaction, self.guide.as_deref());
             out.radiance += emission;
             self.layers.add_emission(at.job, path.sample, &interaction.hit, emission);
         }
@@ -214,17 +267,23 @@ impl VertexSearch {
         let path = &path;
         let media = interaction.sides(at.job, path.medium);
         let Some((bsdf, beta)) = self.leave(at, (path, beta), &interaction, (bsdf, media)) else { return };
-        let mut carried = path.carried(beta, width);
-        carried.chain = self.chain(at, path, &interaction, &bsdf);
-        let streams = [sample.stream, sample.direct];
-        let is_taken = |batch: &mut &mut Batch<'w>| batch.push_vertex(&carried, &interaction, &bsdf, streams);
-        if media == Sides::default() && at.batch.as_mut().is_some_and(is_taken) {
-            return;
-        }
-        let (surface, wo) = (interaction.surface, interaction.wo);
-        let [stream, direct] = streams.map(|s| s.domain(domain::VERTEX + at.vertex));
-        self.keep(path, &carried);
-        vertices.push(Vertex { surface, bsdf, wo, stream, direct, is_next: path.passed == 0, media });
+        let chain = self.chain(at, path, &interaction, &bsdf);
+        let SurfaceInteraction { surface, wo, .. } = interaction;
+        self.keep(at, PathState { beta, width, chain, ..*path }, (surface, wo), (bsdf, media));
+    }
+
+    /// Keeps a path at a vertex.
+    #[inline]
+    fn keep<'w>(
+        &mut self,
+        at: &mut Stage<'_, 'w>,
+        path: PathState,
+        (surface, wo): (SurfaceHit, Vec3),
+        (bsdf, media): (SurfaceBsdf<'w>, Sides),
+    ) {
+        let arrival = at.arrival(&path, self.kept.len(), &mut self.numbers);
+        at.vertices.push(Single { arrival, p: surface.p, p_error: surface.p_error, wo, bsdf, media });
+        self.kept.push(path);
     }
 
     /// True if light paths bring light to what the path has met.
@@ -259,31 +318,9 @@ impl VertexSearch {
         )
     }
 
-    /// Keeps a path at a vertex, with what it has carried there.
-    #[inline]
-    fn keep(&mut self, path: &PathState, carried: &Carried) {
-        let Carried { beta, width, wavelength, chain, .. } = *carried;
-        self.kept.push(PathState {
-            beta,
-            width,
-            wavelength,
-            chain,
-            passed: 0,
-            travelled: 0.0,
-            technique: None,
-            ..*path
-        });
-    }
-
     /// Lets a path fly through its medium towards what its ray meets, and adds what the medium sends out. True if it is
     /// scattered on the way: then what it meets does not matter, but as the first surface that denoisers want to know of.
-    fn fly<'w>(
-        &mut self,
-        at: &mut Stage<'_, 'w>,
-        path: &mut PathState,
-        hit: Option<&Hit>,
-        vertices: &mut Vec<Vertex<'w>>,
-    ) -> bool {
+    fn fly(&mut self, at: &mut Stage<'_, '_>, path: &mut PathState, hit: Option<&Hit>) -> bool {
         let Some(id) = path.medium.filter(|_| !path.is_ghost) else { return false };
         let medium = &at.job.world.scene.media.media[id as usize];
         if medium.is_interior() {
@@ -299,7 +336,7 @@ impl VertexSearch {
         let least = if technique.is_none() { at.job.lights.glimpse_rate(id) } else { 0.0 };
         let weigh = |glimpse: &Glimpse| {
             let p = o + d * glimpse.t;
-            technique.map_or(1.0, |t| t.weight(|ctx| at.job.lights.pdf_glow(ctx, id, (glimpse, p))))
+            at.left.weight(path, |ctx| at.job.lights.pdf_glow(ctx, id, (glimpse, p)))
         };
         let focus = || focus(at.job, &segment, &stream, at.vertex);
         let flight = medium.fly(&segment, path.beta, &mut numbers, focus, (least, weigh));
@@ -315,7 +352,7 @@ impl VertexSearch {
                 if at.vertex < at.depth {
                     let surface = SurfaceHit::in_space(o + d * t);
                     let bsdf = SurfaceBsdf::in_medium(medium.g(), -d);
-                    self.scatter(at, (path, t, weight), (surface, bsdf), vertices);
+                    self.scatter(at, (path, t, weight), (surface, bsdf));
                 }
                 path.is_ghost = at.vertex == 0 && self.features != FeatureSet::None;
                 !path.is_ghost
@@ -329,20 +366,17 @@ impl VertexSearch {
         at: &mut Stage<'_, 'w>,
         (path, t, weight): (&PathState, f32, Rgb),
         (surface, bsdf): (SurfaceHit, SurfaceBsdf<'w>),
-        vertices: &mut Vec<Vertex<'w>>,
     ) {
         let Some(beta) = path.beta_beyond_emitter() else { return };
-        let sample = &at.samples[path.sample as usize];
-        let (width, wo) = (path.width + path.spread * t, bsdf.frame.z);
-        let [stream, direct] = [sample.stream, sample.direct].map(|s| s.domain(domain::VERTEX + at.vertex));
-        self.keep(path, &path.carried(beta * weight, width));
-        let media = Sides::both(path.medium);
-        vertices.push(Vertex { surface, bsdf, wo, stream, direct, is_next: path.passed == 0, media });
+        let (beta, width) = (beta * weight, path.width + path.spread * t);
+        let next = PathState { beta, width, chain: Chain::NONE, ..*path };
+        self.keep(at, next, (surface, bsdf.frame.z), (bsdf, Sides::both(path.medium)));
     }
 
     /// Adds what the escaped paths carry of infinite lights, with the weight of the technique that found it.
-    fn add_infinite(&mut self, job: &RenderJob, out: &mut [PixelSample]) {
-        let (lights, active, layers) = (&job.lights, &self.active, &mut self.layers);
+    fn add_infinite(&mut self, at: &mut Stage<'_, '_>) {
+        let (lights, active, layers) = (&at.job.lights, &self.active, &mut self.layers);
+        let (left, out) = (&at.left, &mut *at.out);
         self.escaped.retain(|&k| {
             let path = &active[k as usize];
             if path.technique.is_none() {
@@ -354,15 +388,14 @@ impl VertexSearch {
         });
         let escaped = &self.escaped;
         let path = |i: usize| &active[escaped[i] as usize];
-        let ctx = |i: usize| path(i).technique.map_or(LightCtx::at(Vec3::ZERO), |technique| technique.ctx);
+        let ctx = |i: usize| left.ctx(path(i));
         lights.infinite_in_directions(
             escaped.len(),
             |i| (ctx(i), path(i).ray.d),
             |i, le, p_light| {
                 let path = path(i);
                 let l = path.beta * le;
-                let weight =
-                    path.technique.filter(|_| !l.is_black()).map_or(1.0, |technique| technique.weight(|_| p_light));
+                let weight = if l.is_black() { 1.0 } else { left.weight(path, |_| p_light) };
                 out[path.sample as usize].radiance += l * weight;
                 layers.add_infinite(lights, path.sample, (ctx(i).p, path.ray.d), l * weight);
             },

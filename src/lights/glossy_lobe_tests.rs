@@ -1,6 +1,6 @@
 //! Tests of the choice of lights on glossy surfaces.
 
-use crate::bsdfs::{Bsdf, Conductor, TrowbridgeReitz};
+use crate::bsdfs::{Bsdf, Conductor, KernelBsdf as _, TrowbridgeReitz};
 use crate::lights::{GlossyLobe, Light, LightCtx, LightTree};
 use lumiris_numbers::math::warp::{sample_cosine_hemisphere, sample_uniform_sphere};
 use lumiris_numbers::math::{Rgb, Vec3};

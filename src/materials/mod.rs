@@ -240,8 +240,14 @@ impl MaterialSet {
             Some(distribution) => CoatTable::for_roughness(key.eta, key.thickness, distribution),
             None => CoatTable::for_all_roughness(key.eta, key.thickness),
         };
-        let coats = keys.par_iter().map(tabulate).collect();
+        let mut coats: Vec<CoatTable> = keys.par_iter().map(tabulate).collect();
+        CoatTable::join(&mut coats);
         MaterialSet { caustics: vec![false; entries.len()], entries, coats, coat_of, measured: Vec::new() }
+    }
+
+    /// The tables of all coats, for kernels.
+    pub fn coat_tables(&self) -> &[f32] {
+        self.coats.first().map_or(&[], CoatTable::directional_rows)
     }
 
     /// With the tables that measured materials refer to.

@@ -1,7 +1,7 @@
 //! A BSDF in the shading frame of a hit, for directions in world space.
 
 use crate::bsdfs::{Bsdf, BsdfSample, Lambertian, Phase, ProposalDensity, Resampled, resample};
-use lumiris_lanes::bsdf::Values;
+use lumiris_lanes::kernels::{One, Values, evaluate_one};
 use lumiris_numbers::math::{Frame, Rgb, Vec3};
 
 /// The scattering at a hit. Sides are told by the shading normal alone, as in pbrt-v4: where it disagrees with the
@@ -46,16 +46,13 @@ impl<'a> SurfaceBsdf<'a> {
     /// f·|cos θi| about the shading normal (1/sr).
     #[inline]
     pub fn f_cos(&self, wo: Vec3, wi: Vec3) -> Rgb {
-        let wi = self.frame.to_local(wi);
-        self.bsdf.f(self.frame.to_local(wo), wi) * self.bsdf.cos(wi)
+        self.f_cos_and_pdf(wo, wi).0
     }
 
     /// [`Self::f_cos`] and [`Self::pdf`].
     #[inline]
     pub fn f_cos_and_pdf(&self, wo: Vec3, wi: Vec3) -> (Rgb, f32) {
-        let wi = self.frame.to_local(wi);
-        let (f, pdf) = self.bsdf.f_and_pdf(self.frame.to_local(wo), wi);
-        (f * self.bsdf.cos(wi), pdf)
+        self.bsdf.f_cos_and_pdf(self.frame.to_local(wo), self.frame.to_local(wi))
     }
 
     /// Density of the non-specular part of [`Self::sample`] per steradian.
@@ -76,14 +73,15 @@ impl<'a> SurfaceBsdf<'a> {
         self.bsdf.pdf_first_lobe(self.frame.to_local(wo), self.frame.to_local(wi), pdf)
     }
 
-    /// [`f_cos`](Self::f_cos) and [`pdf`](Self::pdf) for many directions `wi` in world space, by component and channel;
-    /// those of single calls up to rounding. All slices have the same length.
+    /// [`f_cos`](Self::f_cos) and [`pdf`](Self::pdf) for many directions `wi` in world space, by component and channel: the
+    /// bits of single calls. All slices have the same length.
     pub fn eval_lanes(&self, wo: Vec3, wi: [&[f32]; 3], f_cos: [&mut [f32]; 3], pdf: &mut [f32]) {
         let local = self.frame.to_local(wo);
-        match self.bsdf.lanes(local) {
-            Some(model) => {
-                let lanes = lumiris_lanes::bsdf::Bsdf { frame: self.frame, wo: local, model };
-                lanes.eval(lumiris_lanes::level(), wi, &mut Values { f_cos, pdf });
+        match self.bsdf.kernel() {
+            Some(kernel) => {
+                let params = self.bsdf.params();
+                let one = One { params: &params, tables: self.bsdf.tables(), frame: self.frame, wo: local };
+                evaluate_one(lumiris_lanes::level(), kernel, &one, wi, &mut Values { f_cos, pdf });
             }
             None => self.eval_each(wo, wi, f_cos, pdf),
         }
@@ -94,8 +92,7 @@ impl<'a> SurfaceBsdf<'a> {
         let wo = self.frame.to_local(wo);
         for i in 0..pdf.len() {
             let wi = self.frame.to_local(Vec3::new(wi[0][i], wi[1][i], wi[2][i]));
-            let (f, density) = self.bsdf.f_and_pdf(wo, wi);
-            let value = f * self.bsdf.cos(wi);
+            let (value, density) = self.bsdf.f_cos_and_pdf(wo, wi);
             for c in 0..3 {
                 f_cos[c][i] = value[c];
             }

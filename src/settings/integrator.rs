@@ -369,7 +369,7 @@ pub enum SamplingTechnique {
 }
 
 /// Sample counts of one estimate: N samples (shadow segments), resampled from M proposals.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct SampleCounts {
     /// N.
     pub samples: u32,

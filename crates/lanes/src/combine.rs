@@ -5,7 +5,8 @@
 //! 1/m_i, for an estimate that divides by M afterwards; that is right only if all m_i are equal to M, and off by m_i/M
 //! otherwise.
 
-use super::lane::{F, LANES, Vec3s, Wide, begin, load, or_zero, padded, store};
+use super::lane::{F, LANES, Vec3s, begin, load, or_zero, padded, store};
+use super::wide::Wide;
 use fearless_simd::{Level, Simd, dispatch, prelude::*};
 use lumiris_numbers::estimators::mis::Heuristic;
 use lumiris_numbers::estimators::ris::weight;

@@ -4,8 +4,9 @@
 //! in lanes; a texel is one load of four floats. The maps of the square to the sphere are those of
 //! [`lumiris_numbers::math::sphere_map`].
 
-use super::lane::{F, I, LANES, Vec3s, begin, load, or_zero, safe_sqrt, sin_cos_quadrant, sin_cos_turns, store};
+use super::lane::{F, I, LANES, Vec3s, begin, load, or_zero, safe_sqrt, store};
 use super::light::LightLanes;
+use super::wide::{sin_cos_quadrant, sin_cos_turns};
 use fearless_simd::{Level, Simd, dispatch, f32x4, f32x8, prelude::*};
 use lumiris_numbers::math::distribution::{Running, STEP, clamped};
 use lumiris_numbers::math::sphere_map::pdf_equal_area_square_to_sphere;

@@ -8,12 +8,11 @@
 //!
 //! In kernels there are no closures and no `map` over arrays: their code would be compiled without the vectors.
 //!
-//! Reading order: [`lane`], [`columns`], [`curve`], [`sampler`], [`light`], [`area`], [`environment`], [`bsdf`],
+//! Reading order: [`lane`], [`wide`], [`columns`], [`curve`], [`sampler`], [`light`], [`area`], [`environment`], [`kernels`],
 //! [`combine`], [`camera`], [`hits`], [`triangles`], [`vertex`], [`connections`],
 //! [`light_choice`], [`sums`].
 
 pub mod area;
-pub mod bsdf;
 pub mod camera;
 pub mod columns;
 pub mod combine;
@@ -21,6 +20,7 @@ pub mod connections;
 pub mod curve;
 pub mod environment;
 pub mod hits;
+pub mod kernels;
 pub mod lane;
 pub mod light;
 pub mod light_choice;
@@ -28,6 +28,7 @@ pub mod sampler;
 pub mod sums;
 pub mod triangles;
 pub mod vertex;
+pub mod wide;
 
 pub use environment::Environment;
 pub use fearless_simd::Level;

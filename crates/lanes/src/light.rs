@@ -1,6 +1,7 @@
 //! Directions from one point to one light, many at once.
 
-use super::lane::{F, LANES, Vec3s, begin, load, padded, safe_sqrt, sin_cos_turns};
+use super::lane::{F, LANES, Vec3s, begin, load, padded, safe_sqrt};
+use super::wide::sin_cos_turns;
 use fearless_simd::{Level, Simd, dispatch, prelude::*};
 use lumiris_numbers::math::warp;
 

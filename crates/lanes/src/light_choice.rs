@@ -2,8 +2,9 @@
 //!
 //! The formulas are those of [`lumiris_numbers::math::light_bound`].
 
-use super::lane::{F, LANES, Vec3s, Wide, load, store};
+use super::lane::{F, LANES, Vec3s, load, store};
 use super::vertex::Columns3;
+use super::wide::Wide;
 use fearless_simd::{Level, Simd, dispatch, prelude::*};
 use lumiris_numbers::math::light_bound::{GlossyLobe, LightBound, Receiver, first_probability};
 

@@ -4,18 +4,17 @@
 //! The formulas are those of the modules `geometry::mesh`, `bsdfs::diffuse` and `direct` for single vertices.
 //! Columns have one length, a multiple of [`LANES`].
 
-use super::lane::{F, I, LANES, M, Vec3s, Wide, load, narrowed, or_zero, safe_sqrt, sin_cos_eighth, store, widened};
+use super::kernels::{self, Kernel, Rows, Values};
+pub use super::lane::{Columns3, ColumnsMut3};
+use super::lane::{F, I, LANES, M, Vec3s, load, narrowed, or_zero, safe_sqrt, store, widened};
+use super::wide::Wide;
 use fearless_simd::{Level, Simd, dispatch, f64x8, prelude::*};
 use lumiris_numbers::estimators::mis::Heuristic;
+use lumiris_numbers::math::elementary::concentric_disk;
 use lumiris_numbers::math::gamma;
 use lumiris_numbers::math::ray::{COINCIDENCE, SEGMENT_END};
-use std::f32::consts::{FRAC_1_PI, FRAC_PI_4};
-
-/// Three columns of a vector or of a colour.
-pub type Columns3<'a> = [&'a [f32]; 3];
-
-/// Three columns to be written.
-pub type ColumnsMut3<'a> = [&'a mut [f32]; 3];
+use lumiris_numbers::math::v3::V3;
+use std::f32::consts::FRAC_1_PI;
 
 /// Hits of [`LANES`] triangles: `[axis][lane]` of vectors.
 #[derive(Clone, Copy, Debug, Default)]
@@ -148,25 +147,9 @@ pub fn evaluate_lambertian(
     f_cos: &mut ColumnsMut3<'_>,
     pdf: &mut [f32],
 ) {
-    dispatch!(level, simd => evaluate_lanes(simd, at, wi, f_cos, pdf));
-}
-
-#[inline(always)]
-fn evaluate_lanes<S: Simd>(
-    simd: S,
-    at: &Lambertian<'_>,
-    wi: Columns3<'_>,
-    f_cos: &mut ColumnsMut3<'_>,
-    pdf: &mut [f32],
-) {
-    for i in (0..pdf.len()).step_by(LANES) {
-        let ns = Vec3s::load(simd, at.ns, i);
-        let (cos_i, cos_o) = (ns.dot(Vec3s::load(simd, wi, i)), ns.dot(Vec3s::load(simd, at.wo, i)));
-        let is_same_side = (cos_i * cos_o).simd_gt(F::splat(simd, 0.0));
-        let density = or_zero(is_same_side, cos_i.abs() * FRAC_1_PI);
-        store(density, pdf, i);
-        Vec3s::load(simd, at.rho, i).times(density).store(f_cos, i);
-    }
+    let rows = Rows { params: &at.rho, tables: &[], ns: at.ns, tangents: None, wo: at.wo };
+    let f_cos = f_cos.each_mut().map(|channel| &mut **channel);
+    kernels::evaluate(level, Kernel::Diffuse, &rows, wi, &mut Values { f_cos, pdf });
 }
 
 /// Directions by the cosine on the side of `wo`, with their densities (1/sr); 0 where there is none.
@@ -178,38 +161,16 @@ pub fn sample_lambertian(level: Level, at: &Lambertian<'_>, u: [&[f32]; 2], wi: 
 fn sample_lanes<S: Simd>(simd: S, at: &Lambertian<'_>, u: [&[f32]; 2], wi: &mut ColumnsMut3<'_>, pdf: &mut [f32]) {
     let (zero, one) = (F::splat(simd, 0.0), F::splat(simd, 1.0));
     for i in (0..pdf.len()).step_by(LANES) {
-        let (x, y) = (load(simd, u[0], i) * 2.0 - 1.0, load(simd, u[1], i) * 2.0 - 1.0);
-        let (dx, dy) = concentric_disk(x, y);
+        let (Wide(dx), Wide(dy)) = concentric_disk([Wide(load(simd, u[0], i)), Wide(load(simd, u[1], i))]);
         let z = safe_sqrt(one - dx * dx - dy * dy);
         let ns = Vec3s::load(simd, at.ns, i);
         let cos_o = ns.dot(Vec3s::load(simd, at.wo, i));
-        let (tx, ty) = tangents(ns);
+        let (tx, ty) = V3::from(ns).tangents();
+        let (tx, ty) = (Vec3s::from(tx), Vec3s::from(ty));
         let w = tx.times(dx).plus(ty.times(dy)).plus(ns.times(z.copysign(cos_o)));
         store(or_zero(cos_o.simd_ne(zero), z * FRAC_1_PI), pdf, i);
         w.store(wi, i);
     }
-}
-
-/// The disk under the square −1..1 [Shirley and Chiu 1997].
-#[inline(always)]
-fn concentric_disk<S: Simd>(x: F<S>, y: F<S>) -> (F<S>, F<S>) {
-    let zero = F::splat(x.token(), 0.0);
-    let is_x = x.abs().simd_gt(y.abs());
-    let (radius, other) = (is_x.select(x, y), is_x.select(y, x));
-    let ratio = or_zero(radius.simd_ne(zero), other / radius);
-    let (sin, cos) = sin_cos_eighth(ratio * FRAC_PI_4);
-    (radius * is_x.select(cos, sin), radius * is_x.select(sin, cos))
-}
-
-/// Two directions that make a frame with the unit vector `z` [Duff et al. 2017].
-#[inline(always)]
-fn tangents<S: Simd>(z: Vec3s<S>) -> (Vec3s<S>, Vec3s<S>) {
-    let one = F::splat(z.x.token(), 1.0);
-    let sign = one.copysign(z.z);
-    let a = -(one / (sign + z.z));
-    let b = z.x * z.y * a;
-    let x = Vec3s { x: one + sign * z.x * z.x * a, y: sign * b, z: -(sign * z.x) };
-    (x, Vec3s { x: b, y: sign + z.y * z.y * a, z: -z.y })
 }
 
 /// Samples of one technique, and the density of another one at them.

@@ -48,7 +48,7 @@ fn the_closed_form_is_the_mean_of_the_walk() {
         let walk = over_lambert(Dielectric { eta, distribution }, rho, max_depth);
         for (wo, wi) in pairs {
             let w = walk_moments(&walk, wo, wi, 256_000);
-            let f = f64::from(closed.f(wo, wi).r);
+            let f = f64::from(Bsdf::CoatedDiffuse(closed).f(wo, wi).r);
             let z = z_test(w.mean(), f, w.standard_error().max(1e-5 * f));
             assert!(
                 z.p_value > significance,
@@ -92,8 +92,8 @@ fn analog_walk(l: &Layered, wo: Vec3, s: &mut Pcg32) -> Option<(Vec3, Rgb, bool)
         z = boundary;
         x = if z == 0.0 {
             match &l.base {
-                Base::Diffuse(b) => b.sample(-w, s.random::<[f32; 2]>())?,
-                Base::Conductor(b) => b.sample(-w, s.random::<[f32; 2]>())?,
+                Base::Diffuse(b) => b.sample(-w, 0.0, s.random::<[f32; 2]>())?,
+                Base::Conductor(b) => b.sample(-w, 0.0, s.random::<[f32; 2]>())?,
             }
         } else {
             l.top.sample_select(-w, s.random::<f32>(), s.random::<[f32; 2]>(), Transport::Radiance, all)?

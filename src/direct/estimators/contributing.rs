@@ -67,7 +67,7 @@ impl Contributing {
 
     /// Densities of light samples include their expected numbers.
     fn allocation(&self, point: &ShadingPoint<'_>) -> SampleAllocation {
-        let only = mc::allocation(point);
+        let only = mc::allocation_at(point);
         match self.bsdf_samples_at(&point.bsdf.bsdf) {
             n if n > 0 && only.light_draws > 0 => {
                 SampleAllocation { n_light: 1.0, ..SampleAllocation::fixed(only.light_draws, n) }

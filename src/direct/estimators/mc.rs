@@ -1,5 +1,6 @@
 //! `mc`: light sampling alone. Specular lobes, whose directions no light sample has, get one BSDF sample.
 
+use crate::bsdfs::Bsdf;
 use crate::direct::candidates::{Candidates, Drawn, SampleAllocation};
 use crate::direct::light_samples;
 use crate::direct::point::ShadingPoint;
@@ -14,18 +15,22 @@ pub struct Mc {
 
 impl Mc {
     pub(super) fn propose(&self, t1: &mut T1<'_>) {
-        t1.propose(allocation, light_samples::draw);
+        t1.propose(allocation_at, light_samples::draw);
     }
 }
 
 /// All samples are light samples, unless every lobe is specular.
-pub(super) fn allocation(point: &ShadingPoint<'_>) -> SampleAllocation {
-    let (n, bsdf) = (point.sample_counts.samples, &point.bsdf.bsdf);
+pub(in crate::direct) fn allocation(n: u32, bsdf: &Bsdf<'_>) -> SampleAllocation {
     if bsdf.has_non_specular() {
         SampleAllocation::fixed(n, u32::from(bsdf.has_specular()))
     } else {
         SampleAllocation::fixed(0, n)
     }
+}
+
+/// The same for a shading point.
+pub(super) fn allocation_at(point: &ShadingPoint<'_>) -> SampleAllocation {
+    allocation(point.sample_counts.samples, &point.bsdf.bsdf)
 }
 
 /// A BSDF sample counts for specular lobes only.

@@ -1,11 +1,13 @@
 //! `mis`: light and BSDF samples, combined by multiple importance sampling [Veach and Guibas 1995].
 
+use crate::bsdfs::Bsdf;
 use crate::direct::candidates::{Candidates, SampleAllocation};
 use crate::direct::light_samples;
 use crate::direct::point::ShadingPoint;
 use crate::direct::t1::T1;
 use crate::settings::{IntegratorSettings, bsdf_samples};
 use lumiris_numbers::estimators::mis::Heuristic;
+use lumiris_numbers::samplers::SampleStream;
 
 /// Light and BSDF sampling.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -35,28 +37,29 @@ impl Mis {
         n >= 2 && self.bsdf_samples(n) == 1
     }
 
-    /// Allocates the samples of a point to the techniques.
-    pub(super) fn allocation(&self, point: &ShadingPoint<'_>) -> SampleAllocation {
-        let n = point.sample_counts.samples;
+    /// Allocates the `n` samples of a point of this BSDF to the techniques; `stream` has the random numbers of its direct light.
+    pub(in crate::direct) fn allocation(&self, n: u32, bsdf: &Bsdf<'_>, stream: &SampleStream) -> SampleAllocation {
         // Of one sample, half of a point has none
         if n == 0 {
             return SampleAllocation::fixed(0, 0);
         }
-        if point.bsdf_by_path {
-            return SampleAllocation { bsdf_draws: 0, ..SampleAllocation::fixed(point.light_samples_beside_path(), 1) };
-        }
-        if !point.bsdf.bsdf.has_non_specular() {
+        if !bsdf.has_non_specular() {
             return SampleAllocation::fixed(0, n);
         }
         if n == 1 {
-            return SampleAllocation::one_of_both(point);
+            return SampleAllocation::one_of_both(stream);
         }
         let by_bsdf = self.bsdf_samples(n);
         SampleAllocation::fixed(n - by_bsdf, by_bsdf)
     }
 
+    /// The same for a shading point.
+    pub(super) fn allocation_at(&self, point: &ShadingPoint<'_>) -> SampleAllocation {
+        self.allocation(point.sample_counts.samples, &point.bsdf.bsdf, &point.stream)
+    }
+
     pub(super) fn propose(&self, t1: &mut T1<'_>) {
-        t1.propose(|point| self.allocation(point), light_samples::draw);
+        t1.propose(|point| self.allocation_at(point), light_samples::draw);
     }
 
     pub(super) fn select(&self, candidates: &mut Candidates) {

@@ -170,10 +170,10 @@ impl Estimator {
             Estimator::Mis(mis) => mis.propose(t1),
             Estimator::Ris(ris) => ris.propose_and_draw(t1, &mut batch.ris),
             Estimator::Ocv(Ocv { mis, form: OcvForm::Pixels }) => {
-                batch.components.propose_together(t1, |point| mis.allocation(point));
+                batch.components.propose_together(t1, |point| mis.allocation_at(point));
             }
             Estimator::Ocv(Ocv { mis, .. }) | Estimator::OptimalMis(OptimalMis { mis, .. }) => {
-                batch.components.propose(t1, |point| mis.allocation(point));
+                batch.components.propose(t1, |point| mis.allocation_at(point));
             }
             Estimator::Correlated(c) => c.propose(t1, &mut batch.correlated),
             Estimator::Contributing(c) => c.propose(t1, &mut batch.contributing),

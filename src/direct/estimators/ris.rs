@@ -205,7 +205,7 @@ fn allocation(point: &ShadingPoint<'_>) -> SampleAllocation {
     // A power of two, for which the points of a Sobol' sequence are best distributed
     let by_bsdf = 1 << (by_bsdf.log2().round().max(0.0) as u32);
     let by_bsdf = if by_bsdf < m { by_bsdf } else { 1 };
-    if m == 1 { SampleAllocation::one_of_both(point) } else { SampleAllocation::fixed(m - by_bsdf, by_bsdf) }
+    if m == 1 { SampleAllocation::one_of_both(&point.stream) } else { SampleAllocation::fixed(m - by_bsdf, by_bsdf) }
 }
 
 /// Consecutive points of a batch.

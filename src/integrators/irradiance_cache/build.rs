@@ -15,10 +15,9 @@ use super::cache::IrradianceCache;
 use super::gather::{BATCH, Gatherer, RecordRequest};
 use super::octree::Octree;
 use super::record::{Range, Record};
-use crate::direct::Fits;
+use crate::direct::{Fits, ShadingPoint};
 use crate::film::PixelBounds;
-use crate::integrators::path::{AtVertices, CameraSample, PathStats, PathTracer, Shading};
-use crate::integrators::segment::{PathState, Vertex};
+use crate::integrators::path::{Arrived, AtVertices, CameraSample, PathStats, PathTracer, Shading};
 use crate::integrators::{Cameras, Tracer};
 use crate::scene::RenderJob;
 use crate::settings::Cached;
@@ -162,18 +161,19 @@ fn ask_chunk(
     paths: &mut PathTracer,
 ) -> Vec<RecordRequest> {
     let (mut wanted, mut out) = (Vec::new(), Vec::new());
-    let mut ask = |vertex: u32, path: &PathState, v: &Vertex<'_>| {
+    let mut ask = |vertex: u32, v: &Arrived<'_, '_>| {
+        let (path, point) = (v.path, &v.point);
         let sample = path.sample as usize;
         let min = WORTHWHILE * samples[sample].weight.abs();
         let is_worthwhile = !(path.beta.map(f32::abs).max_component() < min);
-        let sides = unserved_sides(cache, v).into_iter().flatten().filter(|_| is_worthwhile);
+        let sides = unserved_sides(cache, point).into_iter().flatten().filter(|_| is_worthwhile);
         wanted.extend(sides.map(|(side, ns)| RecordRequest {
-            p: v.surface.p,
-            p_error: v.surface.p_error,
-            n: v.bsdf.n,
+            p: point.p,
+            p_error: point.p_error,
+            n: point.bsdf.n,
             ns,
             time: path.ray.time,
-            pixel_width: pixel_width(path.width, v.surface.p),
+            pixel_width: pixel_width(path.width, point.p),
             spread: path.spread,
             pixel: pixels[sample],
             key: vertex << 1 | side,
@@ -181,8 +181,7 @@ fn ask_chunk(
         is_worthwhile
     };
     let own: &mut AtVertices<'_> = &mut |found, _| {
-        let all = found.paths.iter().zip(found.vertices);
-        all.map(|(path, v)| Shading { lit: None, next: ask(found.vertex, path, v).then_some(v.bsdf) }).collect()
+        found.each().map(|v| Shading { lit: None, next: ask(found.vertex, &v).then_some(v.point.bsdf) }).collect()
     };
     (paths.search.only_reflected, paths.only_specular) = (true, true);
     paths.search.start(job, samples, &mut out);
@@ -194,11 +193,11 @@ fn ask_chunk(
 
 /// The sides of a diffuse surface, 0 that of the viewer and 1 the other, that reflect or transmit light and have no
 /// usable record, with their normals.
-fn unserved_sides(cache: &IrradianceCache, v: &Vertex<'_>) -> [Option<(u32, Vec3)>; 2] {
+fn unserved_sides(cache: &IrradianceCache, v: &ShadingPoint<'_>) -> [Option<(u32, Vec3)>; 2] {
     let Some(part) = v.bsdf.lambertian(v.wo) else { return [None; 2] };
     let ns = v.viewer_normal();
     [(0, part.reflectance, ns), (1, part.transmittance, -ns)].map(|(side, albedo, ns)| {
-        let asks = !albedo.is_black() && !cache.serves(v.surface.p, ns, COVERED);
+        let asks = !albedo.is_black() && !cache.serves(v.p, ns, COVERED);
         asks.then_some((side, ns))
     })
 }

@@ -266,7 +266,6 @@ impl RecordRequest {
         };
         ShadingPoint {
             media: Sides::default(),
-            bsdf_by_path: false,
             p: self.p,
             p_error: self.p_error,
             wo: self.ns,

@@ -24,9 +24,9 @@ pub use build::{BuildStats, build};
 pub use cache::IrradianceCache;
 pub use record::Record;
 
-use super::path::{AtVertices, PathStats, PathTracer};
+use super::path::{Arrived, AtVertices, PathStats, PathTracer};
+use super::segment::CameraSample;
 pub use super::segment::LookupStats;
-use super::segment::{CameraSample, Vertex};
 use super::{Cameras, Integrator, Statistics, Tracer, diffuse};
 use crate::bsdfs::Lambertian;
 use crate::direct::Fits;
@@ -90,7 +90,7 @@ struct CacheTracer<'c> {
 impl Tracer for CacheTracer<'_> {
     fn trace(&mut self, job: &RenderJob, samples: &[CameraSample], fits: &mut Fits, out: &mut Vec<PixelSample>) {
         let includes_direct = self.cache.settings().cached == Cached::All;
-        let mut look_up = |v: &Vertex<'_>, part: &Lambertian<'_>| {
+        let mut look_up = |v: &Arrived<'_, '_>, part: &Lambertian<'_>| {
             let known = reflected(self.cache, v, part);
             self.lookups.lookups += 1;
             self.lookups.misses += u64::from(known.is_none());
@@ -98,7 +98,7 @@ impl Tracer for CacheTracer<'_> {
         };
         self.paths.search.start(job, samples, out);
         let own: &mut AtVertices<'_> =
-            &mut |found, out| diffuse::shade(found, includes_direct, out, |_, v, part| look_up(v, part));
+            &mut |found, out| diffuse::shade(found, includes_direct, out, |v, part| look_up(v, part));
         self.paths.follow((job, &job.settings().integrator), Some(own), samples, fits, out);
     }
 
@@ -108,10 +108,11 @@ impl Tracer for CacheTracer<'_> {
 }
 
 /// Radiance that the Lambertian part of a vertex reflects to the viewer; `None` without records.
-fn reflected(cache: &IrradianceCache, v: &Vertex<'_>, part: &Lambertian<'_>) -> Option<Rgb> {
-    let ns = v.viewer_normal();
+fn reflected(cache: &IrradianceCache, v: &Arrived<'_, '_>, part: &Lambertian<'_>) -> Option<Rgb> {
+    let ns = v.point.viewer_normal();
     let sides = [(part.reflectance, ns), (part.transmittance, -ns)];
-    sides.into_iter().filter(|(albedo, _)| !albedo.is_black()).try_fold(Rgb::BLACK, |known, (albedo, ns)| {
-        Some(known + albedo * cache.irradiance(v.surface.p, ns)? * FRAC_1_PI)
-    })
+    sides
+        .into_iter()
+        .filter(|(albedo, _)| !albedo.is_black())
+        .try_fold(Rgb::BLACK, |known, (albedo, ns)| Some(known + albedo * cache.irradiance(v.point.p, ns)? * FRAC_1_PI))
 }

@@ -6,8 +6,10 @@
 //! converges in the memory of one map [Knaus and Zwicker 2011].
 
 use super::boundary::{Boundary, Probe};
+use crate::direct::Vertices;
 use crate::integrators::Cameras;
-use crate::integrators::path::CameraSample;
+use crate::integrators::path::{CameraSample, Found};
+use crate::integrators::segment::Left;
 use crate::integrators::vertices::{Stage, VertexSearch};
 use crate::photons::{
     GatherScratch, Importance, ImportanceSettings, LowImportance, Origin, Photon, PhotonBudget, PhotonError, PhotonMap,
@@ -314,10 +316,20 @@ pub fn seen(job: &RenderJob, cameras: Cameras<'_>) -> Vec<(Vec3, Vec3)> {
     let samples: Vec<CameraSample> = pixels.map(|pixel| cameras(pixel, 0)).collect();
     let (mut search, mut results) = (VertexSearch::default(), Vec::new());
     search.start(job, &samples, &mut results);
-    let stage = Stage { job, vertex: 0, depth: 1, samples: &samples, out: &mut results, batch: None };
-    let vertices = search.find(stage);
-    let diffuse = vertices.iter().filter(|v| v.bsdf.lambertian(v.wo).is_some());
-    diffuse.map(|v| (v.surface.p, if v.surface.n.dot(v.wo) < 0.0 { -v.surface.n } else { v.surface.n })).collect()
+    let (left, mut vertices) = (Vertices::default(), Vertices::default());
+    let left = Left { vertices: &left, techniques: None };
+    search.find(Stage {
+        job,
+        vertex: 0,
+        depth: 1,
+        samples: &samples,
+        left,
+        out: &mut results,
+        vertices: &mut vertices,
+    });
+    let found = Found { vertex: 0, paths: &search.active, vertices: &vertices };
+    let points = found.each().map(|v| v.point).filter(|v| v.bsdf.lambertian(v.wo).is_some());
+    points.map(|v| (v.p, if v.bsdf.n.dot(v.wo) < 0.0 { -v.bsdf.n } else { v.bsdf.n })).collect()
 }
 
 /// Some places where photons of a map lie.

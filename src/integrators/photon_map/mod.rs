@@ -21,12 +21,12 @@ pub mod maps;
 
 pub use maps::{MapMaker, MapStats, PhotonMaps};
 
-use super::path::{AtVertices, Found, PathStats, PathTracer, Shading};
-use super::segment::{CameraSample, PathState, Vertex};
+use super::path::{Arrived, AtVertices, Found, PathStats, PathTracer, Shading};
+use super::segment::CameraSample;
 use super::{Cameras, Integrator, Statistics, Tracer, diffuse};
 use crate::bsdfs::{Bsdf, Diffuse, DiffuseTransmission, Lambertian};
 use crate::cameras::CameraRay;
-use crate::direct::{Estimator, Fits};
+use crate::direct::{Estimator, Fits, ShadingPoint};
 use crate::film::{FeatureSet, PixelSample};
 use crate::materials::SurfaceBsdf;
 use crate::photons::{GatherScratch, PhotonError, Place, Search};
@@ -153,9 +153,9 @@ impl Tracer for PhotonMapTracer<'_> {
         let (maps, lookups) = (self.maps, &mut self.lookups);
         lookups.requests.clear();
         let own: &mut AtVertices<'_> = &mut |found, out| {
-            diffuse::shade(found, false, out, |path, v, part| {
+            diffuse::shade(found, false, out, |v, part| {
                 if found.vertex + 1 < settings.depth() {
-                    lookups.look_up(maps, &settings.photons, (path, found.vertex), v, part);
+                    lookups.look_up(maps, &settings.photons, found.vertex, v, part);
                 }
                 // Added later
                 Some(Rgb::BLACK)
@@ -241,15 +241,16 @@ impl Lookups {
         &mut self,
         maps: &PhotonMaps,
         settings: &PhotonMapSettings,
-        (path, vertex): (&PathState, u32),
-        v: &Vertex<'_>,
+        vertex: u32,
+        v: &Arrived<'_, '_>,
         part: &Lambertian<'_>,
     ) {
-        for (i, side) in (0..).zip(sides(v, part)) {
+        let path = v.path;
+        for (i, side) in (0..).zip(sides(&v.point, part)) {
             let (albedo, place) = side;
-            wait((path, v, CAUSTIC + i), side, maps.caustics(&place, &mut self.scratch), &mut self.pending);
+            wait((v, CAUSTIC + i), side, maps.caustics(&place, &mut self.scratch), &mut self.pending);
             if settings.gather == 0 {
-                wait((path, v, GLOBAL + i), side, maps.indirect(&place, &mut self.scratch), &mut self.pending);
+                wait((v, GLOBAL + i), side, maps.indirect(&place, &mut self.scratch), &mut self.pending);
                 continue;
             }
             self.requests.push(GatherRequest {
@@ -257,7 +258,7 @@ impl Lookups {
                 beta: path.beta * albedo,
                 vertex,
                 place,
-                p_error: v.surface.p_error,
+                p_error: v.point.p_error,
                 time: path.ray.time,
                 stream: v.stream,
                 width: path.width,
@@ -276,24 +277,25 @@ impl Lookups {
         out: &mut [PixelSample],
     ) -> Vec<Shading<'w>> {
         let rays_per_request = settings.photons.gather.max(1);
-        let shading = |(path, v): (&PathState, &Vertex<'w>)| {
-            let Some(part) = v.bsdf.lambertian(v.wo) else { return Shading::default() };
+        let shading = |v: Arrived<'_, 'w>| {
+            let (path, point) = (v.path, &v.point);
+            let Some(part) = point.bsdf.lambertian(point.wo) else { return Shading::default() };
             let first = self.pending.len();
-            let (radiance, reach) = reflected(maps, path, v, &part, (&mut self.scratch, &mut self.pending));
-            let is_near = v.surface.p.distance(path.ray.o) < reach;
+            let (radiance, reach) = reflected(maps, &v, &part, (&mut self.scratch, &mut self.pending));
+            let is_near = point.p.distance(path.ray.o) < reach;
             if !is_near {
                 out[path.sample as usize].radiance += path.beta * radiance;
                 return Shading::default();
             }
             self.pending.truncate(first);
-            for (i, side) in (0..).zip(sides(v, &part)) {
-                wait((path, v, CAUSTIC + i), side, maps.caustics(&side.1, &mut self.scratch), &mut self.pending);
+            for (i, side) in (0..).zip(sides(point, &part)) {
+                wait((&v, CAUSTIC + i), side, maps.caustics(&side.1, &mut self.scratch), &mut self.pending);
             }
-            let lit = Some(only_lambertian(v, &part));
+            let lit = Some(only_lambertian(&point.bsdf, &part));
             let before = self.requests[(path.sample / rays_per_request) as usize].vertex;
             Shading { lit, next: lit.filter(|_| before + found.vertex + 2 < settings.depth()) }
         };
-        found.paths.iter().zip(found.vertices).map(shading).collect()
+        found.each().map(shading).collect()
     }
 
     /// Adds the pending radiance, times the numbers of trials of its kernels.
@@ -309,8 +311,8 @@ impl Lookups {
 }
 
 /// The sides of a vertex that reflect to the viewer, with their albedos.
-fn sides(v: &Vertex<'_>, part: &Lambertian<'_>) -> impl Iterator<Item = (Rgb, Place)> {
-    let (n, ns, p) = (v.surface.n, v.viewer_normal(), v.surface.p);
+fn sides(v: &ShadingPoint<'_>, part: &Lambertian<'_>) -> impl Iterator<Item = (Rgb, Place)> {
+    let (n, ns, p) = (v.bsdf.n, v.viewer_normal(), v.p);
     let n = if n.dot(v.wo) < 0.0 { -n } else { n };
     let both = [(part.reflectance, Place { p, n, ns }), (part.transmittance, Place { p, n: -n, ns: -ns })];
     both.into_iter().filter(|(albedo, _)| !albedo.is_black())
@@ -318,12 +320,13 @@ fn sides(v: &Vertex<'_>, part: &Lambertian<'_>) -> impl Iterator<Item = (Rgb, Pl
 
 /// Adds light reflected by the side of a vertex to the pending radiance: irradiance `e`, by a kernel of `radius`.
 fn wait(
-    (path, v, key): (&PathState, &Vertex<'_>, u32),
+    (v, key): (&Arrived<'_, '_>, u32),
     (albedo, place): (Rgb, Place),
     (e, radius): (Rgb, f32),
     pending: &mut Vec<Pending>,
 ) {
     if !e.is_black() {
+        let path = v.path;
         let probe = Probe { place, radius, time: path.ray.time, stream: v.stream.domain(key) };
         pending.push(Pending { owner: path.sample, radiance: path.beta * albedo * e * FRAC_1_PI, probe });
     }
@@ -333,31 +336,30 @@ fn wait(
 /// distance of these photons; what needs correction is left pending.
 fn reflected(
     maps: &PhotonMaps,
-    path: &PathState,
-    v: &Vertex<'_>,
+    v: &Arrived<'_, '_>,
     part: &Lambertian<'_>,
     (scratch, pending): (&mut GatherScratch, &mut Vec<Pending>),
 ) -> (Rgb, f32) {
     let (mut radiance, mut reach) = (Rgb::BLACK, 0.0_f32);
-    for (i, (albedo, place)) in (0..).zip(sides(v, part)) {
+    for (i, (albedo, place)) in (0..).zip(sides(&v.point, part)) {
         let answer = maps.irradiance(&place, scratch);
         reach = reach.max(answer.reach);
         radiance += albedo * answer.known * FRAC_1_PI;
-        wait((path, v, GLOBAL + i), (albedo, place), answer.global, pending);
-        wait((path, v, CAUSTIC + i), (albedo, place), answer.caustic, pending);
+        wait((v, GLOBAL + i), (albedo, place), answer.global, pending);
+        wait((v, CAUSTIC + i), (albedo, place), answer.caustic, pending);
     }
     (radiance, reach)
 }
 
 /// The Lambertian part as a BSDF.
-fn only_lambertian<'a>(v: &Vertex<'a>, part: &Lambertian<'_>) -> SurfaceBsdf<'a> {
+fn only_lambertian<'a>(bsdf: &SurfaceBsdf<'a>, part: &Lambertian<'_>) -> SurfaceBsdf<'a> {
     let (reflectance, transmittance) = (part.reflectance, part.transmittance);
-    let bsdf = if transmittance.is_black() {
+    let lambertian = if transmittance.is_black() {
         Bsdf::Diffuse(Diffuse { reflectance })
     } else {
         Bsdf::DiffuseTransmission(DiffuseTransmission { reflectance, transmittance })
     };
-    SurfaceBsdf { bsdf, ..v.bsdf }
+    SurfaceBsdf { bsdf: lambertian, ..*bsdf }
 }
 
 /// Guide from the photons around a vertex.

@@ -4,6 +4,7 @@ use super::support::assert_same_bits;
 use fearless_simd::dispatch;
 use fearless_simd::{Simd, prelude::*};
 use lumiris_lanes::lane::*;
+use lumiris_lanes::wide::*;
 
 #[inline(always)]
 fn run<S: Simd>(simd: S, t: &[f32], [s, c, qs, qc]: [&mut [f32]; 4]) {

@@ -2,11 +2,11 @@
 #![allow(clippy::unwrap_used)]
 
 mod area;
-mod bsdf;
 mod combine;
 mod connections;
 mod curve;
 mod environment;
+mod kernels;
 mod lane;
 mod light;
 mod light_choice;

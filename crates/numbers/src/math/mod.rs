@@ -6,13 +6,14 @@
 //!
 //! Reading order: [`rgb`], [`frame`], [`transform`], [`origin`], [`ray`], [`bounds`], [`warp`], [`sphere_map`], [`octahedral`],
 //! [`cumulative`], [`distribution`], [`texel_distribution`], [`bilinear`], [`alias`], [`hash`], [`noise`],
-//! [`number`], [`light_bound`].
+//! [`number`], [`v3`], [`elementary`], [`light_bound`].
 
 pub mod alias;
 pub mod bilinear;
 pub mod bounds;
 pub mod cumulative;
 pub mod distribution;
+pub mod elementary;
 pub mod frame;
 pub mod hash;
 pub mod light_bound;
@@ -25,6 +26,7 @@ pub mod rgb;
 pub mod sphere_map;
 pub mod texel_distribution;
 pub mod transform;
+pub mod v3;
 pub mod warp;
 
 pub use alias::{AliasTable, DiscreteSample};

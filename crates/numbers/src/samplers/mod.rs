@@ -8,6 +8,10 @@
 //! [Belcour and Heitz 2021]. Each is scrambled once more by a hash of all bits of the seed, the domains, and the pixel or
 //! block, so that no two of them have anything in common.
 
+mod domains;
+
+pub use domains::{Domain, Split};
+
 use crate::math::ONE_MINUS_EPSILON;
 use crate::math::hash::{pcg4d, unit_f32};
 use openqmc::bntables::{self, table_value};

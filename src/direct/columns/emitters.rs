@@ -1,9 +1,9 @@
 //! What BSDF samples point at.
 
-use super::columns::{SampleColumns, Surface};
+use super::samples::SampleColumns;
 use crate::accel::RayBatch;
-use crate::direct::{self, EmitterInDirection};
-use crate::integrators::segment::Carried;
+use crate::direct::bsdf_samples::{EmitterInDirection, emitter_at};
+use crate::direct::vertices::Vertices;
 use crate::lights::LightId;
 use crate::lights::many::LightSamples;
 use crate::scene::{EmitterHit, EmitterScratch, RenderJob};
@@ -13,62 +13,61 @@ use lumiris_numbers::math::Ray;
 /// Directions of BSDF sampling among the emitters.
 #[derive(Debug, Default)]
 pub(super) struct EmitterRays {
-    /// Places of their vertices.
-    pub(super) index: Vec<u32>,
-    pub(super) rays: RayBatch,
-    pub(super) scratch: EmitterScratch,
-    pub(super) emitter_hits: Vec<Option<EmitterHit>>,
+    /// Rows of their vertices.
+    rows: Vec<u32>,
+    rays: RayBatch,
+    scratch: EmitterScratch,
+    emitter_hits: Vec<Option<EmitterHit>>,
     /// The light that each sample points at, if there is one that is no infinite light.
     pub(super) lights: Vec<Option<LightId>>,
     /// Those of them that meet nothing.
-    pub(super) far: Vec<u32>,
+    far: Vec<u32>,
 }
 
 impl EmitterRays {
-    /// Looks up what the BSDF samples of the vertices of `paths` point at; those that point at nothing get the density 0.
-    /// Returns the number of rays among the emitters.
-    pub(super) fn find(
-        &mut self,
-        job: &RenderJob,
-        paths: &[Carried],
-        surface: &Surface,
-        samples: &mut SampleColumns,
-    ) -> u64 {
-        let (n, len) = (paths.len(), padded(paths.len()));
-        let EmitterRays { index, rays, scratch, emitter_hits, lights, far } = self;
+    /// Looks up what the BSDF samples of the vertices point at; those that point at nothing get the density 0. Returns the
+    /// number of rays among the emitters.
+    pub(super) fn find(&mut self, job: &RenderJob, vertices: &Vertices<'_>, samples: &mut SampleColumns) -> u64 {
+        let (n, len) = (vertices.len(), padded(vertices.len()));
+        let EmitterRays { rows, rays, scratch, emitter_hits, lights, far } = self;
+        let (at, time) = (vertices.surface.lit_points(), &vertices.time);
         lights.clear();
         lights.resize(n, None);
-        index.clear();
-        index.extend((0..n as u32).filter(|&i| samples.p_bsdf[i as usize] > 0.0));
+        rows.clear();
+        rows.extend((0..n as u32).filter(|&i| samples.bsdf.pdf[i as usize] > 0.0));
         far.clear();
         let mut add = |samples: &mut SampleColumns, i: usize, hit: Option<EmitterHit>| {
             let Some(hit) = hit else { return far.push(i as u32) };
             lights[i] = hit.light;
-            let (ctx, wi) = (surface.lit_points().get(i), samples.light.wi.vec3(i));
             let pmf = |ctx: &_, light| job.lights.sampler.pmf(ctx, light);
-            match direct::emitter_at(job, &ctx, wi, &hit, paths[i].time, pmf) {
+            match emitter_at(job, &at.get(i), samples.light.wi.vec3(i), &hit, time[i], pmf) {
                 Some(found) => set_emitter(&mut samples.light, i, &found),
-                None => samples.p_bsdf[i] = 0.0,
+                None => samples.bsdf.pdf[i] = 0.0,
             }
         };
         let ray = |samples: &SampleColumns, i: usize| {
             let (o, d) = (samples.o.vec3(i), samples.light.wi.vec3(i));
-            Ray { o, d, t_max: f32::INFINITY, time: paths[i].time }
+            Ray { o, d, t_max: f32::INFINITY, time: time[i] }
         };
+
+        // The emitters: among a few in lanes, else by rays
         let (o, d) = (samples.o.get(len), samples.light.wi.get(len));
         if let Some(hit) = job.world.intersect_few_emitters(o, d, scratch) {
-            for i in index.iter().map(|&i| i as usize) {
+            for i in rows.iter().map(|&i| i as usize) {
                 let hit = hit(i, &ray(samples, i));
                 add(samples, i, hit);
             }
         } else {
             rays.clear();
-            index.iter().for_each(|&i| rays.push(&ray(samples, i as usize)));
+            rows.iter().for_each(|&i| rays.push(&ray(samples, i as usize)));
             job.world.intersect_emitters(rays, scratch, emitter_hits);
-            index.iter().zip(&*emitter_hits).for_each(|(&i, hit)| add(samples, i as usize, *hit));
+            rows.iter().zip(&*emitter_hits).for_each(|(&i, hit)| add(samples, i as usize, *hit));
         }
-        let SampleColumns { light: LightSamples { wi, li, pdf, is_far, is_delta, .. }, p_bsdf, .. } = samples;
-        let (at, directions) = (surface.lit_points(), wi);
+
+        // Infinite lights, where there is none
+        let SampleColumns { light: LightSamples { wi, li, pdf, is_far, is_delta, .. }, bsdf, .. } = samples;
+        let p_bsdf = &mut bsdf.pdf;
+        let directions = wi;
         job.lights.infinite_in_directions(
             far.len(),
             |k| (at.get(far[k] as usize), directions.vec3(far[k] as usize)),
@@ -80,12 +79,12 @@ impl EmitterRays {
                 is_far[i] = 1.0;
             },
         );
-        index.len() as u64
+        rows.len() as u64
     }
 }
 
 /// What BSDF sample `i` points at.
-pub(super) fn set_emitter(samples: &mut LightSamples, i: usize, found: &EmitterInDirection) {
+fn set_emitter(samples: &mut LightSamples, i: usize, found: &EmitterInDirection) {
     samples.li.set_rgb(i, found.li);
     samples.pdf[i] = if samples.is_delta[i] { 0.0 } else { found.p_light };
     samples.is_far[i] = if found.end.is_some() { 0.0 } else { 1.0 };

@@ -6,9 +6,10 @@
 //! a light sample that another emitter hides. Columns do not depend on the weights of the techniques: a sample without a weight
 //! has the densities of both.
 
-use super::columns::{SampleColumns, Single, Surface, Traced, others};
 use super::emitters::EmitterRays;
+use super::samples::{SampleColumns, Traced};
 use crate::accel::RayBatch;
+use crate::direct::vertices::Vertices;
 use crate::lights::many::Scratch;
 use crate::scene::RenderJob;
 use lumiris_numbers::estimators::ocv::MAX_COMPONENTS;
@@ -24,23 +25,21 @@ pub(super) struct Controls {
     /// What the last sample of each vertex has of light sampling.
     parts: Vec<f32>,
     is_hidden: Vec<bool>,
+    /// Rows without control variates.
+    is_left_out: Vec<bool>,
     hidden: RayBatch,
     hidden_of: Vec<u32>,
     occluded: Vec<bool>,
 }
 
 impl Controls {
-    /// Begins `n` vertices, with their columns at the negative of the expectation. `scratch` has begun with them.
-    pub(super) fn begin(
-        &mut self,
-        job: &RenderJob,
-        n: usize,
-        (surface, scratch): (&Surface, &mut Scratch),
-        singles: &[Single<'_>],
-    ) {
+    /// Begins vertices, with their columns at the negative of the expectation. `scratch` has begun with them.
+    pub(super) fn begin(&mut self, job: &RenderJob, vertices: &Vertices<'_>, scratch: &mut Scratch) {
         self.sums.clear();
-        self.sums.resize(n, [0.0; MAX_COMPONENTS]);
-        let (lights, at) = (&job.lights, surface.lit_points());
+        self.sums.resize(vertices.len(), [0.0; MAX_COMPONENTS]);
+        self.is_left_out.clear();
+        self.is_left_out.resize(vertices.len(), false);
+        let (lights, at) = (&job.lights, vertices.surface.lit_points());
         if let Some(light) = lights.sampler.only_light() {
             let group = lights.groups.group_of(light).unwrap_or(0);
             self.sums.iter_mut().for_each(|sums| sums[group] = -1.0);
@@ -52,7 +51,9 @@ impl Controls {
         }
         self.lobe = job.has_two_lobes().then(|| lights.groups.len());
         if let Some(lobe) = self.lobe {
-            others(singles).for_each(|s| self.sums[s.index as usize][lobe] = -s.bsdf.first_lobe(s.wo));
+            for (i, bsdf) in vertices.bsdfs.iter().enumerate() {
+                self.sums[i][lobe] = -bsdf.first_lobe(vertices.surface.wo.vec3(i));
+            }
         }
     }
 
@@ -62,7 +63,7 @@ impl Controls {
         job: &RenderJob,
         [n_light, n_bsdf]: [f32; 2],
         (samples, traced, scratch): (&SampleColumns, &Traced, &Scratch),
-        singles: &[Single<'_>],
+        vertices: &Vertices<'_>,
     ) {
         self.find_hidden(job, samples, traced);
         self.divide([n_light, n_bsdf], samples, true);
@@ -77,11 +78,11 @@ impl Controls {
             }
         }
         let Some(lobe) = self.lobe else { return };
-        for single in others(singles) {
-            let i = single.index as usize;
-            let (p_light, p_bsdf) = (samples.light.pdf[i], samples.p_bsdf[i]);
+        for (i, bsdf) in vertices.bsdfs.iter().enumerate() {
+            let (p_light, p_bsdf) = (samples.light.pdf[i], samples.bsdf.pdf[i]);
             if !self.is_hidden[i] && samples.has_integrand(i, true) && p_bsdf > 0.0 {
-                let p_lobe = single.bsdf.pdf_first_lobe(single.wo, samples.light.wi.vec3(i), p_bsdf);
+                let wo = vertices.surface.wo.vec3(i);
+                let p_lobe = bsdf.pdf_first_lobe(wo, samples.light.wi.vec3(i), p_bsdf);
                 self.sums[i][lobe] += p_lobe / (n_light * p_light + n_bsdf * p_bsdf);
             }
         }
@@ -93,7 +94,7 @@ impl Controls {
         job: &RenderJob,
         [n_light, n_bsdf]: [f32; 2],
         (samples, emitters): (&SampleColumns, &EmitterRays),
-        singles: &[Single<'_>],
+        vertices: &Vertices<'_>,
     ) {
         self.divide([n_light, n_bsdf], samples, false);
         let groups = &job.lights.groups;
@@ -105,7 +106,7 @@ impl Controls {
                 sums[group] += part;
             }
         }
-        self.add_lobes([n_light, n_bsdf], samples, singles);
+        self.add_lobes([n_light, n_bsdf], samples, vertices);
     }
 
     /// Sets the parts of light sampling in samples of one technique whose integrand is not zero; all others are their own
@@ -114,7 +115,7 @@ impl Controls {
         let n = self.sums.len();
         self.parts.resize(n, 0.0);
         let alone = if by_light { 1.0 / n_light } else { 0.0 };
-        let (p_light, p_bsdf) = (&samples.light.pdf[..n], &samples.p_bsdf[..n]);
+        let (p_light, p_bsdf) = (&samples.light.pdf[..n], &samples.bsdf.pdf[..n]);
         for (i, part) in self.parts.iter_mut().enumerate() {
             let own = p_light[i] / (n_light * p_light[i] + n_bsdf * p_bsdf[i]);
             *part = if samples.has_integrand(i, by_light) & (p_light[i] > 0.0) { own } else { alone };
@@ -122,25 +123,30 @@ impl Controls {
     }
 
     /// Adds the part of the first lobe in a BSDF sample of each vertex.
-    fn add_lobes(&mut self, [n_light, n_bsdf]: [f32; 2], samples: &SampleColumns, singles: &[Single<'_>]) {
+    fn add_lobes(&mut self, [n_light, n_bsdf]: [f32; 2], samples: &SampleColumns, vertices: &Vertices<'_>) {
         let Some(lobe) = self.lobe else { return };
-        for single in others(singles) {
-            let i = single.index as usize;
-            let is_first = samples.u[0][i] < single.bsdf.first_lobe(single.wo);
-            let (p_light, p_bsdf) = (samples.light.pdf[i], samples.p_bsdf[i]);
+        for (i, bsdf) in vertices.bsdfs.iter().enumerate() {
+            let wo = vertices.surface.wo.vec3(i);
+            let is_first = samples.u[0][i] < bsdf.first_lobe(wo);
+            let (p_light, p_bsdf) = (samples.light.pdf[i], samples.bsdf.pdf[i]);
             let is_own = !samples.has_integrand(i, false);
             self.sums[i][lobe] += if is_own || samples.light.is_delta[i] {
                 if is_first { 1.0 / n_bsdf } else { 0.0 }
             } else {
                 let wi: Vec3 = samples.light.wi.vec3(i);
-                single.bsdf.pdf_first_lobe(single.wo, wi, p_bsdf) / (n_light * p_light + n_bsdf * p_bsdf)
+                bsdf.pdf_first_lobe(wo, wi, p_bsdf) / (n_light * p_light + n_bsdf * p_bsdf)
             };
         }
     }
 
+    /// Has no control variates for these rows, whose samples are others.
+    pub(super) fn leave_out(&mut self, rows: impl Iterator<Item = usize>) {
+        rows.for_each(|i| self.is_left_out[i] = true);
+    }
+
     /// The controls of a vertex, of which the first ones are there.
     pub(super) fn of(&self, i: usize) -> &[f32; MAX_COMPONENTS] {
-        &self.sums[i]
+        if self.is_left_out[i] { &[0.0; MAX_COMPONENTS] } else { &self.sums[i] }
     }
 
     /// Determines which samples of light that BSDF sampling could draw as well are hidden by another emitter.
@@ -152,8 +158,8 @@ impl Controls {
             return;
         }
         self.hidden.clear();
-        for (k, &i) in traced.index.iter().enumerate() {
-            if traced.occluded[k] && samples.p_bsdf[i as usize] > 0.0 {
+        for (k, &i) in traced.rows.iter().enumerate() {
+            if traced.occluded[k] && samples.bsdf.pdf[i as usize] > 0.0 {
                 self.hidden.push(&traced.rays.get(k));
                 self.hidden_of.push(i);
             }

@@ -1,0 +1,192 @@
+//! Reflection and refraction at a dielectric interface, smooth or with GGX microfacets [Walter et al. 2007].
+//!
+//! Reflection: f = D F G / (4 cos θo cos θi), half vector m = wo + wi. Transmission: m = wo + η'wi,
+//! f = D (1 − F) G |wo·m wi·m| / (|cos θo cos θi| (wi·m + wo·m/η')²), times 1/η'² for radiance, where η' is the index
+//! of the side of `wi` relative to the side of `wo`. One scattering event only. Parameters: η of the side of −z
+//! relative to that of +z, alphas.
+
+use super::facets::Facets;
+use super::fresnel::{fr_inverse, inverse_eta, reflect, refract};
+use super::{BsdfKernel, Drawn, Value, flags, lobe, same_side};
+use lumiris_numbers::math::number::{Mask as _, Number};
+use lumiris_numbers::math::v3::V3;
+
+/// What is transported along the path, which decides whether transmission scales by 1/η².
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Transport {
+    /// Paths from the camera.
+    Radiance,
+    /// Paths from the lights.
+    Importance,
+}
+
+/// Which lobes a sample, a value or a density is of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Select {
+    /// Both.
+    All,
+    /// Reflection only.
+    Reflection,
+    /// Transmission only.
+    Transmission,
+}
+
+/// Reflection and transmission.
+#[derive(Debug)]
+pub struct Dielectric;
+
+/// Transmission alone: out of an interior whose reflections are no vertices.
+#[derive(Debug)]
+pub struct Exit;
+
+/// Interface between the outside (+z) and a dielectric (−z).
+#[derive(Clone, Copy, Debug)]
+pub struct Interface<N> {
+    /// Index of refraction of the side of −z relative to that of +z.
+    pub eta: N,
+    /// Microfacets.
+    pub facets: Facets<N>,
+}
+
+impl Select {
+    /// Probability of reflection among the selected lobes, and where they carry light.
+    #[inline(always)]
+    fn p_reflect<N: Number>(self, fresnel: N) -> (N, N::Mask) {
+        let (zero, one) = (fresnel.constant(0.0), fresnel.constant(1.0));
+        match self {
+            Select::All => (fresnel, one.above(zero)),
+            Select::Reflection => (one, fresnel.above(zero)),
+            Select::Transmission => (zero, one.above(fresnel)),
+        }
+    }
+}
+
+/// Value of both lobes, and of the selected ones.
+#[inline(always)]
+fn selected<N: Number>(select: Select, value: N, is_reflection: N::Mask) -> N {
+    match select {
+        Select::All => value,
+        Select::Reflection => value.or_zero(is_reflection),
+        Select::Transmission => value.or_zero(!is_reflection),
+    }
+}
+
+impl<N: Number> Interface<N> {
+    /// From the parameters.
+    #[inline(always)]
+    pub fn new(p: &[N]) -> Self {
+        Interface { eta: p[0], facets: Facets { alpha_x: p[1], alpha_y: p[2] } }
+    }
+
+    /// True where all scattering is by deltas.
+    #[inline(always)]
+    pub fn is_specular(self) -> N::Mask {
+        let from_one = (self.eta - 1.0).magnitude();
+        self.facets.is_smooth() | !from_one.above(self.eta.constant(0.0))
+    }
+
+    /// f·|cos θi| and density (1/sr); 0 where specular.
+    #[inline(always)]
+    pub fn evaluate(self, wo: V3<N>, wi: V3<N>, select: Select, transport: Transport) -> (N, N) {
+        let (zero, one) = (wo.z.constant(0.0), wo.z.constant(1.0));
+        let inverse = inverse_eta(wo.z, self.eta);
+        let h = wo.times(N::choose(same_side(wo, wi), one, inverse)).plus(wi);
+        // Along the normal in the upper hemisphere
+        let scale = one.signed_as(h.z) / h.dot(h).root();
+        let (o_m, i_m) = (wo.dot(h) * scale, wi.dot(h) * scale);
+        let faces = (i_m * wi.z).above(zero) & (o_m * wo.z).above(zero);
+        let (f_cos, pdf) = self.of_normal((wo, wi), (h, o_m, i_m), inverse, (select, transport));
+        let Value { f_cos, pdf } = Value::grey(f_cos, pdf).kept(faces & !self.is_specular());
+        (f_cos[0], pdf)
+    }
+
+    /// The same for a normal along `h`, with the cosines of `wo` and `wi` to it.
+    #[inline(always)]
+    fn of_normal(
+        self,
+        (wo, wi): (V3<N>, V3<N>),
+        (h, o_m, i_m): (V3<N>, N, N),
+        inverse: N,
+        (select, transport): (Select, Transport),
+    ) -> (N, N) {
+        let is_reflection = same_side(wo, wi);
+        let fresnel = fr_inverse(o_m, inverse);
+        let (p, exists) = select.p_reflect(fresnel);
+        let (d_g, density) = self.facets.reflection(wo, wi, h);
+        let sum = i_m + o_m * inverse;
+        let jacobian = i_m.magnitude() * o_m.magnitude() * 4.0 / (sum * sum);
+        let scale = match transport {
+            Transport::Radiance => inverse * inverse,
+            Transport::Importance => inverse.constant(1.0),
+        };
+        let f_cos = d_g * N::choose(is_reflection, fresnel, (-fresnel + 1.0) * jacobian * scale);
+        let pdf = density * N::choose(is_reflection, p, (-p + 1.0) * jacobian);
+        (selected(select, f_cos, is_reflection), pdf.or_zero(exists))
+    }
+
+    /// Reflection or refraction, chosen by the Fresnel reflectance of the sampled microfacet.
+    #[inline(always)]
+    pub fn sample(self, wo: V3<N>, u: [N; 3], select: Select, transport: Transport) -> Drawn<N> {
+        let (zero, one) = (wo.z.constant(0.0), wo.z.constant(1.0));
+        let is_specular = self.is_specular();
+        let up = V3 { x: zero, y: zero, z: one };
+        let m =
+            if is_specular.all() { up } else { V3::choose(is_specular, up, self.facets.sample_m(wo, [u[1], u[2]])) };
+        let o_m = wo.dot(m);
+        let (refracted, inverse, passes) = refract(wo, m, self.eta);
+        let fresnel = fr_inverse(o_m, inverse);
+        let (p, exists) = select.p_reflect(fresnel);
+        let reflects = p.above(u[0]);
+        let wi = V3::choose(reflects, reflect(wo, m), refracted);
+
+        let scale = match transport {
+            Transport::Radiance => inverse * inverse,
+            Transport::Importance => one,
+        };
+        let (mut f_cos, mut pdf) =
+            (N::choose(reflects, fresnel, (one - fresnel) * scale), N::choose(reflects, p, one - p));
+        let mut is_sample = wo.z.magnitude().above(zero);
+        if !is_specular.all() {
+            let side = wo.z * wi.z;
+            let is_side = (reflects & side.above(zero)) | (!reflects & zero.above(side));
+            let (f, density) = self.of_normal((wo, wi), (m, o_m, wi.dot(m)), inverse, (select, transport));
+            f_cos = N::choose(is_specular, f_cos, f);
+            pdf = N::choose(is_specular, pdf, density);
+            is_sample = is_sample & (is_specular | (is_side & (o_m * wo.z).above(zero)));
+        }
+        let kind = N::choose(is_specular, flags(one, lobe::SPECULAR), flags(one, lobe::GLOSSY))
+            + N::choose(reflects, flags(one, lobe::REFLECTION), flags(one, lobe::TRANSMISSION));
+        let eta = N::choose(reflects, one, one / inverse);
+        Drawn::new(wi, Value::grey(f_cos, pdf), kind, eta).kept(is_sample & exists & (reflects | passes))
+    }
+}
+
+impl BsdfKernel for Dielectric {
+    const PARAMS: usize = 3;
+
+    #[inline(always)]
+    fn evaluate<N: Number>(p: &[N], _tables: &[f32], wo: V3<N>, wi: V3<N>) -> Value<N> {
+        let (f_cos, pdf) = Interface::new(p).evaluate(wo, wi, Select::All, Transport::Radiance);
+        Value::grey(f_cos, pdf)
+    }
+
+    #[inline(always)]
+    fn sample<N: Number>(p: &[N], _tables: &[f32], wo: V3<N>, u: [N; 3]) -> Drawn<N> {
+        Interface::new(p).sample(wo, u, Select::All, Transport::Radiance)
+    }
+}
+
+impl BsdfKernel for Exit {
+    const PARAMS: usize = 3;
+
+    #[inline(always)]
+    fn evaluate<N: Number>(p: &[N], _tables: &[f32], wo: V3<N>, wi: V3<N>) -> Value<N> {
+        let (f_cos, pdf) = Interface::new(p).evaluate(wo, wi, Select::Transmission, Transport::Radiance);
+        Value::grey(f_cos, pdf)
+    }
+
+    #[inline(always)]
+    fn sample<N: Number>(p: &[N], _tables: &[f32], wo: V3<N>, u: [N; 3]) -> Drawn<N> {
+        Interface::new(p).sample(wo, u, Select::Transmission, Transport::Radiance)
+    }
+}

@@ -1,0 +1,130 @@
+//! BSDFs whose formulas are kernels of `lumiris_lanes::kernels`, here for single directions.
+
+use super::{Bsdf, BsdfSample, Lobe};
+use lumiris_lanes::kernels::{BsdfKernel, Drawn, Value};
+pub use lumiris_lanes::kernels::{Kernel, MAX_PARAMS};
+use lumiris_numbers::math::{Rgb, Vec3};
+
+/// A BSDF that is a kernel with its parameters.
+pub trait KernelBsdf {
+    /// The formulas.
+    type Formulas: BsdfKernel;
+
+    /// The parameters, an array.
+    type Params: AsRef<[f32]>;
+
+    /// The parameters of the kernel.
+    fn params(&self) -> Self::Params;
+
+    /// The tables of the kernel.
+    fn tables(&self) -> &[f32] {
+        &[]
+    }
+
+    /// f·|cos θi| and density (1/sr), without deltas.
+    #[inline]
+    fn f_cos_and_pdf(&self, wo: Vec3, wi: Vec3) -> (Rgb, f32) {
+        evaluate::<Self::Formulas>(self.params().as_ref(), self.tables(), wo, wi)
+    }
+
+    /// Value without cosine (1/sr), without deltas.
+    #[inline]
+    fn f(&self, wo: Vec3, wi: Vec3) -> Rgb {
+        without_cos(self.f_cos_and_pdf(wo, wi).0, wi)
+    }
+
+    /// Density of the non-specular part of [`Self::sample`] per steradian.
+    #[inline]
+    fn pdf(&self, wo: Vec3, wi: Vec3) -> f32 {
+        self.f_cos_and_pdf(wo, wi).1
+    }
+
+    /// A direction, by `uc` among the lobes and `u` within one.
+    #[inline]
+    fn sample(&self, wo: Vec3, uc: f32, u: [f32; 2]) -> Option<BsdfSample> {
+        let params = self.params();
+        of_drawn(Self::Formulas::sample(params.as_ref(), self.tables(), wo.into(), [uc, u[0], u[1]]))
+    }
+}
+
+/// f·|cos θi| and density (1/sr) by a kernel.
+#[inline]
+pub(super) fn evaluate<K: BsdfKernel>(p: &[f32], tables: &[f32], wo: Vec3, wi: Vec3) -> (Rgb, f32) {
+    let Value { f_cos, pdf } = K::evaluate(p, tables, wo.into(), wi.into());
+    (Rgb::from_array(f_cos), pdf)
+}
+
+/// f of f·|cos θi|; black along the surface, where it is not finite.
+#[inline]
+pub(super) fn without_cos(f_cos: Rgb, wi: Vec3) -> Rgb {
+    let f = f_cos / wi.z.abs();
+    if f.is_finite() { f } else { Rgb::BLACK }
+}
+
+/// The sample, if there is one.
+#[inline]
+pub(super) fn of_drawn(drawn: Drawn<f32>) -> Option<BsdfSample> {
+    let wi = drawn.wi.into();
+    let f = without_cos(Rgb::from_array(drawn.f_cos), wi);
+    let lobe = Lobe::of_flags(drawn.lobe as u8);
+    (drawn.pdf > 0.0).then_some(BsdfSample { f, wi, pdf: drawn.pdf, lobe, eta: drawn.eta })
+}
+
+/// The parameters, followed by zeros.
+fn padded(params: &[f32]) -> [f32; MAX_PARAMS] {
+    let mut all = [0.0; MAX_PARAMS];
+    all[..params.len()].copy_from_slice(params);
+    all
+}
+
+impl Bsdf<'_> {
+    /// The parameters of its kernel, of which there are [`Kernel::params`].
+    pub fn params(&self) -> [f32; MAX_PARAMS] {
+        match self {
+            Bsdf::Diffuse(b) => padded(&b.params()),
+            Bsdf::DiffuseTransmission(b) => padded(&b.params()),
+            Bsdf::Conductor(b) => padded(&b.params()),
+            Bsdf::Dielectric(b) => padded(&b.params()),
+            Bsdf::Exit(b) => padded(&b.params()),
+            Bsdf::ThinDielectric(b) => padded(&b.params()),
+            Bsdf::CoatedDiffuse(b) => padded(&b.params()),
+            Bsdf::Principled(b) => padded(&b.params()),
+            Bsdf::Layered(_) | Bsdf::Hair(_) | Bsdf::Measured(_) | Bsdf::Evaluated(_) | Bsdf::Phase(_) => padded(&[]),
+        }
+    }
+
+    /// The kernel that evaluates it, if there is one.
+    #[inline]
+    pub fn kernel(&self) -> Option<Kernel> {
+        match self {
+            Bsdf::Diffuse(_) => Some(Kernel::Diffuse),
+            Bsdf::DiffuseTransmission(_) => Some(Kernel::DiffuseTransmission),
+            Bsdf::Conductor(_) => Some(Kernel::Conductor),
+            Bsdf::Dielectric(_) => Some(Kernel::Dielectric),
+            Bsdf::Exit(_) => Some(Kernel::Exit),
+            Bsdf::ThinDielectric(_) => Some(Kernel::ThinDielectric),
+            Bsdf::CoatedDiffuse(b) => b.kernel(),
+            Bsdf::Principled(_) => Some(Kernel::Principled),
+            Bsdf::Layered(_) | Bsdf::Hair(_) | Bsdf::Measured(_) | Bsdf::Evaluated(_) | Bsdf::Phase(_) => None,
+        }
+    }
+
+    /// The tables of its kernel; those of all coats of a scene are the same.
+    pub fn tables(&self) -> &[f32] {
+        match self {
+            Bsdf::CoatedDiffuse(b) => b.tables(),
+            Bsdf::Diffuse(_)
+            | Bsdf::DiffuseTransmission(_)
+            | Bsdf::Conductor(_)
+            | Bsdf::Dielectric(_)
+            | Bsdf::Exit(_)
+            | Bsdf::ThinDielectric(_)
+            | Bsdf::Layered(_)
+            | Bsdf::Principled(_)
+            | Bsdf::Hair(_)
+            | Bsdf::Measured(_)
+            | Bsdf::Evaluated(_)
+            | Bsdf::Phase(_) => &[],
+        }
+    }
+}

@@ -1,0 +1,412 @@
+//! Direct light of vertices in columns, by estimators that trace every sample that they draw: `mc`, `mis`, and `ocv` over
+//! pixels.
+//!
+//! ```text
+//! vertices ─light samples─▶ f·cos, weights ─segments─▶ T2 ─▶ radiance
+//!          └BSDF samples──▶ emitters among which they are looked up ─▶ f·cos, weights ─segments─▶ T2 ─▶ radiance
+//! ```
+//!
+//! Each step is a loop over all vertices, for one sample of each. Lambertian rows are evaluated by kernels, all others one by
+//! one into the same columns. A few rows have other numbers of samples than most: where all lobes are specular, light
+//! samples are of no use, and where the path cannot continue by a BSDF sample, its own are drawn.
+//!
+//! Reading order: [`techniques`] (how many samples), [`samples`] (columns), [`emitters`] (what BSDF samples point at),
+//! [`controls`] (control variates, for `ocv`); this file goes through the steps.
+
+mod controls;
+mod emitters;
+mod samples;
+mod techniques;
+
+pub use techniques::Techniques;
+
+use super::candidates::SampleAllocation;
+use super::domain;
+use super::stats::DirectStats;
+use super::transmittance::{Crossing, Departure};
+use super::vertices::{BsdfSamples, Vertices};
+use crate::accel::{Coherence, RayBatch};
+use crate::bsdfs::Lobe;
+use crate::lights::LightId;
+use crate::lights::many::{NO_LIGHT, Scratch};
+use crate::media::Sides;
+use crate::scene::RenderJob;
+use controls::Controls;
+use emitters::EmitterRays;
+use lumiris_lanes::columns::{Columns3, padded};
+use lumiris_lanes::vertex as kernels;
+use lumiris_lanes::{level, sampler};
+use lumiris_numbers::estimators::mis::{Heuristic, Technique};
+use lumiris_numbers::math::{Rgb, Vec3};
+use lumiris_numbers::samplers::{SampleStream, Split};
+use samples::{SampleColumns, Traced};
+use std::time::Instant;
+
+/// The part of a light sample that is left, where light paths bring the rest: of the sample of a row, that of a point on a
+/// light with its normal, in a direction.
+pub type Rest<'a> = dyn Fn(usize, LightId, Vec3, Vec3) -> f32 + 'a;
+
+/// Takes the row, the light (`None`: all infinite ones), the direction and the contribution of a visible sample.
+pub type Visible<'a> = dyn FnMut(usize, Option<LightId>, Vec3, Rgb) + 'a;
+
+/// What else the samples are asked for, and told to.
+#[derive(Default)]
+pub struct Sinks<'a> {
+    /// Factor of light samples.
+    pub rest: Option<&'a Rest<'a>>,
+    /// Takes the samples that are visible.
+    pub visible: Option<&'a mut Visible<'a>>,
+    /// Takes copies of the segments.
+    pub segments: Option<&'a mut Vec<RayBatch>>,
+}
+
+/// Estimates direct light of vertices in columns; holds the buffers of one worker.
+#[derive(Debug, Default)]
+pub struct ColumnStage {
+    /// Numbers of samples of the rows that differ from the others, which are the first ones.
+    allocations: Vec<SampleAllocation>,
+    samples: SampleColumns,
+    drawn: Vec<SampleStream>,
+    scratch: Scratch,
+    traced: Traced,
+    crossing: Crossing,
+    emitter_rays: EmitterRays,
+    controls: Controls,
+    /// Direct light so far.
+    radiance: Columns3,
+}
+
+/// A sample of each vertex.
+#[derive(Clone, Copy, Debug)]
+struct Draw {
+    /// Of light sampling; else of BSDF sampling.
+    by_light: bool,
+    /// Its number among the samples of the technique.
+    index: u32,
+}
+
+/// What all steps read.
+#[derive(Clone, Copy)]
+struct Batch<'a, 'w> {
+    job: &'a RenderJob,
+    techniques: &'a Techniques,
+    vertices: &'a Vertices<'w>,
+    /// Numbers of samples of most rows.
+    usual: SampleAllocation,
+}
+
+impl Batch<'_, '_> {
+    /// Length of the columns.
+    fn len(&self) -> usize {
+        padded(self.vertices.len())
+    }
+}
+
+impl ColumnStage {
+    /// Direct light of a row after [`Self::estimate`].
+    #[inline]
+    pub fn radiance(&self, row: usize) -> Rgb {
+        self.radiance.rgb(row)
+    }
+
+    /// The control variates of a row, where there are some.
+    pub fn controls(&self, job: &RenderJob, row: usize) -> &[f32] {
+        &self.controls.of(row)[..job.controls()]
+    }
+
+    /// Estimates ∫ f_s L_direct |cos θ| dω for each vertex.
+    pub fn estimate(
+        &mut self,
+        job: &RenderJob,
+        techniques: &Techniques,
+        vertices: &Vertices<'_>,
+        sinks: &mut Sinks<'_>,
+        stats: &mut DirectStats,
+    ) {
+        if vertices.is_empty() {
+            return;
+        }
+        let start = Instant::now();
+        let batch = Batch { job, techniques, vertices, usual: techniques.usual() };
+        let [light, bsdf] = self.begin(&batch, stats);
+        stats.select += start.elapsed();
+        for index in 0..light {
+            let start = Instant::now();
+            self.sample_lights(&batch, sinks.rest, index);
+            let proposed = self.trace(&batch, Draw { by_light: true, index }, sinks, (stats, start));
+            stats.t1_light += proposed - start;
+            if index < batch.usual.light_draws {
+                self.add_controls(&batch, true);
+            }
+        }
+        for index in 0..bsdf {
+            let start = Instant::now();
+            stats.emitter_rays += self.sample_bsdfs(&batch, index);
+            self.trace(&batch, Draw { by_light: false, index }, sinks, (stats, start));
+            if index < batch.usual.bsdf_draws {
+                self.add_controls(&batch, false);
+            }
+        }
+    }
+
+    /// Begins vertices without light; returns how many samples of each technique some of them draw.
+    fn begin(&mut self, batch: &Batch<'_, '_>, stats: &mut DirectStats) -> [u32; 2] {
+        let Batch { job, techniques, vertices, usual } = *batch;
+        let (n, len) = (vertices.len(), batch.len());
+        self.samples.reserve(len);
+        self.radiance.reserve(len);
+        self.radiance.get_mut(len).into_iter().for_each(|c| c.fill(0.0));
+
+        // Numbers of samples
+        let unusual = if techniques.are_drawn() { n } else { vertices.bsdfs.len() };
+        self.allocations.clear();
+        self.allocations
+            .extend((0..unusual).map(|i| techniques.allocation(&vertices.bsdf(i).bsdf, &vertices.direct[i])));
+        let rest = if unusual < n { Some(&usual) } else { None };
+        let most = |of: fn(&SampleAllocation) -> u32| self.allocations.iter().chain(rest).map(of).max().unwrap_or(0);
+        let sum = |of: fn(&SampleAllocation) -> u32| {
+            let all = self.allocations.iter().map(|a| u64::from(of(a))).sum::<u64>();
+            all + (n - unusual) as u64 * u64::from(of(&usual))
+        };
+        let (light, bsdf) = (|a: &SampleAllocation| a.light_draws, |a: &SampleAllocation| a.bsdf_draws);
+        stats.light_proposals += sum(light);
+        stats.proposals += sum(light) + sum(bsdf);
+
+        // The choice of lights
+        self.scratch.begin(&job.lights, n, vertices.surface.lit_points());
+        if techniques.has_controls {
+            self.controls.begin(job, vertices, &mut self.scratch);
+            let is_unusual = |(i, a): (usize, &SampleAllocation)| (*a != usual).then_some(i);
+            self.controls.leave_out(self.allocations.iter().enumerate().filter_map(is_unusual));
+        }
+        [most(light), most(bsdf)]
+    }
+
+    /// Adds the last sample of each vertex to its control variates, if there are any.
+    fn add_controls(&mut self, batch: &Batch<'_, '_>, by_light: bool) {
+        if !batch.techniques.has_controls {
+            return;
+        }
+        let n = [batch.usual.n_light, batch.usual.n_bsdf];
+        let ColumnStage { controls, samples, traced, scratch, emitter_rays, .. } = self;
+        if by_light {
+            controls.add_light_samples(batch.job, n, (samples, traced, scratch), batch.vertices);
+        } else {
+            controls.add_bsdf_samples(batch.job, n, (samples, emitter_rays), batch.vertices);
+        }
+    }
+
+    /// Draws the numbers of a sample of each vertex.
+    fn draw(&mut self, batch: &Batch<'_, '_>, draw: Draw) {
+        let of = |a: &SampleAllocation| if draw.by_light { a.light_draws } else { a.bsdf_draws };
+        let key = if draw.by_light { domain::LIGHT } else { domain::BSDF };
+        let (unusual, usual) = batch.vertices.direct.split_at(self.allocations.len());
+        self.drawn.clear();
+        self.drawn.extend(unusual.iter().zip(&self.allocations).map(|(s, a)| s.split(key, of(a).max(1), draw.index)));
+        let mut split = Split::new(key, of(&batch.usual), draw.index);
+        self.drawn.extend(usual.iter().map(|s| split.of(s)));
+        let n = self.drawn.len();
+        sampler::draw(level(), &self.drawn, self.samples.u.each_mut().map(|u| &mut u[..n]));
+    }
+
+    /// Leaves out the samples of rows that have fewer of them.
+    fn leave_out(&mut self, draw: Draw) {
+        for (i, allocation) in self.allocations.iter().enumerate() {
+            let draws = if draw.by_light { allocation.light_draws } else { allocation.bsdf_draws };
+            if draws <= draw.index {
+                self.samples.leave_out(i, draw.by_light);
+            }
+        }
+    }
+
+    /// The light that the light sample of a row is of.
+    fn light_of(&self, job: &RenderJob, row: usize) -> LightId {
+        job.lights.sampler.only_light().unwrap_or_else(|| self.scratch.chosen(row))
+    }
+
+    /// A light sample of each vertex, with its contribution.
+    fn sample_lights(&mut self, batch: &Batch<'_, '_>, rest: Option<&Rest<'_>>, index: u32) {
+        let Batch { job, techniques, vertices, .. } = *batch;
+        let (n, draw) = (vertices.len(), Draw { by_light: true, index });
+        self.draw(batch, draw);
+        let at = vertices.surface.lit_points();
+        job.lights.sample_many(n, at, &self.samples.u, &mut self.scratch, &mut self.samples.light);
+        self.leave_out(draw);
+        self.leave_out_glows(batch);
+
+        // Their values and the densities of BSDF sampling
+        let SampleColumns { light, bsdf: BsdfSamples { f_cos, pdf, .. }, .. } = &mut self.samples;
+        vertices.evaluate(&light.wi, f_cos, pdf);
+        if let Some(rest) = rest {
+            for i in (0..vertices.bsdfs.len()).filter(|&i| self.samples.light.is_far[i] == 0.0) {
+                let (n, wi) = (self.samples.light.n.vec3(i), self.samples.light.wi.vec3(i));
+                let left = if self.samples.light.pdf[i] > 0.0 { rest(i, self.light_of(job, i), n, wi) } else { 1.0 };
+                self.samples.bsdf.f_cos.set_rgb(i, self.samples.bsdf.f_cos.rgb(i) * left);
+            }
+        }
+        if techniques.is_light_alone() {
+            self.samples.bsdf.pdf[..n].fill(0.0);
+        }
+        for (p, is_delta) in self.samples.bsdf.pdf.iter_mut().zip(&self.samples.light.is_delta) {
+            *p = if *is_delta { 0.0 } else { *p };
+        }
+        self.weigh(batch, true);
+    }
+
+    /// Leaves out light samples of media where the path does not continue by its BSDF sample: near by, what media send out
+    /// would have no other technique, and the next segment finds it.
+    fn leave_out_glows(&mut self, batch: &Batch<'_, '_>) {
+        let Batch { job, techniques, vertices, .. } = *batch;
+        if !job.world.scene.media.is_emissive() {
+            return;
+        }
+        for i in 0..vertices.len() {
+            let is_glow = job.lights.medium_of(self.light_of(job, i)).is_some();
+            let is_by_path = techniques.are_by_path() && !vertices.bsdf(i).bsdf.is_only_evaluated();
+            if is_glow && !is_by_path {
+                self.samples.leave_out(i, true);
+            }
+        }
+    }
+
+    /// A BSDF sample of each vertex and the emitter in its direction, with its contribution. Returns the number of rays
+    /// among the emitters.
+    fn sample_bsdfs(&mut self, batch: &Batch<'_, '_>, index: u32) -> u64 {
+        let Batch { job, techniques, vertices, usual } = *batch;
+        let (n, draw) = (vertices.len(), Draw { by_light: false, index });
+        self.draw(batch, draw);
+        let SampleColumns { u, light, bsdf, .. } = &mut self.samples;
+        vertices.sample(u, bsdf);
+        std::mem::swap(&mut light.wi, &mut bsdf.wi);
+        let is_alone = techniques.is_light_alone();
+        for i in 0..n {
+            light.is_delta[i] = Lobe::of_flags(bsdf.lobe[i] as u8).is_specular();
+            let is_drawn = (light.is_delta[i] || !is_alone) && !bsdf.f_cos.rgb(i).is_black();
+            bsdf.pdf[i] = if is_drawn { bsdf.pdf[i] } else { 0.0 };
+        }
+        if usual.bsdf_draws <= index {
+            bsdf.pdf[self.allocations.len()..n].fill(0.0);
+        }
+        self.leave_out(draw);
+
+        self.samples.make_origins(&vertices.surface, batch.len());
+        let count = self.emitter_rays.find(job, vertices, &mut self.samples);
+        self.weigh(batch, false);
+        count
+    }
+
+    /// The contributions of the samples of one technique.
+    fn weigh(&mut self, batch: &Batch<'_, '_>, by_light: bool) {
+        let (len, Batch { techniques, usual, .. }) = (batch.len(), *batch);
+        let SampleColumns { light, bsdf: BsdfSamples { f_cos, pdf: p_bsdf, .. }, c, .. } = &mut self.samples;
+        let by = |a: &SampleAllocation| if by_light { [a.n_light, a.n_bsdf] } else { [a.n_bsdf, a.n_light] };
+        let [p, p_other] =
+            if by_light { [&light.pdf[..len], &p_bsdf[..len]] } else { [&p_bsdf[..len], &light.pdf[..len]] };
+        let [n, n_other] = by(&usual);
+        let (values, li, heuristic) = (f_cos.get(len), light.li.get(len), techniques.heuristic);
+        let samples = kernels::Samples { f_cos: values, li, p, p_other, n, n_other, heuristic };
+        kernels::weigh(level(), &samples, &mut c.get_mut(len));
+        for (i, allocation) in self.allocations.iter().enumerate().filter(|(_, a)| **a != usual) {
+            let [n, n_other] = by(allocation);
+            let value = f_cos.rgb(i) * light.li.rgb(i) * factor(heuristic, [n, p[i]], [n_other, p_other[i]]);
+            c.set_rgb(i, if p[i] > 0.0 && value.is_finite() { value } else { Rgb::BLACK });
+        }
+    }
+
+    /// Traces the segments of the samples that contribute, and adds the contributions of those that are visible. Returns when
+    /// tracing began; sampling did at `start`.
+    fn trace(
+        &mut self,
+        batch: &Batch<'_, '_>,
+        draw: Draw,
+        sinks: &mut Sinks<'_>,
+        (stats, start): (&mut DirectStats, Instant),
+    ) -> Instant {
+        let Batch { job, techniques, vertices, .. } = *batch;
+        // Without a weight, a light sample that an emitter hides has control variates of its own all the same
+        let hides = draw.by_light && techniques.has_controls && job.world.emitters_hide();
+        let is_traced = |samples: &SampleColumns, i: usize| {
+            !samples.c.rgb(i).is_black() || hides && samples.bsdf.pdf[i] > 0.0 && samples.has_integrand(i, true)
+        };
+        let (n, len) = (vertices.len(), batch.len());
+        self.samples.make_segments(&vertices.surface, len);
+        let rows = (0..n as u32).filter(|&i| is_traced(&self.samples, i as usize));
+        self.traced.gather(rows, &self.samples, len, &vertices.time);
+        let proposed = Instant::now();
+        self.occlude(batch, draw, stats);
+        let traced_at = Instant::now();
+
+        let ColumnStage { samples, traced, radiance, .. } = &mut *self;
+        for i in traced.visible() {
+            radiance.set_rgb(i, radiance.rgb(i) + samples.c.rgb(i));
+        }
+        if let Some(visible) = &mut sinks.visible {
+            for i in self.traced.visible() {
+                let light = if draw.by_light { Some(self.light_of(job, i)) } else { self.emitter_rays.lights[i] };
+                visible(i, light, self.samples.light.wi.vec3(i), self.samples.c.rgb(i));
+            }
+        }
+        if let Some(segments) = &mut sinks.segments {
+            segments.push(self.traced.rays.clone());
+        }
+        stats.t1 += proposed - start;
+        stats.t2 += traced_at - proposed;
+        stats.select += traced_at.elapsed();
+        proposed
+    }
+
+    /// Whether the segments are occluded. Contributions of those that may pass surfaces or media are multiplied by an
+    /// estimate of the transmittance: without surfaces to pass, segments that begin in empty space stay there.
+    fn occlude(&mut self, batch: &Batch<'_, '_>, draw: Draw, stats: &mut DirectStats) {
+        let Batch { job, vertices, .. } = *batch;
+        let Traced { rows, rays, occluded, crossing, crossing_rays } = &mut self.traced;
+        let crosses = |row: u32| job.shadows_pass() || vertices.media(row as usize) != Sides::default();
+        crossing.clear();
+        crossing.extend((0..rows.len() as u32).filter(|&k| crosses(rows[k as usize])));
+        if crossing.len() < rows.len() {
+            job.world.accel.occluded(rays, Coherence::Packets, occluded);
+            stats.segments += (rays.len() - crossing.len()) as u64;
+        } else {
+            occluded.clear();
+            occluded.resize(rays.len(), false);
+        }
+        if crossing.is_empty() {
+            return;
+        }
+        crossing_rays.clear();
+        crossing.iter().for_each(|&k| crossing_rays.push(&rays.get(k as usize)));
+        self.cross(batch, draw, stats);
+    }
+
+    /// Lets segments pass surfaces and media.
+    fn cross(&mut self, batch: &Batch<'_, '_>, draw: Draw, stats: &mut DirectStats) {
+        let Batch { job, vertices, .. } = *batch;
+        let mut crossing = std::mem::take(&mut self.crossing);
+        let row = |traced: &Traced, k: usize| traced.rows[traced.crossing[k] as usize] as usize;
+        let departure = |k: usize, d: Vec3| {
+            let i = row(&self.traced, k);
+            let lights_before = self.allocations.get(i).unwrap_or(&batch.usual).light_draws;
+            let (light, index) = if draw.by_light {
+                (self.light_of(job, i), draw.index)
+            } else {
+                (self.emitter_rays.lights[i].unwrap_or(NO_LIGHT), lights_before + draw.index)
+            };
+            let medium = vertices.media(i).towards(vertices.surface.n.vec3(i).dot(d));
+            Departure { light, medium, stream: vertices.direct[i].domain(domain::TRANSMITTANCE + index) }
+        };
+        crossing.start(job, &self.traced.crossing_rays, departure);
+        stats.segments += crossing.trace(job);
+        stats.collisions += crossing.collisions();
+        for (k, transmittance) in crossing.transmittance().enumerate() {
+            let (i, place) = (row(&self.traced, k), self.traced.crossing[k] as usize);
+            self.traced.occluded[place] = transmittance.is_black();
+            self.samples.c.set_rgb(i, self.samples.c.rgb(i) * transmittance);
+        }
+        self.crossing = crossing;
+    }
+}
+
+/// The factor w/(n·p) of a sample of the first technique, of which n and p are given.
+fn factor(heuristic: Heuristic, [n, p]: [f32; 2], [n_other, p_other]: [f32; 2]) -> f32 {
+    heuristic.factor(Technique { n, p }, Technique { n: n_other, p: p_other })
+}

@@ -1,0 +1,112 @@
+//! Columns of samples: one sample of a technique for each vertex, and the segments of those that are traced.
+
+use crate::accel::RayBatch;
+use crate::direct::vertices::{BsdfSamples, Surface};
+use crate::lights::many::LightSamples;
+use lumiris_lanes::columns::{Column, Columns3, reserve};
+use lumiris_lanes::level;
+use lumiris_lanes::vertex::{self as kernels, Ends, Rays};
+
+/// Samples of one technique, one for each vertex.
+#[derive(Debug, Default)]
+pub(super) struct SampleColumns {
+    pub(super) u: [Column; 3],
+    /// Directions and the light that comes along them, with the density of light sampling.
+    pub(super) light: LightSamples,
+    /// Values, and the density of BSDF sampling. The density of the technique is 0 where there is no sample, and the density of
+    /// the other one where only this one can draw it.
+    pub(super) bsdf: BsdfSamples,
+    /// Contributions.
+    pub(super) c: Columns3,
+    /// Rays.
+    pub(super) o: Columns3,
+    pub(super) d: Columns3,
+    pub(super) t_max: Column,
+}
+
+impl SampleColumns {
+    /// Lengthens the columns if they are shorter.
+    pub(super) fn reserve(&mut self, len: usize) {
+        let SampleColumns { u: [u0, u1, u2], light, bsdf, c, o, d, t_max } = self;
+        light.reserve(len);
+        bsdf.reserve(len);
+        [c, o, d].into_iter().for_each(|c| c.reserve(len));
+        reserve(&mut [u0, u1, u2, t_max], len);
+    }
+
+    /// True if sample `i`, of light or of BSDF sampling, has an unshadowed integrand f·|cos θ|·L that is not zero, whatever
+    /// its weight is.
+    #[inline]
+    pub(super) fn has_integrand(&self, i: usize, by_light: bool) -> bool {
+        let p = if by_light { self.light.pdf[i] } else { self.bsdf.pdf[i] };
+        (p > 0.0) & !(self.bsdf.f_cos.rgb(i) * self.light.li.rgb(i)).is_black()
+    }
+
+    /// Leaves out the sample of light or of BSDF sampling of a vertex.
+    #[inline]
+    pub(super) fn leave_out(&mut self, i: usize, by_light: bool) {
+        let p = if by_light { &mut self.light.pdf } else { &mut self.bsdf.pdf };
+        p[i] = 0.0;
+    }
+
+    /// Origins of rays that leave the first `len` vertices in the directions of the samples.
+    pub(super) fn make_origins(&mut self, from: &Surface, len: usize) {
+        kernels::origins(level(), &from.ends(len), self.light.wi.get(len), &mut self.o.get_mut(len));
+    }
+
+    /// Segments from the first `len` vertices to the ends of the samples.
+    pub(super) fn make_segments(&mut self, from: &Surface, len: usize) {
+        let SampleColumns { light, o, d, t_max, .. } = self;
+        let to = Ends { p: light.p.get(len), p_error: light.p_error.get(len), n: light.n.get(len) };
+        let mut rays = Rays { o: o.get_mut(len), d: d.get_mut(len), t_max: &mut t_max[..len] };
+        kernels::segments(level(), &from.ends(len), light.wi.get(len), &to, &light.is_far[..len], &mut rays);
+    }
+}
+
+/// Segments of the samples that are traced.
+#[derive(Debug, Default)]
+pub(super) struct Traced {
+    /// Rows of their vertices.
+    pub(super) rows: Vec<u32>,
+    pub(super) rays: RayBatch,
+    pub(super) occluded: Vec<bool>,
+    /// Which of them may pass surfaces or media, and copies of these.
+    pub(super) crossing: Vec<u32>,
+    /// See [`Self::crossing`].
+    pub(super) crossing_rays: RayBatch,
+}
+
+impl Traced {
+    /// Takes the segments of these rows, whose times are given.
+    pub(super) fn gather(
+        &mut self,
+        rows: impl Iterator<Item = u32>,
+        samples: &SampleColumns,
+        len: usize,
+        time: &[f32],
+    ) {
+        let Traced { rows: index, rays, .. } = self;
+        index.clear();
+        index.extend(rows);
+        rays.clear();
+        let ([ox, oy, oz], [dx, dy, dz]) = (samples.o.get(len), samples.d.get(len));
+        let columns = [
+            (&mut rays.ox, ox),
+            (&mut rays.oy, oy),
+            (&mut rays.oz, oz),
+            (&mut rays.dx, dx),
+            (&mut rays.dy, dy),
+            (&mut rays.dz, dz),
+            (&mut rays.t_max, &samples.t_max[..len]),
+            (&mut rays.time, time),
+        ];
+        for (to, from) in columns {
+            to.extend(index.iter().map(|&i| from[i as usize]));
+        }
+    }
+
+    /// Rows of the segments that are unoccluded.
+    pub(super) fn visible(&self) -> impl Iterator<Item = usize> {
+        self.rows.iter().zip(&self.occluded).filter(|(_, occluded)| !**occluded).map(|(&i, _)| i as usize)
+    }
+}

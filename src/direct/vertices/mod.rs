@@ -1,0 +1,419 @@
+//! The vertices of a batch of paths, in columns: row k of every column is vertex k.
+//!
+//! Rows come in runs of equal work ([`Run`]). The first ones have a [`SurfaceBsdf`] of their own, sorted by the kernel that
+//! evaluates them; all others reflect as Lambertian surfaces. Whatever is known of a vertex when it is added goes straight into
+//! the columns, but points of meshes in world space: their corners are collected, and one kernel determines the points of
+//! all of them at the end ([`Vertices::finish`]).
+
+mod scattering;
+
+pub use scattering::BsdfSamples;
+
+use super::point::{ShadingPoint, lobe_for_lights};
+use crate::bsdfs::{Bsdf, Diffuse};
+use crate::geometry::TriangleMesh;
+use crate::lights::many::LitPoints;
+use crate::lights::{GlossyLobe, LightSampling};
+use crate::materials::SurfaceBsdf;
+use crate::media::Sides;
+use crate::settings::SampleCounts;
+use lumiris_lanes::columns::{Column, Columns3, padded, reserve};
+use lumiris_lanes::kernels::{Kernel, MAX_PARAMS};
+use lumiris_lanes::lane::LANES;
+use lumiris_lanes::level;
+use lumiris_lanes::vertex::{self as kernels, Ends, Lambertian, Points, TriangleHits};
+use lumiris_numbers::math::{Frame, Rgb, Vec3};
+use lumiris_numbers::samplers::SampleStream;
+use std::ops::Range;
+
+/// The vertices of a batch, at most one per path.
+#[derive(Debug, Default)]
+pub struct Vertices<'w> {
+    /// Index of the path of each.
+    pub path: Vec<u32>,
+    /// Time (0 to 1).
+    pub time: Vec<f32>,
+    /// Random numbers of the vertices, and of their direct light.
+    pub streams: Vec<SampleStream>,
+    /// See [`Self::streams`].
+    pub direct: Vec<SampleStream>,
+    /// Points, and Lambertian reflection there.
+    pub surface: Surface,
+    /// BSDFs of the first rows; all later rows are Lambertian.
+    pub bsdfs: Vec<SurfaceBsdf<'w>>,
+    /// The runs of these.
+    runs: Vec<Run>,
+    /// Parameters of their kernels.
+    params: [Column; MAX_PARAMS],
+    /// x of their shading frames.
+    tangents: Columns3,
+    /// Media of the first rows; around all others, rays stay in empty space.
+    media: Vec<Sides>,
+    first_plain: usize,
+    /// Vertices that have not got their rows yet.
+    singles: Vec<Single<'w>>,
+    plain: Vec<Plain>,
+    /// Corners of the plain ones, as many at a time as lanes.
+    hits: Vec<TriangleHits>,
+}
+
+/// Rows that are evaluated together.
+#[derive(Clone, Debug)]
+struct Run {
+    /// What evaluates them; `None`: one by one.
+    kernel: Option<Kernel>,
+    rows: Range<usize>,
+}
+
+/// Points of surfaces, and Lambertian reflection there.
+#[derive(Debug, Default)]
+pub struct Surface {
+    /// Points.
+    pub p: Columns3,
+    /// Bounds of their rounding errors.
+    pub p_error: Columns3,
+    /// Geometric normals; zero where there is no surface.
+    pub n: Columns3,
+    /// The normal on the side that is lit; zero if both are.
+    pub lit: Columns3,
+    /// Shading normals.
+    pub ns: Columns3,
+    /// Unit directions to the viewer.
+    pub wo: Columns3,
+    /// Reflectance; black where the BSDF is another.
+    pub rho: Columns3,
+    /// Lobes that lights are chosen by; none if no choice depends on them.
+    pub lobes: Vec<GlossyLobe>,
+}
+
+/// What a path brings to its vertex.
+#[derive(Clone, Copy, Debug)]
+pub struct Arrival {
+    /// Index of the path.
+    pub path: u32,
+    /// Time (0 to 1).
+    pub time: f32,
+    /// Random numbers of the vertex, and of its direct light.
+    pub streams: [SampleStream; 2],
+}
+
+/// A vertex that is determined by itself.
+#[derive(Clone, Copy, Debug)]
+pub struct Single<'w> {
+    /// How it was reached.
+    pub arrival: Arrival,
+    /// The point.
+    pub p: Vec3,
+    /// Bound of its rounding error.
+    pub p_error: Vec3,
+    /// Direction to the viewer, unit.
+    pub wo: Vec3,
+    /// Scattering.
+    pub bsdf: SurfaceBsdf<'w>,
+    /// What rays that leave it go through.
+    pub media: Sides,
+}
+
+/// A vertex on a mesh in world space, whose point is found by a kernel.
+#[derive(Clone, Copy, Debug)]
+struct Plain {
+    arrival: Arrival,
+    rho: Rgb,
+}
+
+impl Single<'_> {
+    /// True if all that direct light and the path need to know of it is in the columns of a Lambertian row.
+    fn is_lambertian(&self) -> bool {
+        matches!(self.bsdf.bsdf, Bsdf::Diffuse(_)) && self.media == Sides::default()
+    }
+}
+
+impl<'w> Vertices<'w> {
+    /// Without vertices, in the memory of `old`, whose vertices may be of another scene.
+    pub fn emptied(mut old: Vertices<'_>) -> Self {
+        old.clear();
+        let (bsdfs, singles) =
+            (in_memory_of(std::mem::take(&mut old.bsdfs)), in_memory_of(std::mem::take(&mut old.singles)));
+        let Vertices { path, time, streams, direct, surface, runs, params, tangents, media, .. } = old;
+        let (first_plain, plain, hits) = (0, old.plain, old.hits);
+        Vertices {
+            path,
+            time,
+            streams,
+            direct,
+            surface,
+            bsdfs,
+            runs,
+            params,
+            tangents,
+            media,
+            first_plain,
+            singles,
+            plain,
+            hits,
+        }
+    }
+
+    /// Removes all vertices.
+    pub fn clear(&mut self) {
+        self.path.clear();
+        self.time.clear();
+        self.streams.clear();
+        self.direct.clear();
+        self.surface.lobes.clear();
+        self.bsdfs.clear();
+        self.runs.clear();
+        self.media.clear();
+        self.first_plain = 0;
+        self.singles.clear();
+        self.plain.clear();
+    }
+
+    /// Number of rows.
+    pub fn len(&self) -> usize {
+        self.path.len()
+    }
+
+    /// True if there is none.
+    pub fn is_empty(&self) -> bool {
+        self.path.is_empty()
+    }
+
+    /// The rows that are evaluated one by one; all others are Lambertian.
+    pub fn singles(&self) -> Range<usize> {
+        0..self.bsdfs.len()
+    }
+
+    /// The rows on plain meshes, which are the last ones.
+    pub fn plain(&self) -> Range<usize> {
+        self.first_plain..self.len()
+    }
+
+    /// Adds a vertex that is determined already.
+    #[inline]
+    pub fn push(&mut self, vertex: Single<'w>) {
+        self.singles.push(vertex);
+    }
+
+    /// Adds the vertex where a ray of direction `d` has met a mesh in world space that reflects `rho` everywhere: at the
+    /// point of `triangle` with the weights `uv` of the second and the third corner.
+    #[inline]
+    pub fn push_plain(
+        &mut self,
+        arrival: Arrival,
+        (mesh, triangle, uv): (&TriangleMesh, u32, [f32; 2]),
+        d: Vec3,
+        rho: Rgb,
+    ) {
+        let (block, k) = (self.plain.len() / LANES, self.plain.len() % LANES);
+        if block == self.hits.len() {
+            self.hits.push(TriangleHits::default());
+        }
+        let hits = &mut self.hits[block];
+        let vertices = mesh.indices[triangle as usize];
+        for (rows, p) in hits.corners.iter_mut().zip(mesh.corners(vertices)) {
+            set_lane(rows, k, p);
+        }
+        if mesh.normals.is_empty() {
+            hits.normals.iter_mut().for_each(|rows| set_lane(rows, k, Vec3::ZERO));
+        } else {
+            for (rows, v) in hits.normals.iter_mut().zip(vertices) {
+                set_lane(rows, k, mesh.normals[v as usize]);
+            }
+        }
+        [hits.b[0][k], hits.b[1][k]] = uv;
+        hits.orientation[k] = if mesh.flip_normal { -1.0 } else { 1.0 };
+        set_lane(&mut hits.d, k, d);
+        self.plain.push(Plain { arrival, rho });
+    }
+
+    /// Gives all vertices that were added their rows: those with BSDFs of their own first.
+    pub fn finish(&mut self, lights: &LightSampling) {
+        let (singles, plain) = (std::mem::take(&mut self.singles), std::mem::take(&mut self.plain));
+        // The kernel writes whole vectors from the first plain row on
+        self.surface.reserve(padded(singles.len() + padded(plain.len())));
+        self.add_runs(&singles);
+        singles.iter().filter(|single| single.is_lambertian()).for_each(|single| self.add_single(single));
+        self.add_plain(&plain);
+        self.find_lobes(lights);
+        (self.singles, self.plain) = (singles, plain);
+        self.singles.clear();
+        self.plain.clear();
+    }
+
+    #[inline]
+    fn add_row(&mut self, arrival: &Arrival) -> usize {
+        self.path.push(arrival.path);
+        self.time.push(arrival.time);
+        self.streams.push(arrival.streams[0]);
+        self.direct.push(arrival.streams[1]);
+        self.path.len() - 1
+    }
+
+    /// Adds the rows that have BSDFs of their own, kernel by kernel.
+    fn add_runs(&mut self, singles: &[Single<'w>]) {
+        let kernel = |single: &Single<'w>| if single.is_lambertian() { None } else { Some(single.bsdf.bsdf.kernel()) };
+        let mut kinds: Vec<Option<Kernel>> = Vec::new();
+        for kind in singles.iter().filter_map(kernel) {
+            if !kinds.contains(&kind) {
+                kinds.push(kind);
+            }
+        }
+        kinds.sort_by_key(|kind| kind.map(|kernel| kernel as u32));
+        for kind in kinds {
+            let first = self.len();
+            for single in singles.iter().filter(|single| kernel(single) == Some(kind)) {
+                self.bsdfs.push(single.bsdf);
+                self.media.push(single.media);
+                self.add_single(single);
+            }
+            self.runs.push(Run { kernel: kind, rows: first..self.len() });
+        }
+        self.set_params();
+    }
+
+    /// The parameters of kernels.
+    fn set_params(&mut self) {
+        let len = padded(self.bsdfs.len());
+        self.tangents.reserve(len);
+        for Run { kernel, rows } in &self.runs {
+            let Some(kernel) = kernel else { continue };
+            let columns = &mut self.params[..kernel.params()];
+            columns.iter_mut().for_each(|column| reserve(&mut [column], len));
+            for i in rows.clone() {
+                let SurfaceBsdf { bsdf, frame, .. } = &self.bsdfs[i];
+                self.tangents.set(i, frame.x);
+                columns.iter_mut().zip(bsdf.params()).for_each(|(column, param)| column[i] = param);
+            }
+        }
+    }
+
+    fn add_single(&mut self, single: &Single<'_>) {
+        let i = self.add_row(&single.arrival);
+        let Single { p, p_error, wo, bsdf, .. } = single;
+        let has_surface = bsdf.bsdf.has_surface();
+        let s = &mut self.surface;
+        s.p.set(i, *p);
+        s.p_error.set(i, *p_error);
+        s.n.set(i, bsdf.n);
+        s.lit.set(i, if has_surface { bsdf.lit_normal(*wo) } else { Vec3::ZERO });
+        s.ns.set(i, if has_surface { bsdf.frame.z } else { Vec3::ZERO });
+        s.wo.set(i, *wo);
+        let Bsdf::Diffuse(Diffuse { reflectance }) = bsdf.bsdf else { return s.rho.set_rgb(i, Rgb::BLACK) };
+        s.rho.set_rgb(i, reflectance);
+    }
+
+    fn add_plain(&mut self, plain: &[Plain]) {
+        let (first, len) = (self.len(), padded(plain.len()));
+        self.first_plain = first;
+        for vertex in plain {
+            let i = self.add_row(&vertex.arrival);
+            self.surface.rho.set_rgb(i, vertex.rho);
+        }
+        let Surface { p, p_error, n, lit, ns, wo, .. } = &mut self.surface;
+        let [p, p_error, n, facing, ns, wo] =
+            [p, p_error, n, lit, ns, wo].map(|c| c.get_mut(first + len).map(|c| &mut c[first..]));
+        kernels::points(level(), &self.hits[..len / LANES], &mut Points { p, p_error, n, facing, ns, wo });
+    }
+
+    /// The lobes that lights are chosen by.
+    fn find_lobes(&mut self, lights: &LightSampling) {
+        let lobes = &mut self.surface.lobes;
+        lobes.clear();
+        if lights.sampler.needs_lobes() && !self.bsdfs.is_empty() {
+            let wo = &self.surface.wo;
+            lobes.extend(self.bsdfs.iter().enumerate().map(|(i, bsdf)| lobe_for_lights(lights, bsdf, wo.vec3(i))));
+            lobes.resize(self.path.len(), GlossyLobe::NONE);
+        }
+    }
+
+    /// The scattering of a row.
+    #[inline]
+    pub fn bsdf(&self, i: usize) -> SurfaceBsdf<'w> {
+        if let Some(bsdf) = self.bsdfs.get(i) {
+            return *bsdf;
+        }
+        SurfaceBsdf {
+            bsdf: Bsdf::Diffuse(Diffuse { reflectance: self.surface.rho.rgb(i) }),
+            frame: Frame::from_z(self.surface.ns.vec3(i)),
+            n: self.surface.n.vec3(i),
+            makes_caustics: false,
+        }
+    }
+
+    /// What rays that leave a row go through.
+    #[inline]
+    pub fn media(&self, i: usize) -> Sides {
+        self.media.get(i).copied().unwrap_or_default()
+    }
+
+    /// A row by itself, with these counts of samples and the fit of index `fit`; `sample` is its camera sample.
+    pub fn point(&self, i: usize, sample_counts: SampleCounts, [sample, fit]: [u32; 2]) -> ShadingPoint<'w> {
+        ShadingPoint {
+            p: self.surface.p.vec3(i),
+            p_error: self.surface.p_error.vec3(i),
+            wo: self.surface.wo.vec3(i),
+            bsdf: self.bsdf(i),
+            lobe: self.surface.lit_points().get(i).lobe,
+            time: self.time[i],
+            stream: self.direct[i],
+            sample_counts,
+            fit,
+            sample,
+            media: self.media(i),
+        }
+    }
+
+    /// Adds the rows of other vertices that `bsdf` has an answer for, with this BSDF.
+    pub fn select(
+        &mut self,
+        other: &Vertices<'w>,
+        lights: &LightSampling,
+        bsdf: impl Fn(usize) -> Option<SurfaceBsdf<'w>>,
+    ) {
+        for i in 0..other.len() {
+            let Some(bsdf) = bsdf(i) else { continue };
+            let streams = [other.streams[i], other.direct[i]];
+            let arrival = Arrival { path: other.path[i], time: other.time[i], streams };
+            let s = &other.surface;
+            let (p, p_error, wo) = (s.p.vec3(i), s.p_error.vec3(i), s.wo.vec3(i));
+            self.push(Single { arrival, p, p_error, wo, bsdf, media: other.media(i) });
+        }
+        self.finish(lights);
+    }
+}
+
+impl Surface {
+    fn reserve(&mut self, len: usize) {
+        let Surface { p, p_error, n, lit, ns, wo, rho, lobes: _ } = self;
+        [p, p_error, n, lit, ns, wo, rho].into_iter().for_each(|c| c.reserve(len));
+    }
+
+    /// The points, for the choice of lights.
+    pub fn lit_points(&self) -> LitPoints<'_> {
+        LitPoints { p: &self.p, n: &self.lit, ns: &self.ns, lobes: &self.lobes }
+    }
+
+    /// Lambertian reflection of the first `len` rows.
+    pub fn lambertian(&self, len: usize) -> Lambertian<'_> {
+        Lambertian { rho: self.rho.get(len), ns: self.ns.get(len), wo: self.wo.get(len) }
+    }
+
+    /// The first `len` points, as ends of segments.
+    pub fn ends(&self, len: usize) -> Ends<'_> {
+        Ends { p: self.p.get(len), p_error: self.p_error.get(len), n: self.n.get(len) }
+    }
+}
+
+/// Sets a vector of a lane.
+#[inline]
+fn set_lane(rows: &mut [[f32; LANES]; 3], k: usize, v: Vec3) {
+    (rows[0][k], rows[1][k], rows[2][k]) = v.into();
+}
+
+/// An empty vector in the memory of `old`, whose items have the same layout and may borrow from something else.
+fn in_memory_of<T, U>(mut old: Vec<T>) -> Vec<U> {
+    const { assert!(size_of::<T>() == size_of::<U>() && align_of::<T>() == align_of::<U>()) };
+    old.clear();
+    old.into_iter().map(|_| unreachable!("the vector is empty")).collect()
+}

@@ -1,0 +1,135 @@
+//! From vertices to the next segments of their paths, by BSDF sampling.
+
+use super::segment::{BsdfTechnique, PathState, domain, survive};
+use crate::bsdfs::Lobe;
+use crate::direct::vertices::BsdfSamples;
+use crate::direct::{Techniques, Vertices};
+use crate::settings::IntegratorSettings;
+use lumiris_lanes::columns::{Column, Columns3, padded, reserve};
+use lumiris_lanes::vertex as kernels;
+use lumiris_lanes::{level, sampler};
+use lumiris_numbers::math::{Ray, Rgb, Vec3};
+use lumiris_numbers::samplers::{Domain, SampleStream};
+
+/// Directions of a batch; holds the buffers of one worker.
+#[derive(Debug, Default)]
+pub(super) struct Scatter {
+    drawn: Vec<SampleStream>,
+    u: [Column; 3],
+    samples: BsdfSamples,
+    o: Columns3,
+}
+
+/// How paths continue.
+pub(super) struct Continuation<'a> {
+    pub(super) settings: &'a IntegratorSettings,
+    /// Index of the vertices along their paths.
+    pub(super) vertex: u32,
+    /// The samples of direct light there, of which that of the BSDF may be the next segment.
+    pub(super) techniques: Option<Techniques>,
+    /// Only by specular lobes.
+    pub(super) only_specular: bool,
+}
+
+/// A direction in which a path continues.
+struct Direction {
+    /// Origin of the ray.
+    o: Vec3,
+    wi: Vec3,
+    /// Factor of the throughput.
+    weight: Rgb,
+    /// Relative index of refraction.
+    eta: f32,
+    /// Density; `None` if no other technique can draw the direction, or the density is unknown.
+    pdf: Option<f32>,
+    /// The segment looks for the emitter as the BSDF sample of direct light.
+    by_path: bool,
+}
+
+impl Scatter {
+    /// Adds the next segments of the paths at the vertices to `next`.
+    pub(super) fn extend(
+        &mut self,
+        how: &Continuation<'_>,
+        vertices: &Vertices<'_>,
+        paths: &[PathState],
+        next: &mut Vec<PathState>,
+    ) {
+        self.draw(vertices);
+        let len = padded(vertices.len());
+        self.samples.reserve(len);
+        self.o.reserve(len);
+        vertices.sample(&self.u, &mut self.samples);
+        self.resample(how, vertices);
+        let BsdfSamples { wi, f_cos, pdf, lobe, eta } = &self.samples;
+        kernels::origins(level(), &vertices.surface.ends(len), wi.get(len), &mut self.o.get_mut(len));
+        for i in (0..vertices.len()).filter(|&i| pdf[i] > 0.0) {
+            let is_resampled = i < vertices.bsdfs.len() && vertices.bsdfs[i].bsdf.is_only_evaluated();
+            let lobe = Lobe::of_flags(lobe[i] as u8);
+            if how.only_specular && !lobe.is_specular() {
+                continue;
+            }
+            let direction = Direction {
+                o: self.o.vec3(i),
+                wi: wi.vec3(i),
+                weight: f_cos.rgb(i) / pdf[i],
+                eta: eta[i],
+                pdf: (!is_resampled && !lobe.is_specular()).then_some(pdf[i]),
+                by_path: !is_resampled && how.techniques.is_some_and(|techniques| techniques.are_by_path()),
+            };
+            next.extend(how.segment(vertices, i, &paths[vertices.path[i] as usize], &direction));
+        }
+    }
+
+    /// Directions at vertices whose BSDFs can only be evaluated, by resampling M proposals.
+    fn resample(&mut self, how: &Continuation<'_>, vertices: &Vertices<'_>) {
+        for (i, bsdf) in vertices.bsdfs.iter().enumerate().filter(|(_, bsdf)| bsdf.bsdf.is_only_evaluated()) {
+            let (stream, count) = (&vertices.streams[i], how.settings.bsdf_proposals.max(1));
+            let proposal = |k| stream.split(domain::BSDF, count, k).draw::<3>();
+            let [u_choice] = stream.domain(domain::RESAMPLE).draw::<1>();
+            let BsdfSamples { wi, f_cos, pdf, lobe, eta } = &mut self.samples;
+            pdf[i] = 0.0;
+            let Some(r) = bsdf.resample(vertices.surface.wo.vec3(i), count, proposal, u_choice) else { continue };
+            wi.set(i, r.wi);
+            f_cos.set_rgb(i, r.f * (bsdf.cos(r.wi) * r.weight));
+            (pdf[i], lobe[i], eta[i]) = (1.0, f32::from(r.lobe.flags()), r.eta);
+        }
+    }
+
+    /// Draws three numbers for each vertex.
+    fn draw(&mut self, vertices: &Vertices<'_>) {
+        let (n, len) = (vertices.len(), padded(vertices.len()));
+        reserve(&mut self.u.each_mut(), len);
+        self.drawn.clear();
+        let mut numbers = Domain::new(domain::BSDF);
+        self.drawn.extend(vertices.streams.iter().map(|stream| numbers.of(stream)));
+        sampler::draw(level(), &self.drawn, self.u.each_mut().map(|u| &mut u[..n]));
+    }
+}
+
+impl Continuation<'_> {
+    /// The segment in a direction; `None` if it carries no light, or roulette ends the path. Roulette ends a segment that
+    /// looks for an emitter only behind that.
+    #[inline]
+    fn segment(&self, vertices: &Vertices<'_>, row: usize, path: &PathState, to: &Direction) -> Option<PathState> {
+        let beta = path.beta * to.weight;
+        let eta_scale = path.eta_scale * to.eta * to.eta;
+        if beta.is_black() || !beta.is_finite() {
+            return None;
+        }
+        let survivor = survive(beta, eta_scale, &vertices.streams[row], self.vertex + 1, self.settings);
+        let n = vertices.surface.n.vec3(row);
+        let chain = if path.chain.is_caustic() { path.chain } else { path.chain.beyond_first(to.pdf, n.dot(to.wi)) };
+        Some(PathState {
+            ray: Ray { o: to.o, d: to.wi, t_max: f32::INFINITY, ..path.ray },
+            beta: if to.by_path { beta } else { survivor? },
+            eta_scale,
+            passed: 0,
+            travelled: 0.0,
+            technique: to.by_path.then_some(BsdfTechnique { row: row as u32, pdf: to.pdf, survivor }),
+            medium: vertices.media(row).towards(n.dot(to.wi)),
+            chain,
+            ..*path
+        })
+    }
+}
