@@ -111,20 +111,6 @@ impl Bsdf<'_> {
 
     /// The tables of its kernel; those of all coats of a scene are the same.
     pub fn tables(&self) -> &[f32] {
-        match self {
-            Bsdf::CoatedDiffuse(b) => b.tables(),
-            Bsdf::Diffuse(_)
-            | Bsdf::DiffuseTransmission(_)
-            | Bsdf::Conductor(_)
-            | Bsdf::Dielectric(_)
-            | Bsdf::Exit(_)
-            | Bsdf::ThinDielectric(_)
-            | Bsdf::Layered(_)
-            | Bsdf::Principled(_)
-            | Bsdf::Hair(_)
-            | Bsdf::Measured(_)
-            | Bsdf::Evaluated(_)
-            | Bsdf::Phase(_) => &[],
-        }
+        if let Bsdf::CoatedDiffuse(b) = self { b.tables() } else { &[] }
     }
 }

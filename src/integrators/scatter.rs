@@ -59,7 +59,7 @@ impl Scatter {
         let len = padded(vertices.len());
         self.samples.reserve(len);
         self.o.reserve(len);
-        vertices.sample(&self.u, &mut self.samples);
+        vertices.sample(vertices.len(), &self.u, &mut self.samples);
         self.resample(how, vertices);
         let BsdfSamples { wi, f_cos, pdf, lobe, eta } = &self.samples;
         kernels::origins(level(), &vertices.surface.ends(len), wi.get(len), &mut self.o.get_mut(len));

@@ -65,6 +65,23 @@ pub struct LookupStats {
 }
 
 impl PathStats {
+    /// The times of the stages of tracing, which do not overlap.
+    pub fn stages(&self) -> [(&'static str, Duration); 6] {
+        [
+            ("camera_rays", self.camera_time),
+            ("bounce_rays", self.bounce_time),
+            ("shade", self.shade_time),
+            ("t1_propose", self.direct.t1),
+            ("select_resolve", self.direct.select),
+            ("t2_trace", self.direct.t2),
+        ]
+    }
+
+    /// The part of the time `tracing` that no stage has.
+    pub fn beside_stages(&self, tracing: Duration) -> Duration {
+        tracing.saturating_sub(self.stages().iter().map(|(_, time)| *time).sum())
+    }
+
     /// Adds the counts of another worker.
     pub fn merge(&mut self, other: &PathStats) {
         self.camera_rays += other.camera_rays;

@@ -57,19 +57,11 @@ impl WorkerTimes {
 
     /// The phases of workers with these statistics. What tracing takes beside its stages is the time of `paths`.
     pub(super) fn phases(&self, stats: &PathStats) -> Vec<Phase> {
-        let direct = &stats.direct;
-        let stages = [
-            ("camera_rays", stats.camera_time),
-            ("bounce_rays", stats.bounce_time),
-            ("shade", stats.shade_time),
-            ("t1_propose", direct.t1),
-            ("select_resolve", direct.select),
-            ("t2_trace", direct.t2),
-        ];
-        let paths = self.tracing.saturating_sub(stages.iter().map(|(_, time)| *time).sum());
+        let paths = stats.beside_stages(self.tracing);
         let others = [("paths", paths), ("camera_samples", self.camera_samples), ("film", self.film)];
         let scale = self.processor.as_secs_f64() / self.all.as_secs_f64().max(1e-9);
-        let of_tiles = stages.into_iter().chain(others).map(|(name, time)| Phase { name, time: time.mul_f64(scale) });
+        let of_tiles =
+            stats.stages().into_iter().chain(others).map(|(name, time)| Phase { name, time: time.mul_f64(scale) });
         of_tiles.chain([Phase { name: "noise", time: self.noise }]).collect()
     }
 }

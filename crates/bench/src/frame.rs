@@ -151,26 +151,18 @@ pub fn measure_frame(job: &RenderJob, tile_size: u32, rays: usize, turns: u32) -
         name,
         ns_per_camera_sample: median(stats.iter().map(|(stats, times)| per_sample(of(stats, times)))),
     };
-    let paths = |s: &PathStats, times: &Times| {
-        let direct = s.direct.t1 + s.direct.select + s.direct.t2;
-        times.tracing.saturating_sub(s.camera_time + s.bounce_time + s.shade_time + direct)
-    };
+    let mut stages = vec![stage("camera_samples", &|_, times| times.camera_samples)];
+    stages.extend(
+        PathStats::default().stages().iter().enumerate().map(|(i, (name, _))| stage(name, &|s, _| s.stages()[i].1)),
+    );
+    stages.push(stage("paths", &|s, times| s.beside_stages(times.tracing)));
+    stages.push(stage("film", &|_, times| times.film));
     Ok(FrameReport {
         camera_samples,
         ns_per_camera_sample: ours,
         bare_trace_ns_per_camera_sample: traced,
         tracing_share: traced / ours,
-        stages: vec![
-            stage("camera_samples", &|_, times| times.camera_samples),
-            stage("camera_rays", &|s, _| s.camera_time),
-            stage("bounce_rays", &|s, _| s.bounce_time),
-            stage("shade", &|s, _| s.shade_time),
-            stage("t1_propose", &|s, _| s.direct.t1),
-            stage("select_resolve", &|s, _| s.direct.select),
-            stage("t2_trace", &|s, _| s.direct.t2),
-            stage("paths", &paths),
-            stage("film", &|_, times| times.film),
-        ],
+        stages,
         rays: kinds
             .iter()
             .zip(&of_kinds)

@@ -1,20 +1,16 @@
-//! Vertices of many paths at once, in columns: the point that a ray met on a triangle, Lambertian reflection, the
-//! weights of light samples, and shadow segments.
+//! Vertices of many paths at once, in columns: the point that a ray met on a triangle, the weights of light samples, and
+//! shadow segments.
 //!
-//! The formulas are those of the modules `geometry::mesh`, `bsdfs::diffuse` and `direct` for single vertices.
+//! The formulas are those of the modules `geometry::mesh` and `direct` for single vertices.
 //! Columns have one length, a multiple of [`LANES`].
 
-use super::kernels::{self, Kernel, Rows, Values};
 pub use super::lane::{Columns3, ColumnsMut3};
-use super::lane::{F, I, LANES, M, Vec3s, load, narrowed, or_zero, safe_sqrt, store, widened};
+use super::lane::{F, I, LANES, M, Vec3s, load, narrowed, or_zero, store, widened};
 use super::wide::Wide;
 use fearless_simd::{Level, Simd, dispatch, f64x8, prelude::*};
 use lumiris_numbers::estimators::mis::Heuristic;
-use lumiris_numbers::math::elementary::concentric_disk;
 use lumiris_numbers::math::gamma;
 use lumiris_numbers::math::ray::{COINCIDENCE, SEGMENT_END};
-use lumiris_numbers::math::v3::V3;
-use std::f32::consts::FRAC_1_PI;
 
 /// Hits of [`LANES`] triangles: `[axis][lane]` of vectors.
 #[derive(Clone, Copy, Debug, Default)]
@@ -126,51 +122,6 @@ fn point_and_normal<S: Simd>(corners: [Vec3s<S>; 3], b1: F<S>, b2: F<S>) -> (Vec
         Vec3s { x: narrowed(p[0]), y: narrowed(p[1]), z: narrowed(p[2]) },
         Vec3s { x: narrowed(n[0]), y: narrowed(n[1]), z: narrowed(n[2]) },
     )
-}
-
-/// What Lambertian vertices have in common.
-#[derive(Clone, Copy, Debug)]
-pub struct Lambertian<'a> {
-    /// Reflectance.
-    pub rho: Columns3<'a>,
-    /// Shading normals.
-    pub ns: Columns3<'a>,
-    /// Unit directions to the viewer.
-    pub wo: Columns3<'a>,
-}
-
-/// f·|cos θ| (1/sr) and the density of sampling by the cosine (1/sr) for the directions `wi`.
-pub fn evaluate_lambertian(
-    level: Level,
-    at: &Lambertian<'_>,
-    wi: Columns3<'_>,
-    f_cos: &mut ColumnsMut3<'_>,
-    pdf: &mut [f32],
-) {
-    let rows = Rows { params: &at.rho, tables: &[], ns: at.ns, tangents: None, wo: at.wo };
-    let f_cos = f_cos.each_mut().map(|channel| &mut **channel);
-    kernels::evaluate(level, Kernel::Diffuse, &rows, wi, &mut Values { f_cos, pdf });
-}
-
-/// Directions by the cosine on the side of `wo`, with their densities (1/sr); 0 where there is none.
-pub fn sample_lambertian(level: Level, at: &Lambertian<'_>, u: [&[f32]; 2], wi: &mut ColumnsMut3<'_>, pdf: &mut [f32]) {
-    dispatch!(level, simd => sample_lanes(simd, at, u, wi, pdf));
-}
-
-#[inline(always)]
-fn sample_lanes<S: Simd>(simd: S, at: &Lambertian<'_>, u: [&[f32]; 2], wi: &mut ColumnsMut3<'_>, pdf: &mut [f32]) {
-    let (zero, one) = (F::splat(simd, 0.0), F::splat(simd, 1.0));
-    for i in (0..pdf.len()).step_by(LANES) {
-        let (Wide(dx), Wide(dy)) = concentric_disk([Wide(load(simd, u[0], i)), Wide(load(simd, u[1], i))]);
-        let z = safe_sqrt(one - dx * dx - dy * dy);
-        let ns = Vec3s::load(simd, at.ns, i);
-        let cos_o = ns.dot(Vec3s::load(simd, at.wo, i));
-        let (tx, ty) = V3::from(ns).tangents();
-        let (tx, ty) = (Vec3s::from(tx), Vec3s::from(ty));
-        let w = tx.times(dx).plus(ty.times(dy)).plus(ns.times(z.copysign(cos_o)));
-        store(or_zero(cos_o.simd_ne(zero), z * FRAC_1_PI), pdf, i);
-        w.store(wi, i);
-    }
 }
 
 /// Samples of one technique, and the density of another one at them.

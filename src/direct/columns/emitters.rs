@@ -25,10 +25,15 @@ pub(super) struct EmitterRays {
 }
 
 impl EmitterRays {
-    /// Looks up what the BSDF samples of the vertices point at; those that point at nothing get the density 0. Returns the
+    /// Looks up what the BSDF samples of the first `n` vertices point at; those that point at nothing get the density 0. Returns the
     /// number of rays among the emitters.
-    pub(super) fn find(&mut self, job: &RenderJob, vertices: &Vertices<'_>, samples: &mut SampleColumns) -> u64 {
-        let (n, len) = (vertices.len(), padded(vertices.len()));
+    pub(super) fn find(
+        &mut self,
+        job: &RenderJob,
+        (vertices, n): (&Vertices<'_>, usize),
+        samples: &mut SampleColumns,
+    ) -> u64 {
+        let len = padded(n);
         let EmitterRays { rows, rays, scratch, emitter_hits, lights, far } = self;
         let (at, time) = (vertices.surface.lit_points(), &vertices.time);
         lights.clear();

@@ -6,9 +6,9 @@
 //!          └BSDF samples──▶ emitters among which they are looked up ─▶ f·cos, weights ─segments─▶ T2 ─▶ radiance
 //! ```
 //!
-//! Each step is a loop over all vertices, for one sample of each. Lambertian rows are evaluated by kernels, all others one by
-//! one into the same columns. A few rows have other numbers of samples than most: where all lobes are specular, light
-//! samples are of no use, and where the path cannot continue by a BSDF sample, its own are drawn.
+//! Each step is a loop over rows, for one sample of each. The first rows may have other numbers of samples than most: where all
+//! lobes are specular, light samples are of no use, and where the path cannot continue by a BSDF sample, its own are drawn.
+//! Samples beyond those of most rows are made for the first rows only.
 //!
 //! Reading order: [`techniques`] (how many samples), [`samples`] (columns), [`emitters`] (what BSDF samples point at),
 //! [`controls`] (control variates, for `ocv`); this file goes through the steps.
@@ -83,6 +83,10 @@ struct Draw {
     by_light: bool,
     /// Its number among the samples of the technique.
     index: u32,
+    /// The first rows, which have so many samples: all, or those with other numbers than most.
+    rows: usize,
+    /// Most rows have so many.
+    is_usual: bool,
 }
 
 /// What all steps read.
@@ -96,9 +100,11 @@ struct Batch<'a, 'w> {
 }
 
 impl Batch<'_, '_> {
-    /// Length of the columns.
-    fn len(&self) -> usize {
-        padded(self.vertices.len())
+    /// A sample of the rows that have so many; `unusual` rows have other numbers than most.
+    fn draw(&self, by_light: bool, index: u32, unusual: usize) -> Draw {
+        let usual = if by_light { self.usual.light_draws } else { self.usual.bsdf_draws };
+        let is_usual = index < usual;
+        Draw { by_light, index, rows: if is_usual { self.vertices.len() } else { unusual }, is_usual }
     }
 }
 
@@ -132,27 +138,25 @@ impl ColumnStage {
         stats.select += start.elapsed();
         for index in 0..light {
             let start = Instant::now();
-            self.sample_lights(&batch, sinks.rest, index);
-            let proposed = self.trace(&batch, Draw { by_light: true, index }, sinks, (stats, start));
+            let draw = batch.draw(true, index, self.allocations.len());
+            self.sample_lights(&batch, draw, sinks.rest);
+            let proposed = self.trace(&batch, draw, sinks, (stats, start));
             stats.t1_light += proposed - start;
-            if index < batch.usual.light_draws {
-                self.add_controls(&batch, true);
-            }
+            self.add_controls(&batch, draw);
         }
         for index in 0..bsdf {
             let start = Instant::now();
-            stats.emitter_rays += self.sample_bsdfs(&batch, index);
-            self.trace(&batch, Draw { by_light: false, index }, sinks, (stats, start));
-            if index < batch.usual.bsdf_draws {
-                self.add_controls(&batch, false);
-            }
+            let draw = batch.draw(false, index, self.allocations.len());
+            stats.emitter_rays += self.sample_bsdfs(&batch, draw);
+            self.trace(&batch, draw, sinks, (stats, start));
+            self.add_controls(&batch, draw);
         }
     }
 
     /// Begins vertices without light; returns how many samples of each technique some of them draw.
     fn begin(&mut self, batch: &Batch<'_, '_>, stats: &mut DirectStats) -> [u32; 2] {
         let Batch { job, techniques, vertices, usual } = *batch;
-        let (n, len) = (vertices.len(), batch.len());
+        let (n, len) = (vertices.len(), padded(vertices.len()));
         self.samples.reserve(len);
         self.radiance.reserve(len);
         self.radiance.get_mut(len).into_iter().for_each(|c| c.fill(0.0));
@@ -182,14 +186,15 @@ impl ColumnStage {
         [most(light), most(bsdf)]
     }
 
-    /// Adds the last sample of each vertex to its control variates, if there are any.
-    fn add_controls(&mut self, batch: &Batch<'_, '_>, by_light: bool) {
-        if !batch.techniques.has_controls {
+    /// Adds the last sample of each vertex to its control variates, if there are any: rows with other numbers of samples have
+    /// none.
+    fn add_controls(&mut self, batch: &Batch<'_, '_>, draw: Draw) {
+        if !batch.techniques.has_controls || !draw.is_usual {
             return;
         }
         let n = [batch.usual.n_light, batch.usual.n_bsdf];
         let ColumnStage { controls, samples, traced, scratch, emitter_rays, .. } = self;
-        if by_light {
+        if draw.by_light {
             controls.add_light_samples(batch.job, n, (samples, traced, scratch), batch.vertices);
         } else {
             controls.add_bsdf_samples(batch.job, n, (samples, emitter_rays), batch.vertices);
@@ -203,8 +208,10 @@ impl ColumnStage {
         let (unusual, usual) = batch.vertices.direct.split_at(self.allocations.len());
         self.drawn.clear();
         self.drawn.extend(unusual.iter().zip(&self.allocations).map(|(s, a)| s.split(key, of(a).max(1), draw.index)));
-        let mut split = Split::new(key, of(&batch.usual), draw.index);
-        self.drawn.extend(usual.iter().map(|s| split.of(s)));
+        if self.drawn.len() < draw.rows {
+            let mut split = Split::new(key, of(&batch.usual), draw.index);
+            self.drawn.extend(usual.iter().map(|s| split.of(s)));
+        }
         let n = self.drawn.len();
         sampler::draw(level(), &self.drawn, self.samples.u.each_mut().map(|u| &mut u[..n]));
     }
@@ -225,18 +232,18 @@ impl ColumnStage {
     }
 
     /// A light sample of each vertex, with its contribution.
-    fn sample_lights(&mut self, batch: &Batch<'_, '_>, rest: Option<&Rest<'_>>, index: u32) {
+    fn sample_lights(&mut self, batch: &Batch<'_, '_>, draw: Draw, rest: Option<&Rest<'_>>) {
         let Batch { job, techniques, vertices, .. } = *batch;
-        let (n, draw) = (vertices.len(), Draw { by_light: true, index });
+        let n = draw.rows;
         self.draw(batch, draw);
         let at = vertices.surface.lit_points();
         job.lights.sample_many(n, at, &self.samples.u, &mut self.scratch, &mut self.samples.light);
         self.leave_out(draw);
-        self.leave_out_glows(batch);
+        self.leave_out_glows(batch, draw);
 
         // Their values and the densities of BSDF sampling
         let SampleColumns { light, bsdf: BsdfSamples { f_cos, pdf, .. }, .. } = &mut self.samples;
-        vertices.evaluate(&light.wi, f_cos, pdf);
+        vertices.evaluate(n, &light.wi, f_cos, pdf);
         if let Some(rest) = rest {
             for i in (0..vertices.bsdfs.len()).filter(|&i| self.samples.light.is_far[i] == 0.0) {
                 let (n, wi) = (self.samples.light.n.vec3(i), self.samples.light.wi.vec3(i));
@@ -247,20 +254,20 @@ impl ColumnStage {
         if techniques.is_light_alone() {
             self.samples.bsdf.pdf[..n].fill(0.0);
         }
-        for (p, is_delta) in self.samples.bsdf.pdf.iter_mut().zip(&self.samples.light.is_delta) {
+        for (p, is_delta) in self.samples.bsdf.pdf[..n].iter_mut().zip(&self.samples.light.is_delta) {
             *p = if *is_delta { 0.0 } else { *p };
         }
-        self.weigh(batch, true);
+        self.weigh(batch, draw);
     }
 
     /// Leaves out light samples of media where the path does not continue by its BSDF sample: near by, what media send out
     /// would have no other technique, and the next segment finds it.
-    fn leave_out_glows(&mut self, batch: &Batch<'_, '_>) {
+    fn leave_out_glows(&mut self, batch: &Batch<'_, '_>, draw: Draw) {
         let Batch { job, techniques, vertices, .. } = *batch;
         if !job.world.scene.media.is_emissive() {
             return;
         }
-        for i in 0..vertices.len() {
+        for i in 0..draw.rows {
             let is_glow = job.lights.medium_of(self.light_of(job, i)).is_some();
             let is_by_path = techniques.are_by_path() && !vertices.bsdf(i).bsdf.is_only_evaluated();
             if is_glow && !is_by_path {
@@ -271,12 +278,12 @@ impl ColumnStage {
 
     /// A BSDF sample of each vertex and the emitter in its direction, with its contribution. Returns the number of rays
     /// among the emitters.
-    fn sample_bsdfs(&mut self, batch: &Batch<'_, '_>, index: u32) -> u64 {
-        let Batch { job, techniques, vertices, usual } = *batch;
-        let (n, draw) = (vertices.len(), Draw { by_light: false, index });
+    fn sample_bsdfs(&mut self, batch: &Batch<'_, '_>, draw: Draw) -> u64 {
+        let Batch { job, techniques, vertices, .. } = *batch;
+        let n = draw.rows;
         self.draw(batch, draw);
         let SampleColumns { u, light, bsdf, .. } = &mut self.samples;
-        vertices.sample(u, bsdf);
+        vertices.sample(n, u, bsdf);
         std::mem::swap(&mut light.wi, &mut bsdf.wi);
         let is_alone = techniques.is_light_alone();
         for i in 0..n {
@@ -284,20 +291,17 @@ impl ColumnStage {
             let is_drawn = (light.is_delta[i] || !is_alone) && !bsdf.f_cos.rgb(i).is_black();
             bsdf.pdf[i] = if is_drawn { bsdf.pdf[i] } else { 0.0 };
         }
-        if usual.bsdf_draws <= index {
-            bsdf.pdf[self.allocations.len()..n].fill(0.0);
-        }
         self.leave_out(draw);
 
-        self.samples.make_origins(&vertices.surface, batch.len());
-        let count = self.emitter_rays.find(job, vertices, &mut self.samples);
-        self.weigh(batch, false);
+        self.samples.make_origins(&vertices.surface, padded(n));
+        let count = self.emitter_rays.find(job, (vertices, n), &mut self.samples);
+        self.weigh(batch, draw);
         count
     }
 
     /// The contributions of the samples of one technique.
-    fn weigh(&mut self, batch: &Batch<'_, '_>, by_light: bool) {
-        let (len, Batch { techniques, usual, .. }) = (batch.len(), *batch);
+    fn weigh(&mut self, batch: &Batch<'_, '_>, Draw { by_light, rows, .. }: Draw) {
+        let (len, Batch { techniques, usual, .. }) = (padded(rows), *batch);
         let SampleColumns { light, bsdf: BsdfSamples { f_cos, pdf: p_bsdf, .. }, c, .. } = &mut self.samples;
         let by = |a: &SampleAllocation| if by_light { [a.n_light, a.n_bsdf] } else { [a.n_bsdf, a.n_light] };
         let [p, p_other] =
@@ -328,7 +332,7 @@ impl ColumnStage {
         let is_traced = |samples: &SampleColumns, i: usize| {
             !samples.c.rgb(i).is_black() || hides && samples.bsdf.pdf[i] > 0.0 && samples.has_integrand(i, true)
         };
-        let (n, len) = (vertices.len(), batch.len());
+        let (n, len) = (draw.rows, padded(draw.rows));
         self.samples.make_segments(&vertices.surface, len);
         let rows = (0..n as u32).filter(|&i| is_traced(&self.samples, i as usize));
         self.traced.gather(rows, &self.samples, len, &vertices.time);

@@ -1,7 +1,7 @@
 //! The vertices of a batch of paths, in columns: row k of every column is vertex k.
 //!
 //! Rows come in runs of equal work ([`Run`]). The first ones have a [`SurfaceBsdf`] of their own, sorted by the kernel that
-//! evaluates them; all others reflect as Lambertian surfaces. Whatever is known of a vertex when it is added goes straight into
+//! evaluates them; all others are one run of Lambertian surfaces, of which columns know the reflectance. Whatever is known of a vertex when it is added goes straight into
 //! the columns, but points of meshes in world space: their corners are collected, and one kernel determines the points of
 //! all of them at the end ([`Vertices::finish`]).
 
@@ -21,7 +21,7 @@ use lumiris_lanes::columns::{Column, Columns3, padded, reserve};
 use lumiris_lanes::kernels::{Kernel, MAX_PARAMS};
 use lumiris_lanes::lane::LANES;
 use lumiris_lanes::level;
-use lumiris_lanes::vertex::{self as kernels, Ends, Lambertian, Points, TriangleHits};
+use lumiris_lanes::vertex::{self as kernels, Ends, Points, TriangleHits};
 use lumiris_numbers::math::{Frame, Rgb, Vec3};
 use lumiris_numbers::samplers::SampleStream;
 use std::ops::Range;
@@ -41,9 +41,9 @@ pub struct Vertices<'w> {
     pub surface: Surface,
     /// BSDFs of the first rows; all later rows are Lambertian.
     pub bsdfs: Vec<SurfaceBsdf<'w>>,
-    /// The runs of these.
+    /// Runs of rows.
     runs: Vec<Run>,
-    /// Parameters of their kernels.
+    /// Parameters of the kernels of the first rows.
     params: [Column; MAX_PARAMS],
     /// x of their shading frames.
     tangents: Columns3,
@@ -179,11 +179,6 @@ impl<'w> Vertices<'w> {
         self.path.is_empty()
     }
 
-    /// The rows that are evaluated one by one; all others are Lambertian.
-    pub fn singles(&self) -> Range<usize> {
-        0..self.bsdfs.len()
-    }
-
     /// The rows on plain meshes, which are the last ones.
     pub fn plain(&self) -> Range<usize> {
         self.first_plain..self.len()
@@ -235,6 +230,10 @@ impl<'w> Vertices<'w> {
         self.add_runs(&singles);
         singles.iter().filter(|single| single.is_lambertian()).for_each(|single| self.add_single(single));
         self.add_plain(&plain);
+        let lambertian = self.bsdfs.len()..self.len();
+        if !lambertian.is_empty() {
+            self.runs.push(Run { kernel: Some(Kernel::Diffuse), rows: lambertian });
+        }
         self.find_lobes(lights);
         (self.singles, self.plain) = (singles, plain);
         self.singles.clear();
@@ -392,11 +391,6 @@ impl Surface {
     /// The points, for the choice of lights.
     pub fn lit_points(&self) -> LitPoints<'_> {
         LitPoints { p: &self.p, n: &self.lit, ns: &self.ns, lobes: &self.lobes }
-    }
-
-    /// Lambertian reflection of the first `len` rows.
-    pub fn lambertian(&self, len: usize) -> Lambertian<'_> {
-        Lambertian { rho: self.rho.get(len), ns: self.ns.get(len), wo: self.wo.get(len) }
     }
 
     /// The first `len` points, as ends of segments.

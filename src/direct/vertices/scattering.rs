@@ -1,11 +1,9 @@
 //! Scattering at all rows: values and densities for one direction of each, and directions by BSDF sampling.
 
-use super::{Run, Vertices};
-use lumiris_lanes::columns::{Column, Columns3, padded, reserve};
+use super::Vertices;
+use lumiris_lanes::columns::{Column, Columns3, reserve};
 use lumiris_lanes::kernels::{self, Directions, Kernel, MAX_PARAMS, Rows, Values};
-use lumiris_lanes::lane::LANES;
 use lumiris_lanes::level;
-use lumiris_lanes::vertex::{self as lambertian, Lambertian};
 use std::ops::Range;
 
 /// A BSDF sample of each row, see [`lumiris_lanes::kernels::Drawn`].
@@ -43,75 +41,50 @@ fn part_mut<'a>(columns: &'a mut Columns3, rows: &Range<usize>) -> [&'a mut [f32
 }
 
 impl Vertices<'_> {
-    /// The rows from the vector on that the first Lambertian row is in: what they have of others is overwritten.
-    fn lambertian_rows(&self) -> Range<usize> {
-        self.bsdfs.len() / LANES * LANES..padded(self.len())
-    }
-
-    fn lambertian(&self, rows: &Range<usize>) -> Lambertian<'_> {
+    /// Calls `each` with the rows of a run and its kernel.
+    fn with_rows(&self, rows: &Range<usize>, kernel: Kernel, each: impl FnOnce(&Rows<'_>)) {
         let s = &self.surface;
-        Lambertian { rho: part(&s.rho, rows), ns: part(&s.ns, rows), wo: part(&s.wo, rows) }
-    }
-
-    /// Calls `run` with the rows of a kernel.
-    fn with_rows(&self, Run { kernel, rows }: &Run, run: impl FnOnce(Kernel, &Rows<'_>)) {
-        let Some(kernel) = *kernel else { return };
+        let (ns, wo) = (part(&s.ns, rows), part(&s.wo, rows));
+        let Some(first) = self.bsdfs.get(rows.start) else {
+            return each(&Rows { params: &part(&s.rho, rows), tables: &[], ns, tangents: None, wo });
+        };
         let mut params: [&[f32]; MAX_PARAMS] = [&[]; MAX_PARAMS];
-        for (slice, column) in params.iter_mut().zip(&self.params[..kernel.params()]) {
+        let count = kernel.params();
+        for (slice, column) in params.iter_mut().zip(&self.params[..count]) {
             *slice = &column[rows.clone()];
         }
-        let s = &self.surface;
-        run(
-            kernel,
-            &Rows {
-                params: &params[..kernel.params()],
-                tables: self.bsdfs[rows.start].bsdf.tables(),
-                ns: part(&s.ns, rows),
-                tangents: Some(part(&self.tangents, rows)),
-                wo: part(&s.wo, rows),
-            },
-        );
+        let tangents = Some(part(&self.tangents, rows));
+        each(&Rows { params: &params[..count], tables: first.bsdf.tables(), ns, tangents, wo });
     }
 
-    /// f·|cos θ| and the density of BSDF sampling (1/sr) for a direction of each row.
-    pub fn evaluate(&self, wi: &Columns3, f_cos: &mut Columns3, pdf: &mut Column) {
-        let rows = self.lambertian_rows();
-        let (at, directions) = (self.lambertian(&rows), part(wi, &rows));
-        lambertian::evaluate_lambertian(level(), &at, directions, &mut part_mut(f_cos, &rows), &mut pdf[rows]);
-        for run in &self.runs {
-            let rows = run.rows.clone();
-            if run.kernel.is_none() {
+    /// The runs among the first `n` rows.
+    fn runs(&self, n: usize) -> impl Iterator<Item = (Option<Kernel>, Range<usize>)> {
+        self.runs.iter().filter(move |run| run.rows.start < n).map(|run| (run.kernel, run.rows.clone()))
+    }
+
+    /// f·|cos θ| and the density of BSDF sampling (1/sr) for a direction of each of the first `n` rows.
+    pub fn evaluate(&self, n: usize, wi: &Columns3, f_cos: &mut Columns3, pdf: &mut Column) {
+        for (kernel, rows) in self.runs(n) {
+            let Some(kernel) = kernel else {
                 for i in rows {
                     let (value, density) = self.bsdfs[i].f_cos_and_pdf(self.surface.wo.vec3(i), wi.vec3(i));
                     f_cos.set_rgb(i, value);
                     pdf[i] = density;
                 }
                 continue;
-            }
-            self.with_rows(run, |kernel, of| {
+            };
+            self.with_rows(&rows, kernel, |of| {
                 let mut values = Values { f_cos: part_mut(f_cos, &rows), pdf: &mut pdf[rows.clone()] };
                 kernels::evaluate(level(), kernel, of, part(wi, &rows), &mut values);
             });
         }
     }
 
-    /// A BSDF sample of each row by three numbers.
-    pub fn sample(&self, u: &[Column; 3], out: &mut BsdfSamples) {
-        let rows = self.lambertian_rows();
+    /// A BSDF sample of each of the first `n` rows by three numbers.
+    pub fn sample(&self, n: usize, u: &[Column; 3], out: &mut BsdfSamples) {
         let BsdfSamples { wi, f_cos, pdf, lobe, eta } = out;
-        let numbers = [&u[1][rows.clone()], &u[2][rows.clone()]];
-        let at = self.lambertian(&rows);
-        lambertian::sample_lambertian(level(), &at, numbers, &mut part_mut(wi, &rows), &mut pdf[rows.clone()]);
-        for (f_cos, rho) in part_mut(f_cos, &rows).into_iter().zip(at.rho) {
-            for ((f_cos, rho), pdf) in f_cos.iter_mut().zip(rho).zip(&pdf[rows.clone()]) {
-                *f_cos = rho * pdf;
-            }
-        }
-        lobe[rows.clone()].fill(f32::from(kernels::lobe::DIFFUSE | kernels::lobe::REFLECTION));
-        eta[rows].fill(1.0);
-        for run in &self.runs {
-            let rows = run.rows.clone();
-            if run.kernel.is_none() {
+        for (kernel, rows) in self.runs(n) {
+            let Some(kernel) = kernel else {
                 for i in rows {
                     let drawn = self.bsdfs[i].sample(self.surface.wo.vec3(i), u[0][i], [u[1][i], u[2][i]]);
                     pdf[i] = drawn.map_or(0.0, |s| s.pdf);
@@ -121,8 +94,8 @@ impl Vertices<'_> {
                     (lobe[i], eta[i]) = (f32::from(s.lobe.flags()), s.eta);
                 }
                 continue;
-            }
-            self.with_rows(run, |kernel, of| {
+            };
+            self.with_rows(&rows, kernel, |of| {
                 let mut directions = Directions {
                     wi: part_mut(wi, &rows),
                     f_cos: part_mut(f_cos, &rows),

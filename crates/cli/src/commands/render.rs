@@ -360,6 +360,8 @@ fn stats(
     let d = &s.direct;
     let textures = &job.world.scene.textures;
     let seconds = |t: Duration| t.as_secs_f64();
+    let times = s.stages().into_iter().chain([("ocv_solve", d.solve)]);
+    let thread_seconds: serde_json::Map<_, _> = times.map(|(name, time)| (name.into(), seconds(time).into())).collect();
     let mrays = |count: u64, t: Duration| count as f64 / seconds(t).max(1e-12) * 1e-6;
     let accel = job.world.accel.stats();
     let metadata: serde_json::Map<_, _> =
@@ -377,11 +379,7 @@ fn stats(
             "load": setup.load, "build": setup.build, "prepare": setup.prepare, "render": seconds(rendering.elapsed),
         },
         "cpu_seconds": laps.json(),
-        "thread_seconds": {
-            "camera_rays": seconds(s.camera_time), "bounce_rays": seconds(s.bounce_time), "shade": seconds(s.shade_time),
-            "t1_propose": seconds(d.t1), "select_resolve": seconds(d.select), "t2_trace": seconds(d.t2),
-            "ocv_solve": seconds(d.solve),
-        },
+        "thread_seconds": thread_seconds,
         "counts": {
             "replica_pixels": rendering.film.replicas().len(), "camera_rays": s.camera_rays, "bounce_rays": s.bounce_rays, "proposals": d.proposals,
             "emitter_rays": d.emitter_rays, "shadow_segments": d.segments, "medium_collisions": s.collisions + d.collisions,

@@ -2,15 +2,13 @@
 
 use super::support::assert_same_bits;
 use lumiris_lanes::lane::LANES;
+use lumiris_lanes::level;
 use lumiris_lanes::vertex::*;
-use lumiris_lanes::{Level, level};
 use lumiris_numbers::estimators::mis::{Heuristic, Technique};
+use lumiris_numbers::math::Vec3;
 use lumiris_numbers::math::ray::{SEGMENT_END, offset_origin};
 use lumiris_numbers::math::warp::sample_uniform_sphere;
-use lumiris_numbers::math::{Rgb, Vec3};
-use lumiris_test_support::assert_chi_squared;
 use lumiris_test_support::random::{Pcg32, RngExt, pcg32};
-use std::f32::consts::FRAC_1_PI;
 
 const N: usize = 64;
 
@@ -59,16 +57,7 @@ fn kernels_are_the_same_at_all_levels() {
         points(level, &hits, &mut out);
     });
 
-    let (rho, ns, wo, wi) = (vectors(stream, 1.0), directions(stream), directions(stream), directions(stream));
-    let lambertian = Lambertian { rho: slices(&rho), ns: slices(&ns), wo: slices(&wo) };
-    assert_same_bits::<4>(N, |level, [r, g, b, pdf]| {
-        evaluate_lambertian(level, &lambertian, slices(&wi), &mut [r, g, b], pdf);
-    });
-    let u = [numbers(stream, 0.4), numbers(stream, 0.4)].map(|u| u.iter().map(|u| u + 0.5).collect::<Vec<_>>());
-    assert_same_bits::<4>(N, |level, [x, y, z, pdf]| {
-        sample_lambertian(level, &lambertian, [&u[0], &u[1]], &mut [x, y, z], pdf);
-    });
-
+    let (ns, wo, wi) = (directions(stream), directions(stream), directions(stream));
     let (p, p_error) = (vectors(stream, 9.0), vectors(stream, 1e-6).map(|v| v.iter().map(|x| x.abs()).collect()));
     let from = Ends { p: slices(&p), p_error: slices(&p_error), n: slices(&ns) };
     let to = Ends { p: slices(&corners[0]), p_error: slices(&p_error), n: slices(&wo) };
@@ -130,46 +119,4 @@ fn contributions_are_weighted_as_single_samples() {
             assert!((at(&c, i) - expected).length() <= 1e-5 * expected.length(), "{i} {heuristic:?}");
         }
     }
-}
-
-#[test]
-fn lambertian_directions_follow_the_cosine_on_the_side_of_wo() {
-    let stream = &mut pcg32([8, 1, 4]);
-    let mut observed = vec![0.0; 64];
-    let rounds = 2000;
-    for _ in 0..rounds {
-        let (ns, wo) = (directions(stream), directions(stream));
-        let rho: Three = [0, 1, 2].map(|c| vec![0.2 + 0.3 * c as f32; N]);
-        let lambertian = Lambertian { rho: slices(&rho), ns: slices(&ns), wo: slices(&wo) };
-        let u = [0, 1].map(|_| (0..N).map(|_| stream.random::<f32>()).collect::<Vec<f32>>());
-        let (mut wi, mut pdf): (Three, _) = ([0, 1, 2].map(|_| vec![0.0; N]), vec![0.0; N]);
-        let best = level();
-        sample_lambertian(best, &lambertian, [&u[0], &u[1]], &mut wi.each_mut().map(|w| &mut w[..]), &mut pdf);
-        let (mut f_cos, mut density): (Three, _) = ([0, 1, 2].map(|_| vec![0.0; N]), vec![0.0; N]);
-        evaluate_lambertian(best, &lambertian, slices(&wi), &mut f_cos.each_mut().map(|f| &mut f[..]), &mut density);
-        for i in 0..N {
-            let (n, w) = (at(&ns, i) * at(&ns, i).dot(at(&wo, i)).signum(), at(&wi, i));
-            let cos = n.dot(w);
-            assert!(cos >= 0.0 && (w.length() - 1.0).abs() < 1e-5 && (pdf[i] - cos * FRAC_1_PI).abs() < 1e-5);
-            assert!((density[i] - pdf[i]).abs() < 1e-5);
-            let f = Rgb::new(0.2, 0.5, 0.8) * (cos * FRAC_1_PI);
-            assert!((Rgb::new(f_cos[0][i], f_cos[1][i], f_cos[2][i]) - f).map(f32::abs).max_component() < 1e-5);
-            // cos² is uniform; so is the azimuth about n
-            let frame = lumiris_numbers::math::Frame::from_z(n);
-            let azimuth = lumiris_numbers::math::warp::azimuth(frame.to_local(w)) / std::f32::consts::TAU;
-            let cell = |x: f32| ((x * 8.0) as usize).min(7);
-            observed[cell(cos * cos) * 8 + cell(azimuth)] += 1.0;
-        }
-    }
-    let expected = (rounds * N) as f64 / 64.0;
-    assert_chi_squared(&observed, &[expected; 64], 1e-5);
-    // Seen from the horizon there is no direction
-    let edge: Three = [vec![1.0; N], vec![0.0; N], vec![0.0; N]];
-    let normal: Three = [vec![0.0; N], vec![0.0; N], vec![1.0; N]];
-    let lambertian = Lambertian { rho: slices(&edge), ns: slices(&normal), wo: slices(&edge) };
-    let (half, mut pdf) = (vec![0.5; N], vec![1.0; N]);
-    let mut wi: Three = [0, 1, 2].map(|_| vec![0.0; N]);
-    let out = &mut wi.each_mut().map(|w| &mut w[..]);
-    sample_lambertian(Level::baseline(), &lambertian, [&half, &half], out, &mut pdf);
-    assert!(pdf.iter().all(|&p| p == 0.0));
 }
