@@ -6,7 +6,7 @@
 //! vertex where the lookup misses, or without such a part, continues as in `path`. So no light is counted twice or
 //! lost.
 
-use super::path::{Arrived, Found, Shading};
+use super::path::{BatchVertices, PathVertex, Shading};
 use crate::bsdfs::Lambertian;
 use crate::film::PixelSample;
 use crate::materials::SurfaceBsdf;
@@ -15,12 +15,12 @@ use lumiris_numbers::math::Rgb;
 /// Adds to `out` what the Lambertian parts of the vertices of some paths reflect to the viewer: `reflected`, where that
 /// is available. It may include direct light.
 pub(super) fn shade<'w>(
-    found: &Found<'_, 'w>,
+    found: &BatchVertices<'_, 'w>,
     includes_direct: bool,
     out: &mut [PixelSample],
-    mut reflected: impl FnMut(&Arrived<'_, 'w>, &Lambertian<'_>) -> Option<Rgb>,
+    mut reflected: impl FnMut(&PathVertex<'_, 'w>, &Lambertian<'_>) -> Option<Rgb>,
 ) -> Vec<Shading<'w>> {
-    let shading = |v: Arrived<'_, 'w>| {
+    let shading = |v: PathVertex<'_, 'w>| {
         let (path, bsdf) = (v.path, v.point.bsdf);
         let all = Some(bsdf);
         let known = bsdf.lambertian(v.point.wo).and_then(|part| Some((reflected(&v, &part)?, part.rest)));

@@ -16,7 +16,7 @@ use super::light_paths::{LightImage, LightPilot};
 use super::reuse::{self, Place, Reuse};
 use super::scatter::{Continuation, Scatter};
 pub use super::segment::{CameraSample, PathStats};
-use super::segment::{Left, PathState};
+use super::segment::{LastVertices, PathState};
 pub use super::vertices::Recording;
 use super::vertices::{Stage, VertexSearch};
 use super::{Integrator, Statistics, Tracer};
@@ -83,7 +83,7 @@ impl Tracer for WithLightPaths<'_> {
 }
 
 /// The vertices of a batch of paths.
-pub(super) struct Found<'a, 'w> {
+pub(super) struct BatchVertices<'a, 'w> {
     /// Their index along the paths, from 0.
     pub(super) vertex: u32,
     pub(super) paths: &'a [PathState],
@@ -91,28 +91,28 @@ pub(super) struct Found<'a, 'w> {
 }
 
 /// A vertex by itself.
-pub(super) struct Arrived<'a, 'w> {
+pub(super) struct PathVertex<'a, 'w> {
     pub(super) path: &'a PathState,
     pub(super) point: ShadingPoint<'w>,
     /// Its random numbers.
     pub(super) stream: SampleStream,
 }
 
-impl<'a, 'w> Found<'a, 'w> {
+impl<'a, 'w> BatchVertices<'a, 'w> {
     /// The vertices one by one.
-    pub(super) fn each(&self) -> impl Iterator<Item = Arrived<'a, 'w>> {
+    pub(super) fn each(&self) -> impl Iterator<Item = PathVertex<'a, 'w>> {
         let (paths, vertices) = (self.paths, self.vertices);
         (0..vertices.len()).map(move |i| {
             let path = &paths[vertices.path[i] as usize];
             let point = vertices.point(i, SampleCounts::default(), [path.sample, 0]);
-            Arrived { path, point, stream: vertices.streams[i] }
+            PathVertex { path, point, stream: vertices.streams[i] }
         })
     }
 }
 
 /// What an integrator does at vertices where it is not path tracing: it adds to the samples what is known of the light
 /// that is reflected there, and says of each vertex what remains to be done. Called once per batch.
-pub(super) type AtVertices<'s> = dyn for<'w> FnMut(&Found<'_, 'w>, &mut [PixelSample]) -> Vec<Shading<'w>> + 's;
+pub(super) type AtVertices<'s> = dyn for<'w> FnMut(&BatchVertices<'_, 'w>, &mut [PixelSample]) -> Vec<Shading<'w>> + 's;
 
 /// What remains to be done at a vertex; by default nothing.
 #[derive(Clone, Copy, Debug, Default)]
@@ -238,7 +238,7 @@ impl PathTracer {
             }
 
             // Trace, add β·L_e of what is met, and arrive at the vertices
-            let from = Left { vertices: &left, techniques: drawn };
+            let from = LastVertices { vertices: &left, techniques: drawn };
             self.search.find(Stage { job, vertex, depth, samples, left: from, out, vertices: &mut vertices });
 
             // The samples there. Light samples alone do not find all that media send out: beyond the last vertex there is another
@@ -250,7 +250,7 @@ impl PathTracer {
 
             // What the integrator knows of the light, and what neighbours share of the path
             let own = own.as_mut().map(|own| {
-                let found = Found { vertex, paths: &self.search.active, vertices: &vertices };
+                let found = BatchVertices { vertex, paths: &self.search.active, vertices: &vertices };
                 let shadings = own(&found, out);
                 lit.clear();
                 lit.select(&vertices, &job.lights, |i| shadings[i].lit);

@@ -154,7 +154,7 @@ impl PathState {
     pub(super) fn emission(
         &self,
         job: &RenderJob,
-        left: &Left<'_, '_>,
+        left: &LastVertices<'_, '_>,
         interaction: &SurfaceInteraction,
         guide: Option<&Guide>,
     ) -> Rgb {
@@ -264,13 +264,13 @@ impl BsdfTechnique {
     pub(super) const NO_ROW: u32 = u32::MAX;
 }
 
-/// What the paths of a batch have left: the last vertices, and the samples that were drawn there.
-pub(super) struct Left<'a, 'w> {
+/// The last vertices of the paths of a batch, and the samples that were drawn there.
+pub(super) struct LastVertices<'a, 'w> {
     pub(super) vertices: &'a Vertices<'w>,
     pub(super) techniques: Option<Techniques>,
 }
 
-impl Left<'_, '_> {
+impl LastVertices<'_, '_> {
     /// Where light was sampled at the last vertex of a path.
     #[inline]
     pub(super) fn ctx(&self, path: &PathState) -> LightCtx {

@@ -3,10 +3,10 @@
 
 use super::light_layers::LayerSums;
 use super::light_paths::{Chain, Guide};
-use super::segment::{CameraSample, Left, PathState, PathStats, domain};
+use super::segment::{CameraSample, LastVertices, PathState, PathStats, domain};
 use crate::accel::{Coherence, Hit, RayBatch};
 use crate::direct::Vertices;
-use crate::direct::vertices::{Arrival, Single};
+use crate::direct::vertices::{Single, VertexHeader};
 use crate::film::{FeatureSet, Features, PixelSample};
 use crate::geometry::{Shape, SurfaceHit};
 use crate::lights::LightCtx;
@@ -50,7 +50,7 @@ pub(super) struct Stage<'a, 'w> {
     pub(super) depth: u32,
     pub(super) samples: &'a [CameraSample],
     /// What the paths come from.
-    pub(super) left: Left<'a, 'w>,
+    pub(super) left: LastVertices<'a, 'w>,
     /// Takes what the paths see.
     pub(super) out: &'a mut [PixelSample],
     /// Takes the vertices.
@@ -58,11 +58,11 @@ pub(super) struct Stage<'a, 'w> {
 }
 
 impl Stage<'_, '_> {
-    /// How a path arrives that gets the given index.
+    /// The header of the vertex of a path, which gets the given index.
     #[inline]
-    fn arrival(&self, path: &PathState, index: usize, numbers: &mut VertexNumbers) -> Arrival {
+    fn header(&self, path: &PathState, index: usize, numbers: &mut VertexNumbers) -> VertexHeader {
         let sample = &self.samples[path.sample as usize];
-        Arrival { path: index as u32, time: path.ray.time, streams: numbers.of(sample) }
+        VertexHeader { path: index as u32, time: path.ray.time, streams: numbers.of(sample) }
     }
 }
 
@@ -217,7 +217,7 @@ impl VertexSearch {
             Chain::NONE
         };
         at.vertices.push_plain(
-            at.arrival(path, self.kept.len(), &mut self.numbers),
+            at.header(path, self.kept.len(), &mut self.numbers),
             (mesh, hit.primitive, hit.uv),
             d,
             rho,
@@ -281,8 +281,8 @@ impl VertexSearch {
         (surface, wo): (SurfaceHit, Vec3),
         (bsdf, media): (SurfaceBsdf<'w>, Sides),
     ) {
-        let arrival = at.arrival(&path, self.kept.len(), &mut self.numbers);
-        at.vertices.push(Single { arrival, p: surface.p, p_error: surface.p_error, wo, bsdf, media });
+        let header = at.header(&path, self.kept.len(), &mut self.numbers);
+        at.vertices.push(Single { header, p: surface.p, p_error: surface.p_error, wo, bsdf, media });
         self.kept.push(path);
     }
 

@@ -86,9 +86,9 @@ pub struct Surface {
     pub lobes: Vec<GlossyLobe>,
 }
 
-/// What a path brings to its vertex.
+/// What a vertex takes over from its path.
 #[derive(Clone, Copy, Debug)]
-pub struct Arrival {
+pub struct VertexHeader {
     /// Index of the path.
     pub path: u32,
     /// Time (0 to 1).
@@ -100,8 +100,8 @@ pub struct Arrival {
 /// A vertex that is determined by itself.
 #[derive(Clone, Copy, Debug)]
 pub struct Single<'w> {
-    /// How it was reached.
-    pub arrival: Arrival,
+    /// What it takes over from its path.
+    pub header: VertexHeader,
     /// The point.
     pub p: Vec3,
     /// Bound of its rounding error.
@@ -117,7 +117,7 @@ pub struct Single<'w> {
 /// A vertex on a mesh in world space, whose point is found by a kernel.
 #[derive(Clone, Copy, Debug)]
 struct Plain {
-    arrival: Arrival,
+    header: VertexHeader,
     rho: Rgb,
 }
 
@@ -195,7 +195,7 @@ impl<'w> Vertices<'w> {
     #[inline]
     pub fn push_plain(
         &mut self,
-        arrival: Arrival,
+        header: VertexHeader,
         (mesh, triangle, uv): (&TriangleMesh, u32, [f32; 2]),
         d: Vec3,
         rho: Rgb,
@@ -219,7 +219,7 @@ impl<'w> Vertices<'w> {
         [hits.b[0][k], hits.b[1][k]] = uv;
         hits.orientation[k] = if mesh.flip_normal { -1.0 } else { 1.0 };
         set_lane(&mut hits.d, k, d);
-        self.plain.push(Plain { arrival, rho });
+        self.plain.push(Plain { header, rho });
     }
 
     /// Gives all vertices that were added their rows: those with BSDFs of their own first.
@@ -241,11 +241,11 @@ impl<'w> Vertices<'w> {
     }
 
     #[inline]
-    fn add_row(&mut self, arrival: &Arrival) -> usize {
-        self.path.push(arrival.path);
-        self.time.push(arrival.time);
-        self.streams.push(arrival.streams[0]);
-        self.direct.push(arrival.streams[1]);
+    fn add_row(&mut self, header: &VertexHeader) -> usize {
+        self.path.push(header.path);
+        self.time.push(header.time);
+        self.streams.push(header.streams[0]);
+        self.direct.push(header.streams[1]);
         self.path.len() - 1
     }
 
@@ -288,7 +288,7 @@ impl<'w> Vertices<'w> {
     }
 
     fn add_single(&mut self, single: &Single<'_>) {
-        let i = self.add_row(&single.arrival);
+        let i = self.add_row(&single.header);
         let Single { p, p_error, wo, bsdf, .. } = single;
         let has_surface = bsdf.bsdf.has_surface();
         let s = &mut self.surface;
@@ -306,7 +306,7 @@ impl<'w> Vertices<'w> {
         let (first, len) = (self.len(), padded(plain.len()));
         self.first_plain = first;
         for vertex in plain {
-            let i = self.add_row(&vertex.arrival);
+            let i = self.add_row(&vertex.header);
             self.surface.rho.set_rgb(i, vertex.rho);
         }
         let Surface { p, p_error, n, lit, ns, wo, .. } = &mut self.surface;
@@ -373,10 +373,10 @@ impl<'w> Vertices<'w> {
         for i in 0..other.len() {
             let Some(bsdf) = bsdf(i) else { continue };
             let streams = [other.streams[i], other.direct[i]];
-            let arrival = Arrival { path: other.path[i], time: other.time[i], streams };
+            let header = VertexHeader { path: other.path[i], time: other.time[i], streams };
             let s = &other.surface;
             let (p, p_error, wo) = (s.p.vec3(i), s.p_error.vec3(i), s.wo.vec3(i));
-            self.push(Single { arrival, p, p_error, wo, bsdf, media: other.media(i) });
+            self.push(Single { header, p, p_error, wo, bsdf, media: other.media(i) });
         }
         self.finish(lights);
     }

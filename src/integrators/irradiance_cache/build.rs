@@ -17,7 +17,7 @@ use super::octree::Octree;
 use super::record::{Range, Record};
 use crate::direct::{Fits, ShadingPoint};
 use crate::film::PixelBounds;
-use crate::integrators::path::{Arrived, AtVertices, CameraSample, PathStats, PathTracer, Shading};
+use crate::integrators::path::{AtVertices, CameraSample, PathStats, PathTracer, PathVertex, Shading};
 use crate::integrators::{Cameras, Tracer};
 use crate::scene::RenderJob;
 use crate::settings::Cached;
@@ -161,7 +161,7 @@ fn ask_chunk(
     paths: &mut PathTracer,
 ) -> Vec<RecordRequest> {
     let (mut wanted, mut out) = (Vec::new(), Vec::new());
-    let mut ask = |vertex: u32, v: &Arrived<'_, '_>| {
+    let mut ask = |vertex: u32, v: &PathVertex<'_, '_>| {
         let (path, point) = (v.path, &v.point);
         let sample = path.sample as usize;
         let min = WORTHWHILE * samples[sample].weight.abs();

@@ -24,7 +24,7 @@ pub use build::{BuildStats, build};
 pub use cache::IrradianceCache;
 pub use record::Record;
 
-use super::path::{Arrived, AtVertices, PathStats, PathTracer};
+use super::path::{AtVertices, PathStats, PathTracer, PathVertex};
 use super::segment::CameraSample;
 pub use super::segment::LookupStats;
 use super::{Cameras, Integrator, Statistics, Tracer, diffuse};
@@ -90,7 +90,7 @@ struct CacheTracer<'c> {
 impl Tracer for CacheTracer<'_> {
     fn trace(&mut self, job: &RenderJob, samples: &[CameraSample], fits: &mut Fits, out: &mut Vec<PixelSample>) {
         let includes_direct = self.cache.settings().cached == Cached::All;
-        let mut look_up = |v: &Arrived<'_, '_>, part: &Lambertian<'_>| {
+        let mut look_up = |v: &PathVertex<'_, '_>, part: &Lambertian<'_>| {
             let known = reflected(self.cache, v, part);
             self.lookups.lookups += 1;
             self.lookups.misses += u64::from(known.is_none());
@@ -108,7 +108,7 @@ impl Tracer for CacheTracer<'_> {
 }
 
 /// Radiance that the Lambertian part of a vertex reflects to the viewer; `None` without records.
-fn reflected(cache: &IrradianceCache, v: &Arrived<'_, '_>, part: &Lambertian<'_>) -> Option<Rgb> {
+fn reflected(cache: &IrradianceCache, v: &PathVertex<'_, '_>, part: &Lambertian<'_>) -> Option<Rgb> {
     let ns = v.point.viewer_normal();
     let sides = [(part.reflectance, ns), (part.transmittance, -ns)];
     sides

@@ -8,8 +8,8 @@
 use super::boundary::{Boundary, Probe};
 use crate::direct::Vertices;
 use crate::integrators::Cameras;
-use crate::integrators::path::{CameraSample, Found};
-use crate::integrators::segment::Left;
+use crate::integrators::path::{BatchVertices, CameraSample};
+use crate::integrators::segment::LastVertices;
 use crate::integrators::vertices::{Stage, VertexSearch};
 use crate::photons::{
     GatherScratch, Importance, ImportanceSettings, LowImportance, Origin, Photon, PhotonBudget, PhotonError, PhotonMap,
@@ -317,7 +317,7 @@ pub fn seen(job: &RenderJob, cameras: Cameras<'_>) -> Vec<(Vec3, Vec3)> {
     let (mut search, mut results) = (VertexSearch::default(), Vec::new());
     search.start(job, &samples, &mut results);
     let (left, mut vertices) = (Vertices::default(), Vertices::default());
-    let left = Left { vertices: &left, techniques: None };
+    let left = LastVertices { vertices: &left, techniques: None };
     search.find(Stage {
         job,
         vertex: 0,
@@ -327,7 +327,7 @@ pub fn seen(job: &RenderJob, cameras: Cameras<'_>) -> Vec<(Vec3, Vec3)> {
         out: &mut results,
         vertices: &mut vertices,
     });
-    let found = Found { vertex: 0, paths: &search.active, vertices: &vertices };
+    let found = BatchVertices { vertex: 0, paths: &search.active, vertices: &vertices };
     let points = found.each().map(|v| v.point).filter(|v| v.bsdf.lambertian(v.wo).is_some());
     points.map(|v| (v.p, if v.bsdf.n.dot(v.wo) < 0.0 { -v.bsdf.n } else { v.bsdf.n })).collect()
 }

@@ -21,7 +21,7 @@ pub mod maps;
 
 pub use maps::{MapMaker, MapStats, PhotonMaps};
 
-use super::path::{Arrived, AtVertices, Found, PathStats, PathTracer, Shading};
+use super::path::{AtVertices, BatchVertices, PathStats, PathTracer, PathVertex, Shading};
 use super::segment::CameraSample;
 use super::{Cameras, Integrator, Statistics, Tracer, diffuse};
 use crate::bsdfs::{Bsdf, Diffuse, DiffuseTransmission, Lambertian};
@@ -242,7 +242,7 @@ impl Lookups {
         maps: &PhotonMaps,
         settings: &PhotonMapSettings,
         vertex: u32,
-        v: &Arrived<'_, '_>,
+        v: &PathVertex<'_, '_>,
         part: &Lambertian<'_>,
     ) {
         let path = v.path;
@@ -273,11 +273,11 @@ impl Lookups {
         &mut self,
         maps: &PhotonMaps,
         settings: &IntegratorSettings,
-        found: &Found<'_, 'w>,
+        found: &BatchVertices<'_, 'w>,
         out: &mut [PixelSample],
     ) -> Vec<Shading<'w>> {
         let rays_per_request = settings.photons.gather.max(1);
-        let shading = |v: Arrived<'_, 'w>| {
+        let shading = |v: PathVertex<'_, 'w>| {
             let (path, point) = (v.path, &v.point);
             let Some(part) = point.bsdf.lambertian(point.wo) else { return Shading::default() };
             let first = self.pending.len();
@@ -320,7 +320,7 @@ fn sides(v: &ShadingPoint<'_>, part: &Lambertian<'_>) -> impl Iterator<Item = (R
 
 /// Adds light reflected by the side of a vertex to the pending radiance: irradiance `e`, by a kernel of `radius`.
 fn wait(
-    (v, key): (&Arrived<'_, '_>, u32),
+    (v, key): (&PathVertex<'_, '_>, u32),
     (albedo, place): (Rgb, Place),
     (e, radius): (Rgb, f32),
     pending: &mut Vec<Pending>,
@@ -336,7 +336,7 @@ fn wait(
 /// distance of these photons; what needs correction is left pending.
 fn reflected(
     maps: &PhotonMaps,
-    v: &Arrived<'_, '_>,
+    v: &PathVertex<'_, '_>,
     part: &Lambertian<'_>,
     (scratch, pending): (&mut GatherScratch, &mut Vec<Pending>),
 ) -> (Rgb, f32) {
