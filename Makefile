@@ -48,9 +48,10 @@ test: setup test-scalar
 	$(CARGO) test $(WORKSPACE) --doc
 	$(CARGO) test $(WORKSPACE) --no-fail-fast --lib --bins --tests
 
-# The kernels of all instruction sets against those without vectors, as a part of `make test`.
+# The kernels of all instruction sets against those without vectors, as a part of `make test`. Without optimisation, every
+# intermediate number of a kernel has a place of its own on the stack: megabytes of them.
 test-scalar: setup
-	$(CARGO) test --profile scalar --package lumiris-lanes --features scalar
+	RUST_MIN_STACK=67108864 $(CARGO) test --profile scalar --package lumiris-lanes --features scalar
 
 # Renders on a Slurm cluster of two nodes that this machine plays: picture, requeued tasks, a node that goes down.
 test-farm: setup
