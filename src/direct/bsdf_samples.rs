@@ -100,7 +100,8 @@ pub(super) fn find_emitters(
     let sample = |k: usize| &pending[far[k] as usize];
     job.lights.infinite_in_directions_by(
         far.len(),
-        |k| (ctx(sample(k)), sample(k).wi),
+        |k| ctx(sample(k)),
+        |k| sample(k).wi,
         |k, ctx, light| pmf(sample(k).point, ctx, light),
         |k, li, p_light| {
             out[far[k] as usize] = (!li.is_black()).then_some(EmitterInDirection { li, p_light, end: None });

@@ -12,7 +12,7 @@
 //! from event n to n + 1 with √(1 − 1/n) balances their costs and their weights: the mean of each grows like log n.
 
 use super::segment::{BsdfTechnique, PathState, domain};
-use super::vertices::{Stage, VertexSearch};
+use super::vertices::{Flown, Stage, VertexSearch};
 use crate::accel::Hit;
 use crate::bsdfs::dielectric::{Select, Transport};
 use crate::bsdfs::fresnel::fr_dielectric;
@@ -37,14 +37,14 @@ impl VertexSearch {
         path.passed < MAX_EVENTS && path.medium.is_some_and(|id| job.world.scene.media.media[id as usize].is_interior())
     }
 
-    /// Lets a path fly through an interior towards what its ray meets. True if it is scattered or ends on the way.
+    /// Lets a path fly through an interior towards what its ray meets.
     pub(super) fn walk(
         &mut self,
         at: &Stage<'_, '_>,
         medium: &Medium,
-        path: &mut PathState,
+        (index, path): (u32, &mut PathState),
         hit: Option<&Hit>,
-    ) -> bool {
+    ) -> Flown {
         let scale = path.ray.d.length();
         let (o, d) = (path.ray.o, path.ray.d / scale);
         let segment = Segment { o, d, length: hit.map_or(f32::INFINITY, |hit| hit.t * scale) };
@@ -54,21 +54,34 @@ impl VertexSearch {
         let (t, weight) = match end {
             End::Through { weight } => {
                 path.weaken(weight);
-                return false;
+                return Flown::Through;
             }
             End::Scattered { t, weight } => (t, weight),
         };
         // There is no vertex beyond the last for it to arrive at
-        if at.vertex >= at.depth || path.passed >= MAX_EVENTS {
-            return true;
+        if at.vertex < at.depth
+            && path.passed < MAX_EVENTS
+            && let Some(next) = self.scatter_inside(at, path, (d, t, weight), medium)
+        {
+            *path = next;
+            self.passing.push(index);
         }
-        let Some(beta) = path.beta_beyond_emitter() else { return true };
+        Flown::Ended
+    }
+
+    /// A path that is scattered in an interior, after the distance `t` in the direction `d` and with the factor `weight`.
+    fn scatter_inside(
+        &self,
+        at: &Stage<'_, '_>,
+        path: &PathState,
+        (d, t, weight): (Vec3, f32, Rgb),
+        medium: &Medium,
+    ) -> Option<PathState> {
         let [u_survival, u0, u1] = self.walk_numbers(at, path);
-        let Some(beta) = survive(beta * weight, path, u_survival) else { return true };
-        let Some(sample) = Phase::new(medium.g()).sample(-d, [u0, u1]) else { return true };
+        let beta = survive(path.beta_beyond_emitter()? * weight, path, u_survival)?;
+        let sample = Phase::new(medium.g()).sample(-d, [u0, u1])?;
         let next = PathState { width: path.width + path.spread * t, travelled: path.travelled + t, ..*path };
-        self.passing.push(go_on(next, o + d * t, sample.wi, beta));
-        true
+        Some(go_on(next, path.ray.o + d * t, sample.wi, beta))
     }
 
     /// The BSDF and the throughput of a path at a surface. Where a path in an interior meets the boundary it may be reflected:
@@ -76,7 +89,7 @@ impl VertexSearch {
     pub(super) fn leave<'w>(
         &mut self,
         at: &Stage<'_, '_>,
-        (path, beta): (&PathState, Rgb),
+        (index, path, beta): (u32, &mut PathState, Rgb),
         interaction: &SurfaceInteraction,
         (bsdf, sides): (SurfaceBsdf<'w>, Sides),
     ) -> Option<(SurfaceBsdf<'w>, Rgb)> {
@@ -103,7 +116,8 @@ impl VertexSearch {
             travelled: path.depth(interaction),
             ..*path
         };
-        self.passing.push(go_on(next, interaction.origin(wi), wi, beta));
+        *path = go_on(next, interaction.origin(wi), wi, beta);
+        self.passing.push(index);
         None
     }
 

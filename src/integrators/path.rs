@@ -134,8 +134,9 @@ pub struct Outcome {
     pub contribution: Rgb,
 }
 
-/// Paths that are traced together: enough that stages run long, few enough that their data stays in the cache.
-pub const BATCH_PATHS: usize = 4096;
+/// Paths that are traced together: enough that stages run long, few enough that their data, about 1 kB each, stays in the
+/// cache of a core.
+pub const BATCH_PATHS: usize = 1024;
 
 /// Traces paths; holds the buffers of one worker.
 #[derive(Debug, Default)]

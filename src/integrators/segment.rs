@@ -11,7 +11,7 @@ use crate::media::MediumId;
 use crate::scene::{RenderJob, SurfaceInteraction};
 use crate::settings::{IntegratorSettings, SampleCounts};
 use lumiris_numbers::estimators::mis::Technique;
-use lumiris_numbers::math::{Ray, Rgb, Vec3};
+use lumiris_numbers::math::{Ray, Rgb};
 use lumiris_numbers::samplers::SampleStream;
 use std::time::Duration;
 
@@ -194,17 +194,6 @@ impl PathState {
         self.beta *= weight;
         if let Some(technique) = &mut self.technique {
             technique.survivor = technique.survivor.map(|survivor| survivor * weight);
-        }
-    }
-
-    /// Features of a hit of a mesh that reflects `rho`, without the normal.
-    pub(super) fn plain_features(&self, job: &RenderJob, hit: &Hit, distance: f32, rho: Rgb) -> Features {
-        Features {
-            albedo: rho,
-            normal: Vec3::ZERO,
-            depth: self.travelled + distance,
-            material: job.world.scene.surfaces[hit.geometry as usize].material,
-            object: hit.geometry,
         }
     }
 

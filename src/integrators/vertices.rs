@@ -6,9 +6,9 @@ use super::light_paths::{Chain, Guide};
 use super::segment::{CameraSample, LastVertices, PathState, PathStats, domain};
 use crate::accel::{Coherence, Hit, RayBatch};
 use crate::direct::Vertices;
-use crate::direct::vertices::{Single, VertexHeader};
+use crate::direct::vertices::{RowNumbers, Single};
 use crate::film::{FeatureSet, Features, PixelSample};
-use crate::geometry::{Shape, SurfaceHit};
+use crate::geometry::{GeometryId, Shape, SurfaceHit};
 use crate::lights::LightCtx;
 use crate::materials::SurfaceBsdf;
 use crate::materials::dispersion::sample_wavelength;
@@ -57,24 +57,9 @@ pub(super) struct Stage<'a, 'w> {
     pub(super) vertices: &'a mut Vertices<'w>,
 }
 
-impl Stage<'_, '_> {
-    /// The header of the vertex of a path, which gets the given index.
-    #[inline]
-    fn header(&self, path: &PathState, index: usize, numbers: &mut VertexNumbers) -> VertexHeader {
-        let sample = &self.samples[path.sample as usize];
-        VertexHeader { path: index as u32, time: path.ray.time, streams: numbers.of(sample) }
-    }
-}
-
 /// The random numbers of vertices, and of their direct light.
 #[derive(Debug)]
 struct VertexNumbers([Domain; 3]);
-
-impl Default for VertexNumbers {
-    fn default() -> Self {
-        VertexNumbers::new(0)
-    }
-}
 
 impl VertexNumbers {
     fn new(vertex: u32) -> Self {
@@ -89,17 +74,30 @@ impl VertexNumbers {
     }
 }
 
+/// How a path comes through its medium.
+pub(super) enum Flown {
+    /// Straight to what its ray meets.
+    Through,
+    /// It does not: it is scattered on the way, or ends.
+    Ended,
+    /// It is scattered on the way. This one goes on straight, for the features of the first surface, which denoisers want.
+    Ghost(PathState),
+}
+
 /// Paths on their way to the next vertex.
 #[derive(Debug, Default)]
 pub(super) struct VertexSearch {
     pub(super) active: Vec<PathState>,
-    kept: Vec<PathState>,
-    pub(super) passing: Vec<PathState>,
-    /// Indices of active paths that meet nothing and look for emitters.
+    /// Indices of the paths that are traced.
+    traced: Vec<u32>,
+    /// Indices of those that go on in the next trace, without a vertex.
+    pub(super) passing: Vec<u32>,
+    /// Indices of those that meet nothing and look for emitters.
     escaped: Vec<u32>,
     rays: RayBatch,
     hits: Vec<Option<Hit>>,
-    numbers: VertexNumbers,
+    /// Geometries and distances from the camera of first vertices on plain meshes, in the order of these.
+    plain: Vec<(GeometryId, f32)>,
     /// Counts and times.
     pub(super) stats: PathStats,
     /// Omits emission towards the camera, and all features except the depth.
@@ -138,52 +136,76 @@ impl VertexSearch {
         }));
     }
 
-    /// Traces the active paths to their next vertex, adds what they see at the first one, and keeps those that hit
-    /// something that scatters: `at.vertices` belong to the paths that `self.active` then holds.
+    /// Traces the active paths to their next vertices, and adds the emission that they meet on the way. `at.vertices` are
+    /// those of the active paths that arrive at a surface or a particle that scatters.
     pub(super) fn find(&mut self, mut at: Stage<'_, '_>) {
-        self.kept.clear();
-        self.numbers = VertexNumbers::new(at.vertex);
         let mut coherence = if at.vertex == 0 { Coherence::Coherent } else { Coherence::Incoherent };
-        while !self.active.is_empty() {
+        self.plain.clear();
+        self.traced.clear();
+        self.traced.extend(0..self.active.len() as u32);
+        while !self.traced.is_empty() {
             self.trace(at.job, at.vertex, coherence);
             coherence = Coherence::Incoherent;
             let start = Instant::now();
+            let (mut paths, hits, traced) =
+                (std::mem::take(&mut self.active), std::mem::take(&mut self.hits), std::mem::take(&mut self.traced));
+            for (&index, hit) in traced.iter().zip(&hits) {
+                self.arrive(&mut at, &mut paths, index, hit.as_ref());
+            }
+            (self.active, self.hits, self.traced) = (paths, hits, traced);
+            self.add_infinite(&mut at);
+            std::mem::swap(&mut self.traced, &mut self.passing);
             self.passing.clear();
             self.escaped.clear();
-            let (mut active, hits) = (std::mem::take(&mut self.active), std::mem::take(&mut self.hits));
-            for (k, (path, hit)) in active.iter_mut().zip(&hits).enumerate() {
-                if path.medium.is_some() && self.fly(&mut at, path, hit.as_ref()) {
-                    continue;
-                }
-                match hit {
-                    Some(hit) if self.take_plain(&mut at, path, hit) => {}
-                    Some(hit) => self.take(&mut at, path, hit),
-                    None if self.looks_for_emitters(at.vertex, path) => self.escaped.push(k as u32),
-                    None => {}
-                }
-            }
-            (self.active, self.hits) = (active, hits);
-            self.add_infinite(&mut at);
-            std::mem::swap(&mut self.active, &mut self.passing);
             self.stats.shade_time += start.elapsed();
         }
         let start = Instant::now();
-        std::mem::swap(&mut self.active, &mut self.kept);
-        at.vertices.finish(&at.job.lights);
-        if at.vertex == 0 {
-            self.set_normals(&mut at);
+        let mut numbers = VertexNumbers::new(at.vertex);
+        at.vertices.finish(&at.job.lights, |path| {
+            let path = &self.active[path as usize];
+            RowNumbers { time: path.ray.time, streams: numbers.of(&at.samples[path.sample as usize]) }
+        });
+        if at.vertex == 0 && self.features != FeatureSet::None {
+            self.set_plain_features(&mut at);
         }
         self.stats.shade_time += start.elapsed();
     }
 
-    /// The shading normals at plain vertices as features of their camera samples.
-    fn set_normals(&self, at: &mut Stage<'_, '_>) {
-        let Vertices { path, surface, .. } = &*at.vertices;
-        for i in at.vertices.plain() {
-            if let Some(features) = &mut at.out[self.active[path[i] as usize].sample as usize].features {
-                let (z, wo) = (surface.ns.vec3(i), surface.wo.vec3(i));
-                features.normal = if z.dot(wo) < 0.0 { -z } else { z };
+    /// Lets a path that has been traced fly through its medium, add what it meets, and get its vertex or go on.
+    #[inline]
+    fn arrive(&mut self, at: &mut Stage<'_, '_>, paths: &mut Vec<PathState>, index: u32, hit: Option<&Hit>) {
+        let mut index = index;
+        if paths[index as usize].medium.is_some() {
+            match self.fly(at, (index, &mut paths[index as usize]), hit) {
+                Flown::Through => {}
+                Flown::Ended => return,
+                Flown::Ghost(ghost) => {
+                    index = paths.len() as u32;
+                    paths.push(ghost);
+                }
             }
+        }
+        let path = &mut paths[index as usize];
+        match hit {
+            Some(hit) if self.take_plain(at, (index, path), hit) => {}
+            Some(hit) => self.take(at, (index, path), hit),
+            None if self.looks_for_emitters(at.vertex, path) => self.escaped.push(index),
+            None => {}
+        }
+    }
+
+    /// The features of first vertices on plain meshes.
+    fn set_plain_features(&self, at: &mut Stage<'_, '_>) {
+        let Vertices { path, surface, .. } = &*at.vertices;
+        for (row, &(object, depth)) in at.vertices.plain().zip(&self.plain) {
+            let (z, wo) = (surface.ns.vec3(row), surface.wo.vec3(row));
+            at.out[self.active[path[row] as usize].sample as usize].features = Some(Features {
+                albedo: surface.rho.rgb(row),
+                normal: if z.dot(wo) < 0.0 { -z } else { z },
+                depth,
+                material: at.job.world.scene.surfaces[object as usize].material,
+                object,
+            });
         }
     }
 
@@ -192,43 +214,36 @@ impl VertexSearch {
         !path.is_ghost && (path.technique.is_some() || vertex == 0 && !self.only_reflected)
     }
 
-    /// Takes a hit of a mesh that reflects the same everywhere, whose point is found together with others; false if
+    /// Takes a hit of a mesh that reflects the same everywhere, whose point is determined together with others; false if
     /// this is none.
     #[inline]
-    fn take_plain(&mut self, at: &mut Stage<'_, '_>, path: &PathState, hit: &Hit) -> bool {
+    fn take_plain(&mut self, at: &mut Stage<'_, '_>, (index, path): (u32, &mut PathState), hit: &Hit) -> bool {
         let is_last = at.vertex >= at.depth;
         let Some(rho) = at.job.plain_reflectance(hit) else { return false };
         if path.medium.is_some() || path.is_ghost || is_last && at.vertex == 0 {
             return false;
         }
         let Some(beta) = path.beta_beyond_emitter().filter(|_| !is_last) else { return true };
-        let distance = hit.t * path.ray.d.length();
-        if at.vertex == 0 && self.features != FeatureSet::None {
-            let features = &mut at.out[path.sample as usize].features;
-            features.get_or_insert_with(|| path.plain_features(at.job, hit, distance, rho));
-        }
         let Shape::Mesh(mesh) = &at.job.world.scene.geometry.geometries[hit.geometry as usize].shape else {
             return false;
         };
-        let (d, width) = (path.ray.d, path.width + path.spread * distance);
-        let chain = if self.begins_chain(at.vertex, path) {
-            Chain::at_first(facing_normal(at.job, hit, d).dot(d), width)
+        let distance = hit.t * path.ray.d.length();
+        if at.vertex == 0 {
+            self.plain.push((hit.geometry, path.travelled + distance));
+        }
+        (path.beta, path.width) = (beta, path.width + path.spread * distance);
+        path.chain = if self.begins_chain(at.vertex, path) {
+            Chain::at_first(facing_normal(at.job, hit, path.ray.d).dot(path.ray.d), path.width)
         } else {
             Chain::NONE
         };
-        at.vertices.push_plain(
-            at.header(path, self.kept.len(), &mut self.numbers),
-            (mesh, hit.primitive, hit.uv),
-            d,
-            rho,
-        );
-        self.kept.push(PathState { beta, width, chain, ..*path });
+        at.vertices.push_plain(index, (mesh, hit.primitive, hit.uv), path.ray.d, rho);
         true
     }
 
     /// Takes any other hit, and adds its vertex, if the path goes on from one.
     #[inline]
-    fn take(&mut self, at: &mut Stage<'_, '_>, path: &PathState, hit: &Hit) {
+    fn take(&mut self, at: &mut Stage<'_, '_>, (index, path): (u32, &mut PathState), hit: &Hit) {
         let interaction = SurfaceInteraction::new(at.job, &path.ray, (path.width, path.spread), hit);
         let (sample, out) = (&at.samples[path.sample as usize], &mut at.out[path.sample as usize]);
         if self.looks_for_emitters(at.vertex, path) {
@@ -236,10 +251,11 @@ impl VertexSearch {
             out.radiance += emission;
             self.layers.add_emission(at.job, path.sample, &interaction.hit, emission);
         }
-        let Some(beta) = path.beta_beyond_emitter() else { return };
-        let Some(bsdf) = interaction.scatter(at.job) else {
+        let Some(mut beta) = path.beta_beyond_emitter() else { return };
+        let Some(mut bsdf) = interaction.scatter(at.job) else {
             if path.passed < MAX_PASSED || self.walks(at.job, path) {
-                self.passing.push(path.pass(at.job, beta, &interaction));
+                *path = path.pass(at.job, beta, &interaction);
+                self.passing.push(index);
             }
             return;
         };
@@ -253,37 +269,21 @@ impl VertexSearch {
                 }
             });
         }
-        let width = interaction.width;
         if at.vertex >= at.depth || path.is_ghost {
             return;
         }
-        let (mut path, mut bsdf, mut beta) = (*path, bsdf, beta);
         if let Some(eta) = bsdf.bsdf.eta_mut()
             && let Some(dispersion) = interaction.dispersion(at.job)
         {
-            let (lambda, weight) = self.wavelength(at, &path);
+            let (lambda, weight) = self.wavelength(at, path);
             (*eta, path.wavelength, beta) = (dispersion.eta(lambda), Some(lambda), beta * weight);
         }
-        let path = &path;
         let media = interaction.sides(at.job, path.medium);
-        let Some((bsdf, beta)) = self.leave(at, (path, beta), &interaction, (bsdf, media)) else { return };
-        let chain = self.chain(at, path, &interaction, &bsdf);
-        let SurfaceInteraction { surface, wo, .. } = interaction;
-        self.keep(at, PathState { beta, width, chain, ..*path }, (surface, wo), (bsdf, media));
-    }
-
-    /// Keeps a path at a vertex.
-    #[inline]
-    fn keep<'w>(
-        &mut self,
-        at: &mut Stage<'_, 'w>,
-        path: PathState,
-        (surface, wo): (SurfaceHit, Vec3),
-        (bsdf, media): (SurfaceBsdf<'w>, Sides),
-    ) {
-        let header = at.header(&path, self.kept.len(), &mut self.numbers);
-        at.vertices.push(Single { header, p: surface.p, p_error: surface.p_error, wo, bsdf, media });
-        self.kept.push(path);
+        let Some((bsdf, beta)) = self.leave(at, (index, path, beta), &interaction, (bsdf, media)) else { return };
+        let SurfaceInteraction { surface, wo, width, .. } = interaction;
+        path.chain = self.chain(at, path, &interaction, &bsdf);
+        (path.beta, path.width) = (beta, width);
+        at.vertices.push(Single { path: index, p: surface.p, p_error: surface.p_error, wo, bsdf, media });
     }
 
     /// True if light paths bring light to what the path has met.
@@ -318,13 +318,12 @@ impl VertexSearch {
         )
     }
 
-    /// Lets a path fly through its medium towards what its ray meets, and adds what the medium sends out. True if it is
-    /// scattered on the way: then what it meets does not matter, but as the first surface that denoisers want to know of.
-    fn fly(&mut self, at: &mut Stage<'_, '_>, path: &mut PathState, hit: Option<&Hit>) -> bool {
-        let Some(id) = path.medium.filter(|_| !path.is_ghost) else { return false };
+    /// Lets a path fly through its medium towards what its ray meets, and adds what the medium emits.
+    fn fly(&mut self, at: &mut Stage<'_, '_>, (index, path): (u32, &mut PathState), hit: Option<&Hit>) -> Flown {
+        let Some(id) = path.medium.filter(|_| !path.is_ghost) else { return Flown::Through };
         let medium = &at.job.world.scene.media.media[id as usize];
         if medium.is_interior() {
-            return self.walk(at, medium, path, hit);
+            return self.walk(at, medium, (index, path), hit);
         }
         let scale = path.ray.d.length();
         let (o, d) = (path.ray.o, path.ray.d / scale);
@@ -346,65 +345,50 @@ impl VertexSearch {
         match end {
             End::Through { weight } => {
                 path.weaken(weight);
-                false
+                Flown::Through
             }
             End::Scattered { t, weight } => {
-                if at.vertex < at.depth {
-                    let surface = SurfaceHit::in_space(o + d * t);
+                let ghost = PathState { is_ghost: true, ..*path };
+                if let Some(beta) = path.beta_beyond_emitter().filter(|_| at.vertex < at.depth) {
+                    (path.beta, path.width) = (beta * weight, path.width + path.spread * t);
+                    path.chain = Chain::NONE;
+                    let SurfaceHit { p, p_error, .. } = SurfaceHit::in_space(o + d * t);
                     let bsdf = SurfaceBsdf::in_medium(medium.g(), -d);
-                    self.scatter(at, (path, t, weight), (surface, bsdf));
+                    let media = Sides::both(path.medium);
+                    at.vertices.push(Single { path: index, p, p_error, wo: bsdf.frame.z, bsdf, media });
                 }
-                path.is_ghost = at.vertex == 0 && self.features != FeatureSet::None;
-                !path.is_ghost
+                let wants_features = at.vertex == 0 && self.features != FeatureSet::None;
+                if wants_features { Flown::Ghost(ghost) } else { Flown::Ended }
             }
         }
     }
 
-    /// Keeps a path that is scattered in its medium after the distance `t`, where its throughput gets the factor `weight`.
-    fn scatter<'w>(
-        &mut self,
-        at: &mut Stage<'_, 'w>,
-        (path, t, weight): (&PathState, f32, Rgb),
-        (surface, bsdf): (SurfaceHit, SurfaceBsdf<'w>),
-    ) {
-        let Some(beta) = path.beta_beyond_emitter() else { return };
-        let (beta, width) = (beta * weight, path.width + path.spread * t);
-        let next = PathState { beta, width, chain: Chain::NONE, ..*path };
-        self.keep(at, next, (surface, bsdf.frame.z), (bsdf, Sides::both(path.medium)));
-    }
-
-    /// Adds what the escaped paths carry of infinite lights, with the weight of the technique that found it.
+    /// Adds the radiance of infinite lights along the escaped paths, with the weights of the techniques that drew them.
     fn add_infinite(&mut self, at: &mut Stage<'_, '_>) {
-        let (lights, active, layers) = (&at.job.lights, &self.active, &mut self.layers);
-        let (left, out) = (&at.left, &mut *at.out);
-        self.escaped.retain(|&k| {
-            let path = &active[k as usize];
-            if path.technique.is_none() {
-                let l = path.beta * lights.le(path.ray.o, path.ray.d);
-                out[path.sample as usize].radiance += l;
-                layers.add_infinite(lights, path.sample, (path.ray.o, path.ray.d), l);
-            }
-            path.technique.is_some()
-        });
-        let escaped = &self.escaped;
+        let (lights, layers, left, out) = (&at.job.lights, &mut self.layers, &at.left, &mut *at.out);
+        let (active, escaped) = (&self.active, &self.escaped);
         let path = |i: usize| &active[escaped[i] as usize];
-        let ctx = |i: usize| left.ctx(path(i));
-        lights.infinite_in_directions(
+        lights.infinite_in_directions_by(
             escaped.len(),
-            |i| (ctx(i), path(i).ray.d),
+            |i| left.ctx(path(i)),
+            |i| path(i).ray.d,
+            // No light was sampled where a path begins
+            |i, ctx, light| if path(i).technique.is_some() { lights.sampler.pmf(ctx, light) } else { 0.0 },
             |i, le, p_light| {
                 let path = path(i);
                 let l = path.beta * le;
                 let weight = if l.is_black() { 1.0 } else { left.weight(path, |_| p_light) };
                 out[path.sample as usize].radiance += l * weight;
-                layers.add_infinite(lights, path.sample, (ctx(i).p, path.ray.d), l * weight);
+                if layers.are_kept() {
+                    layers.add_infinite(lights, path.sample, (left.ctx(path).p, path.ray.d), l * weight);
+                }
             },
         );
     }
 
-    /// First hits of the active paths.
+    /// First hits of the paths.
     fn trace(&mut self, job: &RenderJob, vertex: u32, coherence: Coherence) {
-        self.rays.set(self.active.iter().map(|path| &path.ray));
+        self.rays.set(self.traced.iter().map(|&index| &self.active[index as usize].ray));
         if let Some(r) = &mut self.recording {
             let batches = if coherence == Coherence::Coherent { &mut r.camera } else { &mut r.bounces };
             batches.push(self.rays.clone());

@@ -7,7 +7,8 @@
 //! for latitude-longitude images.
 
 use super::LightSample;
-use lumiris_lanes::Environment;
+use lumiris_lanes::environment::{Environment, equal_area_squares};
+use lumiris_lanes::level;
 use lumiris_numbers::math::sphere_map::{
     equal_area_sphere_to_square, equal_area_square_to_sphere, lat_long_to_sphere, pdf_equal_area_square_to_sphere,
     pdf_lat_long_to_sphere, sphere_to_lat_long, wrap_equal_area_texel,
@@ -220,16 +221,26 @@ impl EnvironmentMap {
     /// [`le_and_pdf`](Self::le_and_pdf) of `n` directions. Texels far apart are cache misses, which overlap where nothing
     /// else is between them.
     pub fn le_and_pdf_many(&self, n: usize, w: impl Fn(usize) -> Vec3, mut out: impl FnMut(usize, Rgb, f32)) {
-        let mut places = [(Vec3::ZERO, Vec2::ZERO); CHUNK];
+        let (mut directions, mut places) = ([[0.0; CHUNK]; 3], [[0.0; CHUNK]; 2]);
         let mut found = [(Rgb::BLACK, 0.0); CHUNK];
         for start in (0..n).step_by(CHUNK) {
             let count = CHUNK.min(n - start);
-            for (i, place) in places[..count].iter_mut().enumerate() {
-                let w = w(start + i);
-                *place = (w, self.to_square(w));
+            for i in 0..count {
+                (directions[0][i], directions[1][i], directions[2][i]) = w(start + i).into();
             }
-            for ((w, p), found) in places[..count].iter().zip(&mut found) {
-                *found = (self.lookup(*p), self.pdf_at(*w, *p));
+            let w = |i: usize| Vec3::new(directions[0][i], directions[1][i], directions[2][i]);
+            match self.mapping {
+                EnvironmentMapping::EqualArea => {
+                    let w = directions.each_ref().map(|axis| &axis[..]);
+                    equal_area_squares(level(), w, places.each_mut().map(|axis| &mut axis[..]));
+                }
+                EnvironmentMapping::LatLong => {
+                    (0..count).for_each(|i| (places[0][i], places[1][i]) = self.to_square(w(i)).into());
+                }
+            }
+            for (i, found) in found[..count].iter_mut().enumerate() {
+                let p = Vec2::new(places[0][i], places[1][i]);
+                *found = (self.lookup(p), self.pdf_at(w(i), p));
             }
             for (i, (le, pdf)) in found[..count].iter().enumerate() {
                 out(start + i, *le, *pdf);
@@ -275,10 +286,11 @@ impl EnvironmentMap {
         match self.filter {
             EnvironmentFilter::Nearest => color(self.texels[self.nearest(p)]),
             EnvironmentFilter::Bilinear => {
-                let (x, y) = (p.x * self.width as f32 - 0.5, p.y * self.height as f32 - 0.5);
-                let (x0, y0) = (x.floor().min(self.width as f32 - 1.0), y.floor().min(self.height as f32 - 1.0));
-                let (dx, dy) = (x - x0, y - y0);
-                let first = self.texel_index(x0 as isize, y0 as isize);
+                // With the border, texel centres are at 1.5, 2.5, …
+                let (x, y) = (p.x * self.width as f32 + 0.5, p.y * self.height as f32 + 0.5);
+                let (x0, y0) = ((x as usize).min(self.width), (y as usize).min(self.height));
+                let (dx, dy) = (x - x0 as f32, y - y0 as f32);
+                let first = y0 * (self.width + 2) + x0;
                 let pair = |i: usize| color(self.texels[i]).lerp(color(self.texels[i + 1]), dx);
                 pair(first).lerp(pair(first + self.width + 2), dy)
             }

@@ -340,14 +340,19 @@ impl Light {
     }
 
     /// [`le_and_pdf`](Self::le_and_pdf) of `n` points and directions.
-    pub fn le_and_pdf_many(&self, n: usize, at: impl Fn(usize) -> (Vec3, Vec3), mut out: impl FnMut(usize, Rgb, f32)) {
+    pub fn le_and_pdf_many(
+        &self,
+        n: usize,
+        p: impl Fn(usize) -> Vec3,
+        w: impl Fn(usize) -> Vec3,
+        mut out: impl FnMut(usize, Rgb, f32),
+    ) {
         if let Light::InfiniteImage { map, world_from_light, scale } = self {
             let to_light = world_from_light.transpose();
-            map.le_and_pdf_many(n, |i| to_light * at(i).1, |i, le, pdf| out(i, le * *scale, pdf));
+            map.le_and_pdf_many(n, |i| to_light * w(i), |i, le, pdf| out(i, le * *scale, pdf));
         } else {
             for i in 0..n {
-                let (p, w) = at(i);
-                let (le, pdf) = self.le_and_pdf(p, w);
+                let (le, pdf) = self.le_and_pdf(p(i), w(i));
                 out(i, le, pdf);
             }
         }

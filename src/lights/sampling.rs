@@ -182,29 +182,29 @@ impl LightSampling {
     pub fn infinite_in_directions(
         &self,
         n: usize,
-        at: impl Fn(usize) -> (LightCtx, Vec3),
+        ctx: impl Fn(usize) -> LightCtx,
+        wi: impl Fn(usize) -> Vec3,
         out: impl FnMut(usize, Rgb, f32),
     ) {
-        self.infinite_in_directions_by(n, at, |_, ctx, light| self.sampler.pmf(ctx, light), out);
+        self.infinite_in_directions_by(n, ctx, wi, |_, ctx, light| self.sampler.pmf(ctx, light), out);
     }
 
     /// [`infinite_in_directions`](Self::infinite_in_directions), where a light is chosen with probability `pmf` at a point.
     pub fn infinite_in_directions_by(
         &self,
         n: usize,
-        at: impl Fn(usize) -> (LightCtx, Vec3),
+        ctx: impl Fn(usize) -> LightCtx,
+        wi: impl Fn(usize) -> Vec3,
         pmf: impl Fn(usize, &LightCtx, LightId) -> f32,
         mut out: impl FnMut(usize, Rgb, f32),
     ) {
         if let [light] = self.set.infinite[..] {
             self.set.lights[light as usize].le_and_pdf_many(
                 n,
-                |i| {
-                    let (ctx, wi) = at(i);
-                    (ctx.p, wi)
-                },
+                |i| ctx(i).p,
+                &wi,
                 |i, le, pdf| {
-                    let pdf = if pdf > 0.0 { pdf * pmf(i, &at(i).0, light) } else { 0.0 };
+                    let pdf = if pdf > 0.0 { pdf * pmf(i, &ctx(i), light) } else { 0.0 };
                     out(i, le, pdf);
                 },
             );
@@ -212,8 +212,7 @@ impl LightSampling {
             (0..n).for_each(|i| out(i, Rgb::BLACK, 0.0));
         } else {
             for i in 0..n {
-                let (ctx, wi) = at(i);
-                let (le, pdf) = self.infinite_in_direction_by(&ctx, wi, |ctx, light| pmf(i, ctx, light));
+                let (le, pdf) = self.infinite_in_direction_by(&ctx(i), wi(i), |ctx, light| pmf(i, ctx, light));
                 out(i, le, pdf);
             }
         }

@@ -8,10 +8,13 @@ use crate::scene::RenderJob;
 use std::ops::Range;
 use std::sync::atomic::AtomicBool;
 
+/// Its multiples modulo 1 are spread evenly.
+const GOLDEN_RATIO: f64 = 0.618_033_988_749_895;
+
 /// Nothing stops what is measured.
 static STOP: AtomicBool = AtomicBool::new(false);
 
-/// Batches of whole pixels, every k-th of a pass.
+/// Batches of whole pixels of a pass.
 pub struct Batches<'a> {
     run: Run<'a>,
     /// The pixels of each batch: of a tile, row by row.
@@ -35,10 +38,11 @@ impl<'a> Batches<'a> {
             })
             .collect();
 
-        // Every k-th batch
+        // Not every k-th one: k may divide the number in a row of tiles, and the same columns would be taken
         let all: usize = parts.iter().map(|(_, pixels)| pixels.len() * per_pixel as usize).sum();
-        let stride = all.div_ceil(rays.max(1)).max(1);
-        let parts = parts.into_iter().step_by(stride).collect();
+        let share = rays as f64 / all.max(1) as f64;
+        let is_taken = |i: usize| (i as f64 * GOLDEN_RATIO).fract() < share;
+        let parts = parts.into_iter().enumerate().filter(|&(i, _)| is_taken(i)).map(|(_, part)| part).collect();
         Batches { run, parts, samples: 0..per_pixel, scratch: camera_samples::Scratch::default() }
     }
 

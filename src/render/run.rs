@@ -35,6 +35,10 @@ const NOISE_INTERVAL: Duration = Duration::from_secs(1);
 /// The same by the time that one of them takes.
 const NOISE_REST: u32 = 50;
 
+/// Camera samples of a tile in the longest pass: 16 per pixel of a usual one. To read and write the sums of a pixel takes
+/// as long as to add several samples.
+const TILE_SAMPLES: u32 = 1 << 14;
+
 // All samples of a turn in a cell are in one batch
 const _: () = assert!(BATCH_PATHS >= cells::CELL.pow(2) as usize && BATCH_PATHS >= REPLICA_CELL.pow(2) as usize);
 
@@ -273,7 +277,7 @@ impl<'a> Run<'a> {
 
     /// Samples per pixel of the longest pass.
     pub(super) fn pass_length(&self) -> u32 {
-        (BATCH_PATHS as u32 / self.tile_size.max(1).pow(2)).clamp(1, 64)
+        (TILE_SAMPLES / self.tile_size.max(1).pow(2)).clamp(1, 64)
     }
 
     /// Samples per pixel of the next pass, at most `longest`, as the time limit has it; `done` are those of this run.

@@ -4,12 +4,12 @@
 //! in lanes; a texel is one load of four floats. The maps of the square to the sphere are those of
 //! [`lumiris_numbers::math::sphere_map`].
 
-use super::lane::{F, I, LANES, Vec3s, begin, load, or_zero, safe_sqrt, store};
+use super::lane::{Columns3, F, I, LANES, Vec3s, begin, load, or_zero, safe_sqrt, store};
 use super::light::LightLanes;
 use super::wide::{sin_cos_quadrant, sin_cos_turns};
 use fearless_simd::{Level, Simd, dispatch, f32x4, f32x8, prelude::*};
 use lumiris_numbers::math::distribution::{Running, STEP, clamped};
-use lumiris_numbers::math::sphere_map::pdf_equal_area_square_to_sphere;
+use lumiris_numbers::math::sphere_map::{self, pdf_equal_area_square_to_sphere};
 use lumiris_numbers::math::{Mat3, ONE_MINUS_EPSILON, TexelDistribution};
 use std::f32::consts::{PI, TAU};
 
@@ -156,6 +156,21 @@ fn lat_long<S: Simd>(x: F<S>, y: F<S>) -> (Vec3s<S>, F<S>) {
     let (sin_phi, cos_phi) = sin_cos_turns(x);
     let w = Vec3s { x: sin_theta * cos_phi, y: sin_theta * sin_phi, z: cos_theta };
     (w, F::splat(x.token(), 1.0) / (sin_theta * (TAU * PI)))
+}
+
+/// The points of the square that stand for unit directions under the equal-area octahedral map. Slices have one length, a
+/// multiple of [`LANES`].
+pub fn equal_area_squares(level: Level, w: Columns3<'_>, out: [&mut [f32]; 2]) {
+    dispatch!(level, simd => squares_lanes(simd, w, out));
+}
+
+#[inline(always)]
+fn squares_lanes<S: Simd>(simd: S, w: Columns3<'_>, [u, v]: [&mut [f32]; 2]) {
+    for i in (0..u.len()).step_by(LANES) {
+        let (x, y) = sphere_map::equal_area_squares(Vec3s::load(simd, w, i).into());
+        store(x.0, u, i);
+        store(y.0, v, i);
+    }
 }
 
 impl Environment<'_> {

@@ -75,7 +75,8 @@ impl EmitterRays {
         let directions = wi;
         job.lights.infinite_in_directions(
             far.len(),
-            |k| (at.get(far[k] as usize), directions.vec3(far[k] as usize)),
+            |k| at.get(far[k] as usize),
+            |k| directions.vec3(far[k] as usize),
             |k, le, p_light| {
                 let i = far[k] as usize;
                 p_bsdf[i] = if le.is_black() { 0.0 } else { p_bsdf[i] };

@@ -86,11 +86,9 @@ pub struct Surface {
     pub lobes: Vec<GlossyLobe>,
 }
 
-/// What a vertex takes over from its path.
+/// The numbers of a row that its path gives.
 #[derive(Clone, Copy, Debug)]
-pub struct VertexHeader {
-    /// Index of the path.
-    pub path: u32,
+pub struct RowNumbers {
     /// Time (0 to 1).
     pub time: f32,
     /// Random numbers of the vertex, and of its direct light.
@@ -100,8 +98,8 @@ pub struct VertexHeader {
 /// A vertex that is determined by itself.
 #[derive(Clone, Copy, Debug)]
 pub struct Single<'w> {
-    /// What it takes over from its path.
-    pub header: VertexHeader,
+    /// Index of its path.
+    pub path: u32,
     /// The point.
     pub p: Vec3,
     /// Bound of its rounding error.
@@ -117,7 +115,7 @@ pub struct Single<'w> {
 /// A vertex on a mesh in world space, whose point is found by a kernel.
 #[derive(Clone, Copy, Debug)]
 struct Plain {
-    header: VertexHeader,
+    path: u32,
     rho: Rgb,
 }
 
@@ -193,13 +191,7 @@ impl<'w> Vertices<'w> {
     /// Adds the vertex where a ray of direction `d` has met a mesh in world space that reflects `rho` everywhere: at the
     /// point of `triangle` with the weights `uv` of the second and the third corner.
     #[inline]
-    pub fn push_plain(
-        &mut self,
-        header: VertexHeader,
-        (mesh, triangle, uv): (&TriangleMesh, u32, [f32; 2]),
-        d: Vec3,
-        rho: Rgb,
-    ) {
+    pub fn push_plain(&mut self, path: u32, (mesh, triangle, uv): (&TriangleMesh, u32, [f32; 2]), d: Vec3, rho: Rgb) {
         let (block, k) = (self.plain.len() / LANES, self.plain.len() % LANES);
         if block == self.hits.len() {
             self.hits.push(TriangleHits::default());
@@ -219,11 +211,11 @@ impl<'w> Vertices<'w> {
         [hits.b[0][k], hits.b[1][k]] = uv;
         hits.orientation[k] = if mesh.flip_normal { -1.0 } else { 1.0 };
         set_lane(&mut hits.d, k, d);
-        self.plain.push(Plain { header, rho });
+        self.plain.push(Plain { path, rho });
     }
 
-    /// Gives all vertices that were added their rows: those with BSDFs of their own first.
-    pub fn finish(&mut self, lights: &LightSampling) {
+    /// Gives all vertices that were added their rows: those with BSDFs of their own first. `numbers` are those of a path.
+    pub fn finish(&mut self, lights: &LightSampling, mut numbers: impl FnMut(u32) -> RowNumbers) {
         let (singles, plain) = (std::mem::take(&mut self.singles), std::mem::take(&mut self.plain));
         // The kernel writes whole vectors from the first plain row on
         self.surface.reserve(padded(singles.len() + padded(plain.len())));
@@ -234,19 +226,16 @@ impl<'w> Vertices<'w> {
         if !lambertian.is_empty() {
             self.runs.push(Run { kernel: Some(Kernel::Diffuse), rows: lambertian });
         }
+        for &path in &self.path {
+            let RowNumbers { time, streams: [of_vertex, direct] } = numbers(path);
+            self.time.push(time);
+            self.streams.push(of_vertex);
+            self.direct.push(direct);
+        }
         self.find_lobes(lights);
         (self.singles, self.plain) = (singles, plain);
         self.singles.clear();
         self.plain.clear();
-    }
-
-    #[inline]
-    fn add_row(&mut self, header: &VertexHeader) -> usize {
-        self.path.push(header.path);
-        self.time.push(header.time);
-        self.streams.push(header.streams[0]);
-        self.direct.push(header.streams[1]);
-        self.path.len() - 1
     }
 
     /// Adds the rows that have BSDFs of their own, kernel by kernel.
@@ -288,7 +277,8 @@ impl<'w> Vertices<'w> {
     }
 
     fn add_single(&mut self, single: &Single<'_>) {
-        let i = self.add_row(&single.header);
+        let i = self.len();
+        self.path.push(single.path);
         let Single { p, p_error, wo, bsdf, .. } = single;
         let has_surface = bsdf.bsdf.has_surface();
         let s = &mut self.surface;
@@ -305,8 +295,8 @@ impl<'w> Vertices<'w> {
     fn add_plain(&mut self, plain: &[Plain]) {
         let (first, len) = (self.len(), padded(plain.len()));
         self.first_plain = first;
-        for vertex in plain {
-            let i = self.add_row(&vertex.header);
+        self.path.extend(plain.iter().map(|vertex| vertex.path));
+        for (i, vertex) in (first..).zip(plain) {
             self.surface.rho.set_rgb(i, vertex.rho);
         }
         let Surface { p, p_error, n, lit, ns, wo, .. } = &mut self.surface;
@@ -370,15 +360,18 @@ impl<'w> Vertices<'w> {
         lights: &LightSampling,
         bsdf: impl Fn(usize) -> Option<SurfaceBsdf<'w>>,
     ) {
+        let mut row_of = vec![0; other.path.iter().max().map_or(0, |&path| path as usize + 1)];
         for i in 0..other.len() {
+            row_of[other.path[i] as usize] = i;
             let Some(bsdf) = bsdf(i) else { continue };
-            let streams = [other.streams[i], other.direct[i]];
-            let header = VertexHeader { path: other.path[i], time: other.time[i], streams };
             let s = &other.surface;
             let (p, p_error, wo) = (s.p.vec3(i), s.p_error.vec3(i), s.wo.vec3(i));
-            self.push(Single { header, p, p_error, wo, bsdf, media: other.media(i) });
+            self.push(Single { path: other.path[i], p, p_error, wo, bsdf, media: other.media(i) });
         }
-        self.finish(lights);
+        self.finish(lights, |path| {
+            let i = row_of[path as usize];
+            RowNumbers { time: other.time[i], streams: [other.streams[i], other.direct[i]] }
+        });
     }
 }
 

@@ -3,7 +3,8 @@
 use super::support::{LENGTHS, assert_same_bits};
 use lumiris_lanes::LightLanes;
 use lumiris_lanes::environment::*;
-use lumiris_numbers::math::{Mat3, TexelDistribution};
+use lumiris_lanes::lane::LANES;
+use lumiris_numbers::math::{Mat3, TexelDistribution, Vec3, sphere_map};
 use lumiris_test_support::random::{RngExt, pcg32};
 
 #[test]
@@ -35,6 +36,31 @@ fn lanes_are_the_same_at_all_levels() {
                     }
                 });
             }
+        }
+    }
+}
+
+#[test]
+fn points_of_the_square_have_the_bits_of_each_by_itself() {
+    let mut stream = pcg32([6, 6, 7]);
+    let mut w: [Vec<f32>; 3] = Default::default();
+    for i in 0..64 * LANES {
+        // Axes, where coordinates are 0, and then any direction
+        let axis = if i % 2 == 0 { 1.0 } else { -1.0 };
+        let v = match i {
+            0..6 => Vec3::AXES[i / 2] * axis,
+            _ => Vec3::from_array(std::array::from_fn(|_| stream.random::<f32>() - 0.5)).normalize(),
+        };
+        w.iter_mut().zip(v.to_array()).for_each(|(column, x)| column.push(x));
+    }
+    for level in lumiris_lanes::levels() {
+        let [mut u, mut v] = [vec![0.0; w[0].len()], vec![0.0; w[0].len()]];
+        equal_area_squares(level, w.each_ref().map(|column| &column[..]), [&mut u, &mut v]);
+        for i in 0..u.len() {
+            let direction = Vec3::new(w[0][i], w[1][i], w[2][i]);
+            let p = sphere_map::equal_area_sphere_to_square(direction);
+            assert_eq!([u[i], v[i]].map(f32::to_bits), p.to_array().map(f32::to_bits), "{direction}");
+            assert!((sphere_map::equal_area_square_to_sphere(p) - direction).length() < 2e-6, "{direction}");
         }
     }
 }

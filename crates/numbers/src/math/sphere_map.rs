@@ -1,6 +1,9 @@
 //! Maps between the unit square and the sphere of directions: the equal-area octahedral map [Clarberg 2008] in the
 //! orientation of pbrt-v4, and the map of latitude and longitude. z is up in both.
 
+use super::elementary::arctangent;
+use super::number::Number;
+use super::v3::V3;
 use super::warp::azimuth;
 use super::{Vec2, Vec3, safe_sqrt, sqr};
 use std::f32::consts::{FRAC_2_PI, FRAC_PI_4, PI, TAU};
@@ -32,19 +35,23 @@ pub fn pdf_equal_area_square_to_sphere() -> f32 {
 /// Inverse of [`equal_area_square_to_sphere`]; `w` is unit.
 #[inline]
 pub fn equal_area_sphere_to_square(w: Vec3) -> Vec2 {
-    let (x, y, z) = (w.x.abs(), w.y.abs(), w.z.abs());
+    equal_area_squares(V3 { x: w.x, y: w.y, z: w.z }).into()
+}
+
+/// [`equal_area_sphere_to_square`] of one direction or of many.
+#[inline(always)]
+pub fn equal_area_squares<N: Number>(w: V3<N>) -> (N, N) {
+    let (x, y, z) = (w.x.magnitude(), w.y.magnitude(), w.z.magnitude());
+    let (zero, one) = (x.constant(0.0), x.constant(1.0));
     // r = sqrt(1 − z), without cancellation near the poles.
-    let r = ((sqr(x) + sqr(y)) / (1.0 + z)).sqrt().min(1.0);
-    let (long, short) = if x > y { (x, y) } else { (y, x) };
-    let mut phi = if long == 0.0 { 0.0 } else { (short / long).atan() * FRAC_2_PI };
-    if x < y {
-        phi = 1.0 - phi;
-    }
-    let (mut u, mut v) = (r - phi * r, phi * r);
-    if w.z < 0.0 {
-        (u, v) = (1.0 - v, 1.0 - u);
-    }
-    Vec2::new((u.copysign(w.x) + 1.0) * 0.5, (v.copysign(w.y) + 1.0) * 0.5)
+    let r = ((x * x + y * y) / (z + 1.0)).root().lesser(one);
+    let is_steep = y.above(x);
+    let phi = arctangent(x.lesser(y), x.greater(y)) * FRAC_2_PI;
+    let phi = N::choose(is_steep, one - phi, phi);
+    let (u, v) = (r - phi * r, phi * r);
+    let is_below = zero.above(w.z);
+    let (u, v) = (N::choose(is_below, one - v, u), N::choose(is_below, one - u, v));
+    ((u.signed_as(w.x) + 1.0) * 0.5, (v.signed_as(w.y) + 1.0) * 0.5)
 }
 
 /// The point of [0, 1]² that stands for the same direction as `p`, which may lie outside by less than 1:
