@@ -5,7 +5,7 @@
 //!
 //! | layer | modules |
 //! |---|---|
-//! | 1 | [`imaging`] |
+//! | 1 | [`imaging`], [`huge_pages`] |
 //! | 2 | [`textures`], [`geometry`], [`bsdfs`], [`media`], [`cameras`], [`film`] |
 //! | 3 | [`materials`], [`lights`], [`accel`] |
 //! | 4 | [`settings`] |
@@ -21,6 +21,7 @@ pub mod cameras;
 pub mod direct;
 pub mod film;
 pub mod geometry;
+pub mod huge_pages;
 pub mod imaging;
 pub mod import;
 pub mod integrators;

@@ -17,7 +17,11 @@ mod progress;
 mod render;
 mod settings;
 
+use lumiris::huge_pages::HugePages;
 use pyo3::prelude::*;
+
+#[global_allocator]
+static MEMORY: HugePages = HugePages;
 
 /// The native module.
 #[pymodule]
