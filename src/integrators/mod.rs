@@ -1,13 +1,15 @@
 //! Light transport: from camera rays to radiance.
 //!
 //! An [`Integrator`] is what all threads share while an image is rendered: it prepares what samples need, makes a
-//! [`Tracer`] for each thread, and reports. Reading order: [`path`] is the loop over vertices, `segment` a path between two of
-//! them, `vertices` finds the next ones, `interior` walks through materials on the way there, and `scatter` extends the paths.
+//! [`Tracer`] for each thread, and reports. Reading order: [`path`] is the loop over vertices, `segment` the state of a path
+//! between two of them, `vertices` traces to the next ones, `interior` walks through materials on the way there,
+//! `direct_light` adds L_d, and `scatter` samples the next segments.
 //! Pixels that are neighbours may share paths ([`reuse`]; which ones: [`cells`]), and light paths bring caustics ([`light_paths`]). [`through_media`] says which settings know participating media. [`irradiance_cache`] and [`photon_map`] replace the light that Lambertian parts reflect (`diffuse`).
 
 pub mod camera_samples;
 pub mod cells;
 mod diffuse;
+mod direct_light;
 mod interior;
 pub mod irradiance_cache;
 pub mod light_layers;

@@ -20,14 +20,13 @@ use super::segment::{LastVertices, PathState};
 pub use super::vertices::Recording;
 use super::vertices::{Stage, VertexSearch};
 use super::{Integrator, Statistics, Tracer};
-use crate::direct::columns::Sinks;
 use crate::direct::{ColumnStage, DirectStage, Estimator, Fits, ShadingPoint, Techniques, Vertices};
 use crate::film::{FeatureSet, PixelSample};
 use crate::materials::SurfaceBsdf;
 use crate::photons::PhotonError;
 use crate::scene::RenderJob;
 use crate::settings::{IntegratorSettings, SampleCounts};
-use lumiris_numbers::math::{Rgb, Vec3};
+use lumiris_numbers::math::Rgb;
 use lumiris_numbers::samplers::SampleStream;
 use std::sync::Arc;
 use std::time::Instant;
@@ -144,9 +143,9 @@ pub struct PathTracer {
     pub(super) search: VertexSearch,
     next: Vec<PathState>,
     scatter: Scatter,
-    radiance: Vec<Rgb>,
-    direct: DirectStage,
-    columns: ColumnStage,
+    pub(super) radiance: Vec<Rgb>,
+    pub(super) direct: DirectStage,
+    pub(super) columns: ColumnStage,
     /// Memory of the vertices of earlier batches.
     spare: [Vertices<'static>; 4],
     /// Paths that samples of a batch share.
@@ -160,14 +159,17 @@ pub struct PathTracer {
 }
 
 /// What the steps at the vertices of a batch read.
-struct Step<'s> {
-    job: &'s RenderJob,
-    samples: &'s [CameraSample],
+pub(super) struct Step<'s> {
+    pub(super) job: &'s RenderJob,
+    pub(super) settings: &'s IntegratorSettings,
+    pub(super) samples: &'s [CameraSample],
     /// Index along the paths.
-    vertex: u32,
-    estimator: Estimator,
+    pub(super) vertex: u32,
+    pub(super) estimator: Estimator,
     /// The samples of direct light, if all of them are traced.
-    techniques: Option<Techniques>,
+    pub(super) techniques: Option<Techniques>,
+    /// Paths go on from the vertices.
+    pub(super) continues: bool,
 }
 
 impl PathTracer {
@@ -216,7 +218,8 @@ impl PathTracer {
         self.follow((job, settings), None, samples, fits, out);
     }
 
-    /// Follows the paths that were started, vertex by vertex; `own` is what the integrator does there itself.
+    /// Follows the paths that were started, vertex by vertex: L = Σ β (L_e·w + L_d). `own` is the integrator's own work at
+    /// vertices.
     pub(super) fn follow(
         &mut self,
         (job, settings): (&RenderJob, &IntegratorSettings),
@@ -225,65 +228,101 @@ impl PathTracer {
         fits: &mut Fits,
         out: &mut [PixelSample],
     ) {
-        let depth = settings.depth();
-        let is_emissive = job.world.scene.media.is_emissive();
-        // Samples that are listed are those of the stages; what an integrator does itself is not in the paths of others
-        let (is_listed, is_plain) = (self.outcomes.is_some(), own.is_none() && self.outcomes.is_none());
         let [mut vertices, mut left, mut lit, mut next] = std::mem::take(&mut self.spare).map(Vertices::emptied);
         let mut drawn = None;
+        let depth = settings.depth();
+        // Paths of an integrator with work of its own do not carry all light, so neighbours cannot share them
+        let may_share = own.is_none() && self.outcomes.is_none();
+        self.reuse.begin(settings.path_reuse.filter(|_| may_share), samples.len());
         fits.begin_batch(samples.len());
-        self.reuse.begin(settings.path_reuse.filter(|_| is_plain), samples.len());
         for vertex in 0..=depth {
             if self.search.active.is_empty() {
                 break;
             }
 
-            // Trace, add β·L_e of what is met, and arrive at the vertices
+            // Trace, add β·L_e·w of the emitters that are hit, and arrive at the vertices
             let from = LastVertices { vertices: &left, techniques: drawn };
             self.search.find(Stage { job, vertex, depth, samples, left: from, out, vertices: &mut vertices });
+            let step = self.step((job, settings), vertex, samples, own.is_some());
 
-            // The samples there. Light samples alone do not find all that media send out: beyond the last vertex there is another
-            // segment for it
-            let estimator = Estimator::at_vertex(settings, self.estimator_of.unwrap_or(vertex));
-            let continues = vertex + 1 < depth || is_emissive && vertex < depth;
-            let techniques = Techniques::of(&estimator, continues && own.is_none()).filter(|_| !is_listed);
-            let step = Step { job, samples, vertex, estimator, techniques };
-
-            // What the integrator knows of the light, and what neighbours share of the path
-            let own = own.as_mut().map(|own| {
-                let found = BatchVertices { vertex, paths: &self.search.active, vertices: &vertices };
-                let shadings = own(&found, out);
-                lit.clear();
-                lit.select(&vertices, &job.lights, |i| shadings[i].lit);
-                next.clear();
-                next.select(&vertices, &job.lights, |i| shadings[i].next);
-            });
-            let (lit, next) = if own.is_some() { (&lit, &next) } else { (&vertices, &vertices) };
+            // Let the integrator answer for its part of the light, and neighbours share their paths
+            let (lit, next) = match &mut own {
+                Some(own) => {
+                    self.leave_to_integrator(*own, (job, vertex), &vertices, [&mut lit, &mut next], out);
+                    (&lit, &next)
+                }
+                None => (&vertices, &vertices),
+            };
             self.share(vertex, &vertices, out);
 
             // Add β·L_d
             self.light(&step, lit, fits, out);
 
             // Scatter
-            self.next.clear();
-            if continues {
-                let start = Instant::now();
-                let how = Continuation { settings, vertex, techniques, only_specular: self.only_specular };
-                self.scatter.extend(&how, next, &self.search.active, &mut self.next);
-                self.search.stats.shade_time += start.elapsed();
-            }
-            std::mem::swap(&mut self.search.active, &mut self.next);
+            self.scatter(&step, next);
             std::mem::swap(&mut left, &mut vertices);
             vertices.clear();
-            drawn = techniques;
+            drawn = step.techniques;
         }
-        if let Some(reuse) = self.reuse.active() {
-            let start = Instant::now();
-            self.direct.stats.segments += reuse.resolve(job, samples, out);
-            self.direct.stats.t2 += start.elapsed();
-        }
+        self.resolve_shared(job, samples, out);
         fits.end_batch(samples.iter().map(|s| (s.fit, s.weight)));
         self.spare = [vertices, left, lit, next].map(Vertices::emptied);
+    }
+
+    /// How light is sampled at vertices of this index, and how paths go on.
+    fn step<'s>(
+        &self,
+        (job, settings): (&'s RenderJob, &'s IntegratorSettings),
+        vertex: u32,
+        samples: &'s [CameraSample],
+        has_own: bool,
+    ) -> Step<'s> {
+        let estimator = Estimator::at_vertex(settings, self.estimator_of.unwrap_or(vertex));
+        // Light samples do not find all emission of media: that beyond the last vertex takes another segment
+        let beyond_last = job.world.scene.media.is_emissive() && vertex < settings.depth();
+        let continues = vertex + 1 < settings.depth() || beyond_last;
+        // Outcomes are those of the stages
+        let techniques = Techniques::of(&estimator, continues && !has_own).filter(|_| self.outcomes.is_none());
+        Step { job, settings, samples, vertex, estimator, techniques, continues }
+    }
+
+    /// Lets an integrator add the light that it knows. `rest` become the vertices that are lit, and those from which paths
+    /// go on.
+    fn leave_to_integrator<'w>(
+        &self,
+        own: &mut AtVertices<'_>,
+        (job, vertex): (&'w RenderJob, u32),
+        vertices: &Vertices<'w>,
+        rest: [&mut Vertices<'w>; 2],
+        out: &mut [PixelSample],
+    ) {
+        let [lit, next] = rest;
+        let shadings = own(&BatchVertices { vertex, paths: &self.search.active, vertices }, out);
+        lit.clear();
+        lit.select(vertices, &job.lights, |i| shadings[i].lit);
+        next.clear();
+        next.select(vertices, &job.lights, |i| shadings[i].next);
+    }
+
+    /// Makes the next segments of the paths that go on from vertices.
+    fn scatter(&mut self, step: &Step<'_>, vertices: &Vertices<'_>) {
+        let start = Instant::now();
+        self.next.clear();
+        if step.continues {
+            let Step { settings, vertex, techniques, .. } = *step;
+            let how = Continuation { settings, vertex, techniques, only_specular: self.only_specular };
+            self.scatter.extend(&how, vertices, &self.search.active, &mut self.next);
+        }
+        std::mem::swap(&mut self.search.active, &mut self.next);
+        self.search.stats.shade_time += start.elapsed();
+    }
+
+    /// Adds the light that neighbours share.
+    fn resolve_shared(&mut self, job: &RenderJob, samples: &[CameraSample], out: &mut [PixelSample]) {
+        let Some(reuse) = self.reuse.active() else { return };
+        let start = Instant::now();
+        self.direct.stats.segments += reuse.resolve(job, samples, out);
+        self.direct.stats.t2 += start.elapsed();
     }
 
     /// Lets the paths at Lambertian vertices be shared.
@@ -300,96 +339,6 @@ impl PathTracer {
             path.beta = reuse.arrive(arrival, at, (path.beta, surface.rho.rgb(i)), radiance);
         }
         self.search.stats.shade_time += start.elapsed();
-    }
-
-    /// Adds the direct light of vertices.
-    fn light(&mut self, step: &Step<'_>, vertices: &Vertices<'_>, fits: &mut Fits, out: &mut [PixelSample]) {
-        match &step.techniques {
-            Some(techniques) => self.light_columns(step, techniques, vertices, fits, out),
-            None => self.light_points(step, vertices, fits, out),
-        }
-    }
-
-    /// Adds the direct light of vertices whose samples are all traced.
-    fn light_columns(
-        &mut self,
-        step: &Step<'_>,
-        techniques: &Techniques,
-        vertices: &Vertices<'_>,
-        fits: &mut Fits,
-        out: &mut [PixelSample],
-    ) {
-        let job = step.job;
-        let VertexSearch { active, layers, guide, recording, .. } = &mut self.search;
-        let path = |row: usize| &active[vertices.path[row] as usize];
-        let rest = guide.as_ref().map(|guide| {
-            move |row: usize, light, n, wi: Vec3| {
-                let chain = path(row).chain;
-                if chain.is_caustic() { chain.rest(guide.density(light, n, -wi)) } else { 1.0 }
-            }
-        });
-        let are_kept = layers.are_kept();
-        let mut visible = |row: usize, light: Option<_>, wi, contribution| {
-            let (path, p) = (path(row), vertices.surface.p.vec3(row));
-            match light {
-                Some(light) => layers.add(&job.lights, path.sample, (light, p, wi), path.beta * contribution),
-                None => layers.add_infinite(&job.lights, path.sample, (p, wi), path.beta * contribution),
-            }
-        };
-        let mut sinks = Sinks {
-            rest: rest.as_ref().map(|rest| rest as _),
-            visible: if are_kept { Some(&mut visible) } else { None },
-            segments: recording.as_mut().map(|r| r.segments_at(step.vertex)),
-        };
-        self.columns.estimate(job, techniques, vertices, &mut sinks, &mut self.direct.stats);
-
-        let start = Instant::now();
-        for row in 0..vertices.len() {
-            let (path, radiance) = (path(row), self.columns.radiance(row));
-            out[path.sample as usize].radiance += path.beta * radiance;
-            if techniques.has_controls {
-                let value = job.world.scene.film.balanced(radiance).to_array();
-                fits.set_controls(path.sample, value, self.columns.controls(job, row));
-            }
-        }
-        self.direct.stats.select += start.elapsed();
-    }
-
-    /// Adds the direct light of vertices by the stages of an estimator that selects among its samples.
-    fn light_points(&mut self, step: &Step<'_>, vertices: &Vertices<'_>, fits: &mut Fits, out: &mut [PixelSample]) {
-        let (job, active) = (step.job, &self.search.active);
-        // In the order of the paths: fits are sums over the points of a pixel
-        let mut rows = vec![u32::MAX; active.len()];
-        vertices.path.iter().zip(0..).for_each(|(&path, row)| rows[path as usize] = row);
-        rows.retain(|&row| row != u32::MAX);
-        let path = |point: usize| &active[vertices.path[rows[point] as usize] as usize];
-        let counts = step.estimator.sample_counts();
-        let point = |(point, &row): (usize, &u32)| {
-            let sample = &step.samples[path(point).sample as usize];
-            let counts = if step.vertex == 0 { sample.sample_counts } else { counts };
-            vertices.point(row as usize, counts, [path(point).sample, sample.fit])
-        };
-        let points: Vec<ShadingPoint<'_>> = rows.iter().enumerate().map(point).collect();
-        self.direct.estimate(job, &step.estimator, &points, fits, &mut self.radiance);
-
-        if let Some(r) = &mut self.search.recording {
-            r.segments_at(step.vertex).push(self.direct.segments().clone());
-        }
-        if let Some(outcomes) = self.outcomes.as_mut().filter(|_| step.vertex == 0) {
-            outcomes.extend(self.direct.outcomes().map(|(point, unshadowed, is_free)| {
-                let contribution = if is_free { unshadowed } else { Rgb::BLACK };
-                Outcome { sample: path(point as usize).sample, unshadowed, contribution }
-            }));
-        }
-        for (point, &radiance) in self.radiance.iter().enumerate() {
-            out[path(point).sample as usize].radiance += path(point).beta * radiance;
-        }
-        if self.search.layers.are_kept() {
-            for (point, (light, wi), contribution) in self.direct.visible() {
-                let (path, p) = (path(point as usize), points[point as usize].light_ctx().p);
-                self.search.layers.add(&job.lights, path.sample, (light, p, wi), path.beta * contribution);
-            }
-        }
     }
 }
 

@@ -404,3 +404,71 @@ fn in_memory_of<T, U>(mut old: Vec<T>) -> Vec<U> {
     old.clear();
     old.into_iter().map(|_| unreachable!("the vector is empty")).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::lights::{LightChoice, LightSamplerKind, LightSetBuilder};
+    use lumiris_numbers::math::Bounds3;
+    use lumiris_numbers::samplers::SamplerKind;
+    use std::sync::Arc;
+
+    fn lights() -> LightSampling {
+        let set = LightSetBuilder::default().build(&Bounds3::from_points([Vec3::ZERO, Vec3::ONE]));
+        let choice = LightChoice { kind: LightSamplerKind::Uniform, infinite_fraction: None, glows: false };
+        LightSampling::new(Arc::new(set), choice, 1)
+    }
+
+    fn numbers(path: u32) -> RowNumbers {
+        let stream = |sample| SampleStream::new(SamplerKind::Sobol, [path, 0], sample, 7);
+        RowNumbers { time: path as f32 / 8.0, streams: [stream(0), stream(1)] }
+    }
+
+    fn single(path: u32, bsdf: SurfaceBsdf<'static>, media: Sides) -> Single<'static> {
+        Single { path, p: Vec3::splat(path as f32), p_error: Vec3::ZERO, wo: Vec3::Z, bsdf, media }
+    }
+
+    fn grey() -> SurfaceBsdf<'static> {
+        let bsdf = Bsdf::Diffuse(Diffuse { reflectance: Rgb::splat(0.5) });
+        SurfaceBsdf { bsdf, frame: Frame::from_z(Vec3::Z), n: Vec3::Z, makes_caustics: false }
+    }
+
+    /// The rows belong to these paths, with the points and the numbers of each.
+    fn assert_rows(vertices: &Vertices<'_>, paths: &[u32]) {
+        assert_eq!(vertices.path, paths);
+        for (row, &path) in paths.iter().enumerate() {
+            let RowNumbers { time, streams } = numbers(path);
+            assert_eq!(vertices.surface.p.vec3(row), Vec3::splat(path as f32));
+            assert_eq!(vertices.time[row], time);
+            assert_eq!(vertices.streams[row].draw::<2>(), streams[0].draw::<2>());
+            assert_eq!(vertices.direct[row].draw::<2>(), streams[1].draw::<2>());
+        }
+    }
+
+    #[test]
+    fn rows_are_sorted_by_kernel_and_keep_the_numbers_of_their_paths() {
+        let (lights, in_medium) = (lights(), SurfaceBsdf::in_medium(0.2, Vec3::Z));
+        let mut vertices = Vertices::default();
+        for path in [5, 1, 4] {
+            vertices.push(single(path, grey(), Sides::default()));
+        }
+        vertices.push(single(0, grey(), Sides::both(Some(3))));
+        vertices.push(single(2, in_medium, Sides::default()));
+        vertices.finish(&lights, numbers);
+
+        // One by one, by the kernel with a medium around, and Lambertian
+        assert_rows(&vertices, &[2, 0, 5, 1, 4]);
+        let runs: Vec<_> = vertices.runs.iter().map(|run| (run.kernel, run.rows.clone())).collect();
+        assert_eq!(runs, [(None, 0..1), (Some(Kernel::Diffuse), 1..2), (Some(Kernel::Diffuse), 2..5)]);
+        assert_eq!((vertices.media(1).front, vertices.media(2).front), (Some(3), None));
+
+        // Chosen rows get others, by their new BSDFs
+        let mut chosen = Vertices::default();
+        chosen.select(&vertices, &lights, |row| match vertices.path[row] {
+            4 => Some(in_medium),
+            path => (path < 5).then(grey),
+        });
+        assert_rows(&chosen, &[4, 0, 2, 1]);
+        assert_eq!(chosen.bsdfs.len(), 2);
+    }
+}

@@ -1,0 +1,101 @@
+//! The direct light of the vertices of paths, by the columns of `mc`, `mis` and `ocv` or by the stages of other estimators.
+
+use super::path::{Outcome, PathTracer, Step};
+use super::vertices::VertexSearch;
+use crate::direct::columns::Sinks;
+use crate::direct::{Fits, ShadingPoint, Techniques, Vertices};
+use crate::film::PixelSample;
+use lumiris_numbers::math::{Rgb, Vec3};
+use std::time::Instant;
+
+impl PathTracer {
+    /// Adds the direct light of vertices.
+    pub(super) fn light(&mut self, step: &Step<'_>, vertices: &Vertices<'_>, fits: &mut Fits, out: &mut [PixelSample]) {
+        match &step.techniques {
+            Some(techniques) => self.light_columns(step, techniques, vertices, fits, out),
+            None => self.light_points(step, vertices, fits, out),
+        }
+    }
+
+    /// Adds the direct light of vertices whose samples are all traced.
+    fn light_columns(
+        &mut self,
+        step: &Step<'_>,
+        techniques: &Techniques,
+        vertices: &Vertices<'_>,
+        fits: &mut Fits,
+        out: &mut [PixelSample],
+    ) {
+        let job = step.job;
+        let VertexSearch { active, layers, guide, recording, .. } = &mut self.search;
+        let path = |row: usize| &active[vertices.path[row] as usize];
+        let rest = guide.as_ref().map(|guide| {
+            move |row: usize, light, n, wi: Vec3| {
+                let chain = path(row).chain;
+                if chain.is_caustic() { chain.rest(guide.density(light, n, -wi)) } else { 1.0 }
+            }
+        });
+        let are_kept = layers.are_kept();
+        let mut visible = |row: usize, light: Option<_>, wi, contribution| {
+            let (path, p) = (path(row), vertices.surface.p.vec3(row));
+            match light {
+                Some(light) => layers.add(&job.lights, path.sample, (light, p, wi), path.beta * contribution),
+                None => layers.add_infinite(&job.lights, path.sample, (p, wi), path.beta * contribution),
+            }
+        };
+        let mut sinks = Sinks {
+            rest: rest.as_ref().map(|rest| rest as _),
+            visible: if are_kept { Some(&mut visible) } else { None },
+            segments: recording.as_mut().map(|r| r.segments_at(step.vertex)),
+        };
+        self.columns.estimate(job, techniques, vertices, &mut sinks, &mut self.direct.stats);
+
+        let start = Instant::now();
+        for row in 0..vertices.len() {
+            let (path, radiance) = (path(row), self.columns.radiance(row));
+            out[path.sample as usize].radiance += path.beta * radiance;
+            if techniques.has_controls {
+                let value = job.world.scene.film.balanced(radiance).to_array();
+                fits.set_controls(path.sample, value, self.columns.controls(job, row));
+            }
+        }
+        self.direct.stats.select += start.elapsed();
+    }
+
+    /// Adds the direct light of vertices by the stages of an estimator that selects among its samples.
+    fn light_points(&mut self, step: &Step<'_>, vertices: &Vertices<'_>, fits: &mut Fits, out: &mut [PixelSample]) {
+        let (job, active) = (step.job, &self.search.active);
+        // In the order of the paths: fits are sums over the points of a pixel
+        let mut rows = vec![u32::MAX; active.len()];
+        vertices.path.iter().zip(0..).for_each(|(&path, row)| rows[path as usize] = row);
+        rows.retain(|&row| row != u32::MAX);
+        let path = |point: usize| &active[vertices.path[rows[point] as usize] as usize];
+        let counts = step.estimator.sample_counts();
+        let point = |(point, &row): (usize, &u32)| {
+            let sample = &step.samples[path(point).sample as usize];
+            let counts = if step.vertex == 0 { sample.sample_counts } else { counts };
+            vertices.point(row as usize, counts, [path(point).sample, sample.fit])
+        };
+        let points: Vec<ShadingPoint<'_>> = rows.iter().enumerate().map(point).collect();
+        self.direct.estimate(job, &step.estimator, &points, fits, &mut self.radiance);
+
+        if let Some(r) = &mut self.search.recording {
+            r.segments_at(step.vertex).push(self.direct.segments().clone());
+        }
+        if let Some(outcomes) = self.outcomes.as_mut().filter(|_| step.vertex == 0) {
+            outcomes.extend(self.direct.outcomes().map(|(point, unshadowed, is_free)| {
+                let contribution = if is_free { unshadowed } else { Rgb::BLACK };
+                Outcome { sample: path(point as usize).sample, unshadowed, contribution }
+            }));
+        }
+        for (point, &radiance) in self.radiance.iter().enumerate() {
+            out[path(point).sample as usize].radiance += path(point).beta * radiance;
+        }
+        if self.search.layers.are_kept() {
+            for (point, (light, wi), contribution) in self.direct.visible() {
+                let (path, p) = (path(point as usize), points[point as usize].light_ctx().p);
+                self.search.layers.add(&job.lights, path.sample, (light, p, wi), path.beta * contribution);
+            }
+        }
+    }
+}
