@@ -6,7 +6,7 @@ use super::light_paths::{Chain, Guide};
 use super::segment::{CameraSample, LastVertices, PathState, PathStats, domain};
 use crate::accel::{Coherence, Hit, RayBatch};
 use crate::direct::Vertices;
-use crate::direct::vertices::{RowNumbers, Single};
+use crate::direct::vertices::Single;
 use crate::film::{FeatureSet, Features, PixelSample};
 use crate::geometry::{GeometryId, Shape, SurfaceHit};
 use crate::lights::LightCtx;
@@ -55,23 +55,6 @@ pub(super) struct Stage<'a, 'w> {
     pub(super) out: &'a mut [PixelSample],
     /// Takes the vertices.
     pub(super) vertices: &'a mut Vertices<'w>,
-}
-
-/// The random numbers of vertices, and of their direct light.
-#[derive(Debug)]
-struct VertexNumbers([Domain; 3]);
-
-impl VertexNumbers {
-    fn new(vertex: u32) -> Self {
-        let key = domain::VERTEX + vertex;
-        VertexNumbers([Domain::new(key), Domain::new(key), Domain::new(domain::DIRECT)])
-    }
-
-    #[inline]
-    fn of(&mut self, sample: &CameraSample) -> [SampleStream; 2] {
-        let VertexNumbers([of_vertex, outer, inner]) = self;
-        [of_vertex.of(&sample.stream), inner.of(&outer.of(&sample.direct))]
-    }
 }
 
 /// How a path comes through its medium.
@@ -160,11 +143,8 @@ impl VertexSearch {
             self.stats.shade_time += start.elapsed();
         }
         let start = Instant::now();
-        let mut numbers = VertexNumbers::new(at.vertex);
-        at.vertices.finish(&at.job.lights, |path| {
-            let path = &self.active[path as usize];
-            RowNumbers { time: path.ray.time, streams: numbers.of(&at.samples[path.sample as usize]) }
-        });
+        at.vertices.finish(&at.job.lights);
+        self.set_numbers(&mut at);
         if at.vertex == 0 && self.features != FeatureSet::None {
             self.set_plain_features(&mut at);
         }
@@ -192,6 +172,17 @@ impl VertexSearch {
             None if self.looks_for_emitters(at.vertex, path) => self.escaped.push(index),
             None => {}
         }
+    }
+
+    /// The times of vertices, and their random numbers.
+    fn set_numbers(&self, at: &mut Stage<'_, '_>) {
+        let Vertices { path, time, streams, direct, .. } = &mut *at.vertices;
+        let sample = |&path: &u32| &at.samples[self.active[path as usize].sample as usize];
+        let key = domain::VERTEX + at.vertex;
+        let (mut of_vertex, mut outer, mut inner) = (Domain::new(key), Domain::new(key), Domain::new(domain::DIRECT));
+        time.extend(path.iter().map(|path| sample(path).ray.ray.time));
+        streams.extend(path.iter().map(|path| of_vertex.of(&sample(path).stream)));
+        direct.extend(path.iter().map(|path| inner.of(&outer.of(&sample(path).direct))));
     }
 
     /// The features of first vertices on plain meshes.

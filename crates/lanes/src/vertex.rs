@@ -105,11 +105,16 @@ fn either<S: Simd>(first: M<S>, a: Vec3s<S>, b: Vec3s<S>) -> Vec3s<S> {
     Vec3s { x: first.select(a.x, b.x), y: first.select(a.y, b.y), z: first.select(a.z, b.z) }
 }
 
+#[inline(always)]
+fn all_widened<S: Simd>(v: Vec3s<S>) -> [f64x8<S>; 3] {
+    [widened(v.x), widened(v.y), widened(v.z)]
+}
+
 /// The points and the unit normals of triangles.
 #[inline(always)]
 fn point_and_normal<S: Simd>(corners: [Vec3s<S>; 3], b1: F<S>, b2: F<S>) -> (Vec3s<S>, Vec3s<S>) {
     let (b1, b2) = (widened(b1), widened(b2));
-    let [p0, p1, p2] = corners.map(|v| [widened(v.x), widened(v.y), widened(v.z)]);
+    let [p0, p1, p2] = [all_widened(corners[0]), all_widened(corners[1]), all_widened(corners[2])];
     let e1 = [p1[0] - p0[0], p1[1] - p0[1], p1[2] - p0[2]];
     let e2 = [p2[0] - p0[0], p2[1] - p0[1], p2[2] - p0[2]];
     let p = [p0[0] + e1[0] * b1 + e2[0] * b2, p0[1] + e1[1] * b1 + e2[1] * b2, p0[2] + e1[2] * b1 + e2[2] * b2];

@@ -86,15 +86,6 @@ pub struct Surface {
     pub lobes: Vec<GlossyLobe>,
 }
 
-/// The numbers of a row that its path gives.
-#[derive(Clone, Copy, Debug)]
-pub struct RowNumbers {
-    /// Time (0 to 1).
-    pub time: f32,
-    /// Random numbers of the vertex, and of its direct light.
-    pub streams: [SampleStream; 2],
-}
-
 /// A vertex that is determined by itself.
 #[derive(Clone, Copy, Debug)]
 pub struct Single<'w> {
@@ -214,8 +205,9 @@ impl<'w> Vertices<'w> {
         self.plain.push(Plain { path, rho });
     }
 
-    /// Gives all vertices that were added their rows: those with BSDFs of their own first. `numbers` are those of a path.
-    pub fn finish(&mut self, lights: &LightSampling, mut numbers: impl FnMut(u32) -> RowNumbers) {
+    /// Gives all vertices that were added their rows: those with BSDFs of their own first. Their times and random numbers
+    /// are left to the caller.
+    pub fn finish(&mut self, lights: &LightSampling) {
         let (singles, plain) = (std::mem::take(&mut self.singles), std::mem::take(&mut self.plain));
         // The kernel writes whole vectors from the first plain row on
         self.surface.reserve(padded(singles.len() + padded(plain.len())));
@@ -225,12 +217,6 @@ impl<'w> Vertices<'w> {
         let lambertian = self.bsdfs.len()..self.len();
         if !lambertian.is_empty() {
             self.runs.push(Run { kernel: Some(Kernel::Diffuse), rows: lambertian });
-        }
-        for &path in &self.path {
-            let RowNumbers { time, streams: [of_vertex, direct] } = numbers(path);
-            self.time.push(time);
-            self.streams.push(of_vertex);
-            self.direct.push(direct);
         }
         self.find_lobes(lights);
         (self.singles, self.plain) = (singles, plain);
@@ -368,10 +354,12 @@ impl<'w> Vertices<'w> {
             let (p, p_error, wo) = (s.p.vec3(i), s.p_error.vec3(i), s.wo.vec3(i));
             self.push(Single { path: other.path[i], p, p_error, wo, bsdf, media: other.media(i) });
         }
-        self.finish(lights, |path| {
-            let i = row_of[path as usize];
-            RowNumbers { time: other.time[i], streams: [other.streams[i], other.direct[i]] }
-        });
+        self.finish(lights);
+        let Vertices { path, time, streams, direct, .. } = self;
+        let rows = || path.iter().map(|&path| row_of[path as usize]);
+        time.extend(rows().map(|row| other.time[row]));
+        streams.extend(rows().map(|row| other.streams[row]));
+        direct.extend(rows().map(|row| other.direct[row]));
     }
 }
 
@@ -419,9 +407,8 @@ mod tests {
         LightSampling::new(Arc::new(set), choice, 1)
     }
 
-    fn numbers(path: u32) -> RowNumbers {
-        let stream = |sample| SampleStream::new(SamplerKind::Sobol, [path, 0], sample, 7);
-        RowNumbers { time: path as f32 / 8.0, streams: [stream(0), stream(1)] }
+    fn stream(path: u32, sample: u32) -> SampleStream {
+        SampleStream::new(SamplerKind::Sobol, [path, 0], sample, 7)
     }
 
     fn single(path: u32, bsdf: SurfaceBsdf<'static>, media: Sides) -> Single<'static> {
@@ -437,11 +424,9 @@ mod tests {
     fn assert_rows(vertices: &Vertices<'_>, paths: &[u32]) {
         assert_eq!(vertices.path, paths);
         for (row, &path) in paths.iter().enumerate() {
-            let RowNumbers { time, streams } = numbers(path);
-            assert_eq!(vertices.surface.p.vec3(row), Vec3::splat(path as f32));
-            assert_eq!(vertices.time[row], time);
-            assert_eq!(vertices.streams[row].draw::<2>(), streams[0].draw::<2>());
-            assert_eq!(vertices.direct[row].draw::<2>(), streams[1].draw::<2>());
+            assert_eq!((vertices.surface.p.vec3(row), vertices.time[row]), (Vec3::splat(path as f32), path as f32));
+            assert_eq!(vertices.streams[row].draw::<2>(), stream(path, 0).draw::<2>());
+            assert_eq!(vertices.direct[row].draw::<2>(), stream(path, 1).draw::<2>());
         }
     }
 
@@ -454,7 +439,12 @@ mod tests {
         }
         vertices.push(single(0, grey(), Sides::both(Some(3))));
         vertices.push(single(2, in_medium, Sides::default()));
-        vertices.finish(&lights, numbers);
+        vertices.finish(&lights);
+        for &path in &vertices.path {
+            vertices.time.push(path as f32);
+            vertices.streams.push(stream(path, 0));
+            vertices.direct.push(stream(path, 1));
+        }
 
         // One by one, by the kernel with a medium around, and Lambertian
         assert_rows(&vertices, &[2, 0, 5, 1, 4]);
