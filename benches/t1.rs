@@ -117,10 +117,14 @@ fn main() {
                     let [jx, jy, ..] = pcg4d([point, 7, 7, 7]).map(|h| h as f32 * 1e-10);
                     let ctx = LightCtx::on(Vec3::new(jx, 0.0, jy), Vec3::Y);
                     let u = numbers[point as usize].each_ref().map(|u| &u[..]);
-                    if is_single {
-                        light.sample_li_each(&ctx, u, &mut out);
-                    } else {
-                        light.sample_li_lanes(&ctx, u, &mut out);
+                    if is_single || !light.sample_li_lanes(u, &mut out) {
+                        for i in 0..m {
+                            let Some(s) = light.sample_li(&ctx, [u[0][i], u[1][i]]) else { continue };
+                            for c in 0..3 {
+                                (out.wi[c][i], out.li[c][i]) = (s.wi[c], s.li[c]);
+                            }
+                            out.pdf[i] = s.pdf;
+                        }
                     }
                     black_box(&mut out);
                 })

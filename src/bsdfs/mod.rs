@@ -242,17 +242,7 @@ impl<'a> Bsdf<'a> {
     /// True if f and pdf are functions of the directions, and pdf is that of sampled directions: not estimates by random
     /// walks, not of what can only be evaluated, and not of interiors.
     pub fn is_evaluated_exactly(&self) -> bool {
-        match self {
-            Bsdf::Diffuse(_)
-            | Bsdf::DiffuseTransmission(_)
-            | Bsdf::Conductor(_)
-            | Bsdf::Dielectric(_)
-            | Bsdf::ThinDielectric(_)
-            | Bsdf::CoatedDiffuse(_)
-            | Bsdf::Principled(_)
-            | Bsdf::Measured(_) => true,
-            Bsdf::Exit(_) | Bsdf::Layered(_) | Bsdf::Hair(_) | Bsdf::Evaluated(_) | Bsdf::Phase(_) => false,
-        }
+        !matches!(self, Bsdf::Exit(_) | Bsdf::Layered(_) | Bsdf::Hair(_) | Bsdf::Evaluated(_) | Bsdf::Phase(_))
     }
 
     /// False in a medium, where directions along the horizon of the frame are no others, and there is no cosine.
@@ -399,21 +389,7 @@ impl<'a> Bsdf<'a> {
     /// True if [`Self::sample`] follows a density that knows nothing of [`Self::f`], so that [`resample()`] pays.
     #[inline]
     pub fn is_only_evaluated(&self) -> bool {
-        match self {
-            Bsdf::Evaluated(_) => true,
-            Bsdf::Diffuse(_)
-            | Bsdf::DiffuseTransmission(_)
-            | Bsdf::Conductor(_)
-            | Bsdf::Dielectric(_)
-            | Bsdf::Exit(_)
-            | Bsdf::ThinDielectric(_)
-            | Bsdf::CoatedDiffuse(_)
-            | Bsdf::Layered(_)
-            | Bsdf::Phase(_)
-            | Bsdf::Hair(_)
-            | Bsdf::Measured(_)
-            | Bsdf::Principled(_) => false,
-        }
+        matches!(self, Bsdf::Evaluated(_))
     }
 
     /// The Lambertian part as seen from `wo`; `None` if there is none. Exact but for the base below a coat, whose

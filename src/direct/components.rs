@@ -1,8 +1,8 @@
 //! What `ocv` and `optimal-mis` have in common: samples drawn from a mixture of densities, the density of each
 //! component of it at each sample, and sums of normal equations over them.
 
-use super::candidates::{Candidates, Drawn, SampleAllocation};
-use super::mixture::{Mixture, draw_groups, draw_together};
+use super::candidates::{Candidate, Candidates, Drawn, SampleAllocation};
+use super::mixture::Mixture;
 use super::point::ShadingPoint;
 use super::shadow_segments::Segments;
 use super::t1::{T1, choice_by_sampler};
@@ -27,25 +27,16 @@ pub(super) struct Components {
 }
 
 impl Components {
-    /// T1: light samples separately for each group of lights, and BSDF samples.
-    pub(super) fn propose(&mut self, t1: &mut T1<'_>, allocate: impl Fn(&ShadingPoint<'_>) -> SampleAllocation) {
-        self.mixtures.clear();
-        t1.draw_lights(&allocate, |job, at, allocation, records| {
-            self.mixtures.push(draw_groups(job, at, allocation, records));
-            allocation.light_draws
-        });
-        t1.draw_bsdf(allocate, &mut self.mixtures, choice_by_sampler(t1.job));
-    }
-
-    /// T1: light and BSDF samples as `mis` draws them.
-    pub(super) fn propose_together(
+    /// T1: light samples as `draw` makes them, and BSDF samples.
+    pub(super) fn propose(
         &mut self,
         t1: &mut T1<'_>,
+        draw: impl Fn(&RenderJob, (u32, &ShadingPoint<'_>), &SampleAllocation, &mut Vec<Candidate>) -> Mixture,
         allocate: impl Fn(&ShadingPoint<'_>) -> SampleAllocation,
     ) {
         self.mixtures.clear();
         t1.draw_lights(&allocate, |job, at, allocation, records| {
-            self.mixtures.push(draw_together(job, at, allocation, records));
+            self.mixtures.push(draw(job, at, allocation, records));
             allocation.light_draws
         });
         t1.draw_bsdf(allocate, &mut self.mixtures, choice_by_sampler(t1.job));

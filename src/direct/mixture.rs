@@ -16,6 +16,7 @@ use super::light_samples::light_candidate;
 use super::point::ShadingPoint;
 use crate::bsdfs::MAX_LOBES;
 use crate::lights::groups::MAX_GROUPS;
+use crate::lights::{LightId, LightSample};
 use crate::scene::RenderJob;
 use lumiris_numbers::estimators::ocv::MAX_COMPONENTS;
 use lumiris_numbers::math::Vec3;
@@ -81,6 +82,25 @@ impl Mixture {
         self.lobes + group
     }
 
+    /// The candidate of a light sample of a group, which is counted if it is zero-valued.
+    fn candidate(
+        &mut self,
+        job: &RenderJob,
+        at: (u32, &ShadingPoint<'_>),
+        allocation: &SampleAllocation,
+        group: usize,
+        drawn: Option<(LightId, LightSample)>,
+    ) -> Option<Candidate> {
+        let candidate = drawn.and_then(|(light, sample)| {
+            let c = light_candidate(job, at, allocation, (light, sample))?;
+            Some(Candidate { group: group as u8, p_lobe: self.p_lobe(at.1, sample.wi, c.p_bsdf), ..c })
+        });
+        if candidate.is_none() {
+            self.zero_valued[self.component(group)] += 1;
+        }
+        candidate
+    }
+
     /// r_j of a sample, by component, of those that are not 0; none if its densities cannot be divided. How many there
     /// are, and they.
     #[inline]
@@ -127,15 +147,8 @@ pub(super) fn draw_together(
             mixture.failed += 1;
             continue;
         };
-        let candidate = lights.sample_choice(&ctx, choice, [u0, u1]).and_then(|(light, sample)| {
-            let c = light_candidate(job, (index, point), allocation, (light, sample))?;
-            let p_lobe = mixture.p_lobe(point, sample.wi, c.p_bsdf);
-            Some(Candidate { group: group as u8, p_lobe, ..c })
-        });
-        if candidate.is_none() {
-            mixture.zero_valued[mixture.component(group)] += 1;
-        }
-        records.extend(candidate);
+        let drawn = lights.sample_choice(&ctx, choice, [u0, u1]);
+        records.extend(mixture.candidate(job, (index, point), allocation, group, drawn));
     }
     mixture
 }
@@ -165,16 +178,8 @@ pub(super) fn draw_groups(
         for i in 0..end - first {
             let stream = point.stream.split(domain::GROUP + group as u32, count, i);
             let [u0, u1, u_choice] = stream.draw::<3>();
-            let sample = lights.sample_group(&ctx, (group, pmf), u_choice, [u0, u1]);
-            let candidate = sample.and_then(|(light, sample)| {
-                let c = light_candidate(job, (index, point), allocation, (light, sample))?;
-                let p_lobe = mixture.p_lobe(point, sample.wi, c.p_bsdf);
-                Some(Candidate { group: group as u8, p_lobe, ..c })
-            });
-            if candidate.is_none() {
-                mixture.zero_valued[mixture.component(group)] += 1;
-            }
-            records.extend(candidate);
+            let drawn = lights.sample_group(&ctx, (group, pmf), u_choice, [u0, u1]);
+            records.extend(mixture.candidate(job, (index, point), allocation, group, drawn));
         }
         first = end;
     }

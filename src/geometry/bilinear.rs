@@ -53,15 +53,9 @@ impl BilinearMesh {
         self.indices[i].map(|v| self.positions[v as usize])
     }
 
-    /// The first hit of patch `i` in (0, t_max); uv are its parameters (u, v).
-    ///
-    /// A ray that leaves from [`lumiris_numbers::math::ray::offset_origin`] does not meet the same planar patch again.
-    pub fn intersect_patch(&self, i: usize, ray: &Ray) -> Option<LocalHit> {
-        self.intersect_patch_where(i, ray, |_, _| true)
-    }
-
     /// The first hit of patch `i` in (0, t_max) that `accepts` takes, which gets the hit and the number of its crossing,
-    /// 0 or 1, in ascending order of u.
+    /// 0 or 1, in ascending order of u; uv are its parameters (u, v). A ray that leaves from
+    /// [`lumiris_numbers::math::ray::offset_origin`] does not meet the same planar patch again.
     #[inline]
     pub fn intersect_patch_where(
         &self,
@@ -231,7 +225,7 @@ mod tests {
             let mesh = patch(std::array::from_fn(|_| random_point(&mut s)));
             let o = random_point(&mut s) * 3.0;
             let ray = Ray { o, d: random_point(&mut s) * 0.7 - o, t_max: f32::INFINITY, time: 0.0 };
-            match (mesh.intersect_patch(0, &ray), reference(&mesh, &ray)) {
+            match (mesh.intersect_patch_where(0, &ray, |_, _| true), reference(&mesh, &ray)) {
                 (Some(hit), Some(t)) => {
                     both += 1;
                     let surface = mesh.surface_hit(0, hit.uv);
@@ -263,7 +257,7 @@ mod tests {
                 continue;
             }
             let ray = Ray { o: offset_origin(hit.p, hit.p_error, hit.n, w), d: w, t_max: f32::INFINITY, time: 0.0 };
-            assert_eq!(mesh.intersect_patch(0, &ray), None, "{mesh:?} {ray:?}");
+            assert_eq!(mesh.intersect_patch_where(0, &ray, |_, _| true), None, "{mesh:?} {ray:?}");
         }
     }
 
@@ -287,11 +281,11 @@ mod tests {
     #[test]
     fn degenerate_patches_do_not_panic() {
         let ray = Ray { o: -Vec3::Z, d: Vec3::Z, t_max: f32::INFINITY, time: 0.0 };
-        assert_eq!(patch([Vec3::ZERO; 4]).intersect_patch(0, &ray), None);
-        assert_eq!(patch([Vec3::NAN; 4]).intersect_patch(0, &ray), None);
+        assert_eq!(patch([Vec3::ZERO; 4]).intersect_patch_where(0, &ray, |_, _| true), None);
+        assert_eq!(patch([Vec3::NAN; 4]).intersect_patch_where(0, &ray, |_, _| true), None);
         // One edge collapsed: still a triangle, with a normal at the apex.
         let triangle = patch([-Vec3::ONE, Vec3::new(1.0, -1.0, 0.0), Vec3::Y, Vec3::Y]);
-        assert!(triangle.intersect_patch(0, &ray).is_some());
+        assert!(triangle.intersect_patch_where(0, &ray, |_, _| true).is_some());
         assert!((triangle.surface_hit(0, [0.3, 1.0]).n.length() - 1.0).abs() < 1e-5);
     }
 }

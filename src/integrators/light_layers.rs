@@ -3,43 +3,21 @@
 //! Every contribution to a sample is of one light: what a path meets, and what a light sample or a BSDF sample brings. Only
 //! directions that meet nothing are of all infinite lights together; their light is divided by what each of them sends.
 
+use super::features::{self, Feature};
 use crate::accel::Hit;
-use crate::direct::Estimator;
 use crate::lights::{LightId, LightSampling};
 use crate::scene::RenderJob;
-use crate::settings::IntegratorKind;
 use lumiris_numbers::math::{Rgb, Vec3};
 
 /// Names of the layers by lights that a rendering has.
 pub fn names(job: &RenderJob) -> &[String] {
-    if is_wanted(job) && obstacle(job).is_none() { job.lights.layers.names() } else { &[] }
+    let is_kept = job.settings().integrator.light_groups && features::allows(job, Feature::LightGroups);
+    if is_kept { job.lights.layers.names() } else { &[] }
 }
 
 /// Number of these layers.
 pub fn count(job: &RenderJob) -> usize {
     names(job).len()
-}
-
-/// True if lights name groups, and the settings ask for their layers.
-pub fn is_wanted(job: &RenderJob) -> bool {
-    job.settings().integrator.light_groups && !job.lights.layers.names().is_empty()
-}
-
-/// Why contributions cannot be told apart by lights; `None` if they can.
-pub fn obstacle(job: &RenderJob) -> Option<&'static str> {
-    let settings = &job.settings().integrator;
-    let of_paths = matches!(settings.kind, IntegratorKind::Direct | IntegratorKind::Path);
-    let has_sums = match Estimator::at_vertex(settings, 0) {
-        Estimator::Mc(_) | Estimator::Mis(_) | Estimator::Contributing(_) => true,
-        Estimator::Ris(ris) => !ris.has_control(),
-        Estimator::Ocv(_) | Estimator::OptimalMis(_) | Estimator::Correlated(_) => false,
-    };
-    let reasons = [
-        (!of_paths, "the integrators direct and path have them"),
-        (job.world.scene.media.is_emissive(), "what media send out is of no light"),
-        (!has_sums, "the estimators mc, mis, ris and contributing have them, without control variates"),
-    ];
-    reasons.into_iter().find(|(holds, _)| *holds).map(|(_, reason)| reason)
 }
 
 /// The light of each layer that the samples of a batch find.

@@ -4,12 +4,15 @@
 //! [`Tracer`] for each thread, and reports. Reading order: [`path`] is the loop over vertices, `segment` the state of a path
 //! between two of them, `vertices` traces to the next ones, `interior` walks through materials on the way there,
 //! `direct_light` adds L_d, and `scatter` samples the next segments.
-//! Pixels that are neighbours may share paths ([`reuse`]; which ones: [`cells`]), and light paths bring caustics ([`light_paths`]). [`through_media`] says which settings know participating media. [`irradiance_cache`] and [`photon_map`] replace the light that Lambertian parts reflect (`diffuse`).
+//! Pixels that are neighbours may share paths ([`reuse`]; which ones: [`cells`]), and light paths bring caustics
+//! ([`light_paths`]). [`features`] is the table of what excludes what. [`irradiance_cache`] and [`photon_map`] replace the
+//! light that Lambertian parts reflect (`diffuse`).
 
 pub mod camera_samples;
 pub mod cells;
 mod diffuse;
 mod direct_light;
+pub mod features;
 mod interior;
 pub mod irradiance_cache;
 pub mod light_layers;
@@ -19,7 +22,6 @@ pub mod photon_map;
 pub mod reuse;
 mod scatter;
 mod segment;
-pub mod through_media;
 mod vertices;
 
 pub use irradiance_cache::{CacheIntegrator, CacheReport, IrradianceCache};

@@ -18,13 +18,11 @@
 //! ([`crate::scene::PixelSamples::turn`]); the numbers are independent of the samples, and so is who is in a group.
 
 use super::cells::Groups;
-use super::light_layers;
+use super::features::{self, Feature};
 use super::segment::CameraSample;
 use crate::accel::{Coherence, RayBatch};
-use crate::direct::Estimator;
 use crate::film::PixelSample;
 use crate::scene::RenderJob;
-use crate::settings::IntegratorKind;
 use lumiris_lanes::columns::{Column, Columns3, padded, reserve};
 use lumiris_lanes::connections::{Connections, Vertices, connect};
 use lumiris_lanes::lane::LANES;
@@ -38,30 +36,7 @@ const TOGETHER: usize = 16;
 
 /// The edge of the blocks of pixels that share paths; 1 if none do.
 pub fn edge(job: &RenderJob) -> u32 {
-    if obstacle(job).is_none() { job.settings().integrator.path_reuse.unwrap_or(1) } else { 1 }
-}
-
-/// Why pixels of this image cannot share paths.
-pub fn obstacle(job: &RenderJob) -> Option<&'static str> {
-    let settings = &job.settings().integrator;
-    let geometry = &job.world.scene.geometry;
-    let is_cut_out = geometry.geometries.iter().any(|g| g.alpha.is_some());
-    let reasons = [
-        (settings.depth() < 2, "paths of one bounce have nothing to share"),
-        (settings.kind != IntegratorKind::Path, "only the integrator path has paths of its own for each pixel"),
-        (
-            Estimator::at_vertex(settings, 0).is_progressive(),
-            "with a progressive estimator, samples depend on earlier ones of their pixel",
-        ),
-        (
-            job.shadows_pass(),
-            "rays may pass surfaces between their vertices, bounds of media or mixtures with `interface`",
-        ),
-        (job.world.scene.materials.has_dispersion(), "paths may have wavelengths"),
-        (light_layers::count(job) > 0, "light groups have layers (--light-groups none: they have not)"),
-        (geometry.has_motion() || is_cut_out, "what a ray meets varies with time or is cut out at random"),
-    ];
-    reasons.into_iter().find(|(holds, _)| *holds).map(|(_, reason)| reason)
+    if features::allows(job, Feature::Sharing) { job.settings().integrator.path_reuse.unwrap_or(1) } else { 1 }
 }
 
 /// A Lambertian vertex: its point, the bound of its rounding error, and the geometric and the shading normal on the side

@@ -132,39 +132,13 @@ impl EnvironmentMap {
         let texels = with_border(&texels, [width, height], mapping);
         let distribution = TexelDistribution::new(&[], 1);
         let mut map = EnvironmentMap { width, height, mapping, filter, texels, distribution, luminance_integral: 0.0 };
-        let weights = map.texel_weights();
-        map.set_distribution(&weights);
+        map.distribution = TexelDistribution::new(&map.texel_weights(), width);
+        for (x, y) in (0..height).flat_map(|y| (0..width).map(move |x| (x, y))) {
+            let index = map.texel_index(x as isize, y as isize);
+            map.texels[index][3] = map.distribution.pdf_of_texel([x, y]);
+        }
         map.luminance_integral = map.distribution.integral() * map.weight_scale();
         Ok(map)
-    }
-
-    /// Samples in proportion to `weights`.
-    fn set_distribution(&mut self, weights: &[f32]) {
-        self.distribution = TexelDistribution::new(weights, self.width);
-        for y in 0..self.height {
-            for x in 0..self.width {
-                let index = self.texel_index(x as isize, y as isize);
-                self.texels[index][3] = self.distribution.pdf_of_texel([x, y]);
-            }
-        }
-    }
-
-    /// The same map sampled in proportion to what exceeds the mean [Karlík et al. 2019], for use together with another
-    /// technique that covers the rest of the sphere. Without one the estimate is biased: dim directions are never
-    /// sampled.
-    #[must_use]
-    pub fn with_mis_compensation(mut self) -> Self {
-        let weights = self.texel_weights();
-        let row_scale = self.row_scales();
-        let scale_sum: f64 = row_scale.iter().map(|&s| f64::from(s)).sum::<f64>() * self.width as f64;
-        let mean = (weights.iter().map(|&w| f64::from(w)).sum::<f64>() / scale_sum) as f32;
-        let excess: Vec<f32> =
-            weights.iter().enumerate().map(|(i, &w)| (w - mean * row_scale[i / self.width]).max(0.0)).collect();
-        // A constant map has no excess; it keeps the plain density.
-        if excess.iter().any(|&e| e > 0.0) {
-            self.set_distribution(&excess);
-        }
-        self
     }
 
     /// Width and height in texels.
@@ -428,9 +402,7 @@ mod tests {
     fn directions_follow_the_density_by_chi_squared() {
         for mapping in MAPPINGS {
             for filter in [EnvironmentFilter::Nearest, EnvironmentFilter::Bilinear] {
-                for map in [random_map(mapping, filter), random_map(mapping, filter).with_mis_compensation()] {
-                    check_chi_squared(&map);
-                }
+                check_chi_squared(&random_map(mapping, filter));
             }
         }
     }
@@ -520,7 +492,6 @@ mod tests {
             let texels = vec![Rgb::WHITE; size[0] * size[1]];
             let map = EnvironmentMap::new(texels, size, mapping, EnvironmentFilter::Bilinear).unwrap();
             assert!((f64::from(map.luminance_integral()) - 4.0 * PI).abs() < 1e-4);
-            assert!(map.clone().with_mis_compensation().sample([0.3, 0.6]).is_some());
             assert!((map.le(Vec3::Z).r - 1.0).abs() < 1e-6);
         }
     }

@@ -5,8 +5,9 @@
 //! it; the groups merely divide that choice in two, first a group and then a light of it, so that the number of samples
 //! per group can be fixed.
 
+use super::tree_choice::one_of;
 use super::{CutNode, Light, LightCtx, LightId, LightSampler, LightTree, SampledLight, Turns};
-use lumiris_numbers::math::{AliasTable, ONE_MINUS_EPSILON};
+use lumiris_numbers::math::AliasTable;
 
 /// Maximum number of groups.
 pub const MAX_GROUPS: usize = 8;
@@ -168,11 +169,7 @@ impl LightGroups {
     ) -> Option<SampledLight> {
         match &self.choice {
             Choice::Tree { .. } if self.has_infinite && group == 0 => {
-                let infinite = &sampler.tree()?.infinite;
-                let x = u * infinite.len() as f32;
-                let i = (x as usize).min(infinite.len() - 1);
-                let u = (x - i as f32).clamp(0.0, ONE_MINUS_EPSILON);
-                Some(SampledLight { light: infinite[i], pmf: group_pmf / infinite.len() as f32, u })
+                Some(one_of(&sampler.tree()?.infinite, u, group_pmf))
             }
             Choice::Tree { cut, .. } => {
                 let place = *cut.get(group - usize::from(self.has_infinite))?;

@@ -161,11 +161,7 @@ impl LearnedVisibility {
 
         // Those in the tree
         let u = ((u - p_infinite) / (1.0 - p_infinite)).min(ONE_MINUS_EPSILON);
-        let (light, pmf, u) = if is_glossy(ctx) {
-            tree.sample_by(u, singles, self.by_lobe(ctx))
-        } else {
-            tree.sample_by(u, singles, self.by_visibility(ctx))
-        }?;
+        let (light, pmf, u) = tree.sample_by(u, singles, self.by_visibility(ctx))?;
         Some(self.unseen(ctx, SampledLight { light, pmf: pmf * (1.0 - p_infinite), u }))
     }
 
@@ -181,12 +177,7 @@ impl LearnedVisibility {
         let count = infinite.iter().filter(|&&light| seen.place(light).is_none()).count();
         let p_infinite = self.choice.probability_of_some(ctx, count);
         let pmf = if tree.contains(light) {
-            let of_tree = if is_glossy(ctx) {
-                tree.pmf_by(light, singles, self.by_lobe(ctx))
-            } else {
-                tree.pmf_by(light, singles, self.by_visibility(ctx))
-            };
-            of_tree * (1.0 - p_infinite)
+            tree.pmf_by(light, singles, self.by_visibility(ctx)) * (1.0 - p_infinite)
         } else if infinite.binary_search(&light).is_ok() {
             p_infinite / count as f32
         } else {
@@ -195,25 +186,15 @@ impl LearnedVisibility {
         self.unseen(ctx, SampledLight { light, pmf, u: 0.0 })
     }
 
-    /// E·√V̂ of nodes at a diffuse point, as a function of the place, the node, and the number of lights below it with a
-    /// single photon.
+    /// E·√V̂ of nodes at a point, as a function of the place, the node, and the number of lights below it with a single photon.
     #[inline]
     fn by_visibility(&self, ctx: &LightCtx) -> impl Fn(usize, &Node, usize) -> f32 {
-        let receiver = Receiver { lobe: None, ..ctx.receiver() };
-        move |place, node, singles| {
-            let e = node.bound.importance(&receiver);
-            e * estimate(e, self.of_nodes[place], singles as f32).sqrt()
-        }
-    }
-
-    /// The same at a glossy point.
-    #[inline]
-    fn by_lobe(&self, ctx: &LightCtx) -> impl Fn(usize, &Node, usize) -> f32 {
         let receiver = ctx.receiver();
         let diffuse = Receiver { lobe: None, ..receiver };
         move |place, node, singles| {
             let e = node.bound.importance(&diffuse);
-            node.bound.importance(&receiver) * estimate(e, self.of_nodes[place], singles as f32).sqrt()
+            let reflected = if receiver.lobe.is_some() { node.bound.importance(&receiver) } else { e };
+            reflected * estimate(e, self.of_nodes[place], singles as f32).sqrt()
         }
     }
 

@@ -72,6 +72,11 @@ impl LightSamples {
         is_delta.resize(is_delta.len().max(len), false);
     }
 
+    /// The first `len` of them, as kernels fill them.
+    fn lanes(&mut self, len: usize) -> LightLanes<'_> {
+        LightLanes { wi: self.wi.get_mut(len), li: self.li.get_mut(len), pdf: &mut self.pdf[..len] }
+    }
+
     /// Sample `i`, drawn from the point `from`; `None` if there is none.
     #[inline]
     pub fn get(&self, i: usize, from: Vec3) -> Option<LightSample> {
@@ -261,9 +266,7 @@ impl LightSampling {
         let len = u[0].len();
         match &self.lights[light as usize] {
             Light::Area(area) if area.is_even() && area.sample_many(n, p, u, out) => {}
-            source @ (Light::InfiniteConstant { .. } | Light::InfiniteImage { .. }) if len > 0 => {
-                let (wi, li, pdf) = (out.wi.get_mut(len), out.li.get_mut(len), &mut out.pdf[..len]);
-                source.sample_li_lanes(&LightCtx::at(Vec3::ZERO), u, &mut LightLanes { wi, li, pdf });
+            light if len > 0 && light.sample_li_lanes(u, &mut out.lanes(len)) => {
                 out.is_far[..n].fill(1.0);
                 out.is_delta[..n].fill(false);
             }
@@ -461,7 +464,7 @@ mod tests {
             };
             let (mut li, mut pdf) = (s.li, s.pdf);
             if lights.infinite.contains(&light) && lights.infinite.len() > 1 {
-                (li, pdf) = (lights.le(ctx.p, s.wi), lights.pdf_infinite(&ctx, s.wi));
+                (li, pdf) = lights.infinite_in_direction(&ctx, s.wi);
             }
             let what = lights.lights[light as usize].kind_name();
             drawn += 1;

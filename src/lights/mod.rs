@@ -268,13 +268,8 @@ impl Light {
         match self {
             Light::Point { .. } | Light::Spot { .. } | Light::Image(_) | Light::Distant { .. } | Light::Glow(_) => 0.0,
             Light::Area(area) => area.pdf_li(ctx, wi, hit),
-            Light::InfiniteConstant { l } => {
-                if l.is_black() {
-                    0.0
-                } else {
-                    lumiris_numbers::math::warp::pdf_uniform_sphere()
-                }
-            }
+            Light::InfiniteConstant { l } if l.is_black() => 0.0,
+            Light::InfiniteConstant { .. } => lumiris_numbers::math::warp::pdf_uniform_sphere(),
             Light::InfiniteImage { map, world_from_light, .. } => map.pdf(world_from_light.transpose() * wi),
             Light::Portal(light) => light.le_and_pdf(ctx.p, wi).1,
         }
@@ -290,17 +285,7 @@ impl Light {
     /// Radiance that leaves the surface of an area light at `hit` in direction `w`; black for all others.
     #[inline]
     pub fn l(&self, hit: &LightHit, w: Vec3) -> Rgb {
-        match self {
-            Light::Area(area) => area.l(hit, w),
-            Light::Point { .. }
-            | Light::Spot { .. }
-            | Light::Image(_)
-            | Light::Distant { .. }
-            | Light::InfiniteConstant { .. }
-            | Light::InfiniteImage { .. }
-            | Light::Portal(_)
-            | Light::Glow(_) => Rgb::BLACK,
-        }
+        if let Light::Area(area) = self { area.l(hit, w) } else { Rgb::BLACK }
     }
 
     /// Radiance that an infinite light sends along a ray which leaves the scene from `p` in unit direction `w`; black for
@@ -381,25 +366,16 @@ impl Light {
     /// True for infinite lights, which are not in the light tree.
     #[inline]
     pub fn is_infinite(&self) -> bool {
-        match self {
-            Light::Distant { .. } | Light::InfiniteConstant { .. } | Light::InfiniteImage { .. } | Light::Portal(_) => {
-                true
-            }
-            Light::Point { .. } | Light::Spot { .. } | Light::Image(_) | Light::Area(_) | Light::Glow(_) => false,
-        }
+        matches!(
+            self,
+            Light::Distant { .. } | Light::InfiniteConstant { .. } | Light::InfiniteImage { .. } | Light::Portal(_)
+        )
     }
 
     /// True for delta lights, which no ray can hit: only light sampling finds them.
     #[inline]
     pub fn is_delta(&self) -> bool {
-        match self {
-            Light::Point { .. } | Light::Spot { .. } | Light::Image(_) | Light::Distant { .. } => true,
-            Light::Area(_)
-            | Light::InfiniteConstant { .. }
-            | Light::InfiniteImage { .. }
-            | Light::Portal(_)
-            | Light::Glow(_) => false,
-        }
+        matches!(self, Light::Point { .. } | Light::Spot { .. } | Light::Image(_) | Light::Distant { .. })
     }
 
     /// Bounds for the light tree; `None` for infinite lights and for lights that emit nothing.

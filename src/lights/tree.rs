@@ -157,14 +157,10 @@ impl LightTree {
         self.descend(place, u, |place, _| self.left_probability(ctx, place))
     }
 
-    /// [`Self::sample`], where the point's `turns` hold what is known of it.
+    /// Chooses a light by `u` in [0, 1): its id, its probability, and `u` remapped to be uniform again. The point's `turns` hold
+    /// the probabilities that are known.
     #[inline]
-    pub fn sample_again(
-        &self,
-        ctx: &impl Deref<Target = LightCtx>,
-        u: f32,
-        turns: Turns<'_>,
-    ) -> Option<(LightId, f32, f32)> {
+    pub fn sample(&self, ctx: &impl Deref<Target = LightCtx>, u: f32, turns: Turns<'_>) -> Option<(LightId, f32, f32)> {
         if self.is_empty() {
             return None;
         }
@@ -309,12 +305,6 @@ impl LightTree {
         }
     }
 
-    /// Chooses a light by `u` in [0, 1): its id, its probability, and `u` remapped to be uniform again.
-    #[inline]
-    pub fn sample(&self, ctx: &LightCtx, u: f32) -> Option<(LightId, f32, f32)> {
-        if self.is_empty() { None } else { self.sample_below(ctx, 0, u) }
-    }
-
     /// [`Self::sample`] with the importances `importance(place, node, count)`, which are positive where those of the nodes
     /// are: so many of `leaves`, ascending places of leaves, are below the node. These leaves themselves are chosen only
     /// where no light beside them can contribute. Nodes are numbered as in [`Self::sums`].
@@ -325,38 +315,33 @@ impl LightTree {
         leaves: &[u32],
         importance: impl Fn(usize, &Node, usize) -> f32,
     ) -> Option<(LightId, f32, f32)> {
-        if self.is_empty() {
-            return None;
-        }
+        let mut left = self.left_by(leaves, importance);
+        if self.is_empty() { None } else { self.descend(0, u, |place, _| left(place)) }
+    }
+
+    /// The probability of the left child of each node on the way down, with the importances of [`Self::sample_by`].
+    #[inline]
+    fn left_by<'a>(
+        &'a self,
+        leaves: &'a [u32],
+        importance: impl Fn(usize, &Node, usize) -> f32 + 'a,
+    ) -> impl FnMut(usize) -> f32 + 'a {
         // Those below the node, and which of them are to its right
         let (mut below, mut right_of, mut last) = (leaves, leaves, None);
-        self.descend(0, u, |place, _| {
+        move |place| {
             if let Some((parent, middle)) = last {
                 below = if place == parent + 1 { &below[..middle] } else { right_of };
             }
-            let (p, middle) = self.left_probability_by(place, below, &importance);
+            let right_place = self.nodes[place].index as usize;
+            let middle = below.partition_point(|&leaf| (leaf as usize) < right_place);
+            let [left, right] = self.children(place);
+            let of = |place: usize, child: &Node, count: usize| {
+                if child.is_leaf && count > 0 { 0.0 } else { importance(place, child, count) }
+            };
+            let importances = [of(place + 1, left, middle), of(right_place, right, below.len() - middle)];
             (right_of, last) = (&below[middle..], Some((place, middle)));
-            p
-        })
-    }
-
-    /// The probability of the left child with the importances of [`Self::sample_by`], where the leaves `below` are
-    /// below the node; and how many of these are below that child.
-    #[inline]
-    fn left_probability_by(
-        &self,
-        place: usize,
-        below: &[u32],
-        importance: &impl Fn(usize, &Node, usize) -> f32,
-    ) -> (f32, usize) {
-        let right_place = self.nodes[place].index as usize;
-        let middle = below.partition_point(|&leaf| (leaf as usize) < right_place);
-        let [left, right] = self.children(place);
-        let of = |place: usize, child: &Node, count: usize| {
-            if child.is_leaf && count > 0 { 0.0 } else { importance(place, child, count) }
-        };
-        let importances = [of(place + 1, left, middle), of(right_place, right, below.len() - middle)];
-        (first_probability(importances, [&left.bound, &right.bound]), middle)
+            first_probability(importances, [&left.bound, &right.bound])
+        }
     }
 
     /// The place of the leaf of a light; `None` if it is not in the tree.
@@ -383,22 +368,7 @@ impl LightTree {
     /// Probability that [`sample`](Self::sample) chooses `light`.
     #[inline]
     pub fn pmf(&self, ctx: &LightCtx, light: LightId) -> f32 {
-        if !self.contains(light) {
-            return 0.0;
-        }
-        let (mut place, mut pmf, mut trail) = (0, 1.0, self.trails[light as usize]);
-        while !self.nodes[place].is_leaf {
-            let p = self.left_probability(ctx, place);
-            if trail & 1 == 0 {
-                pmf *= p;
-                place += 1;
-            } else {
-                pmf *= 1.0 - p;
-                place = self.nodes[place].index as usize;
-            }
-            trail >>= 1;
-        }
-        pmf
+        self.probability(light, |place| self.left_probability(ctx, place))
     }
 
     /// Probability that [`sample_by`](Self::sample_by) chooses `light`.
@@ -409,20 +379,24 @@ impl LightTree {
         leaves: &[u32],
         importance: impl Fn(usize, &Node, usize) -> f32,
     ) -> f32 {
+        self.probability(light, self.left_by(leaves, importance))
+    }
+
+    /// Probability of the way down to a light: `left(node)` is that to turn left at a node.
+    #[inline]
+    fn probability(&self, light: LightId, mut left: impl FnMut(usize) -> f32) -> f32 {
         if !self.contains(light) {
             return 0.0;
         }
-        let (mut place, mut pmf, mut trail, mut below) = (0, 1.0, self.trails[light as usize], leaves);
+        let (mut place, mut pmf, mut trail) = (0, 1.0, self.trails[light as usize]);
         while !self.nodes[place].is_leaf {
-            let (p, middle) = self.left_probability_by(place, below, &importance);
+            let p = left(place);
             if trail & 1 == 0 {
                 pmf *= p;
                 place += 1;
-                below = &below[..middle];
             } else {
                 pmf *= 1.0 - p;
                 place = self.nodes[place].index as usize;
-                below = &below[middle..];
             }
             trail >>= 1;
         }
@@ -508,7 +482,7 @@ mod tests {
             let count = 100_000;
             let mut observed = vec![0.0; lights.len() * 4];
             for _ in 0..count {
-                let (light, pmf, u) = tree.sample(&ctx, s.random::<f32>()).unwrap();
+                let (light, pmf, u) = tree.sample(&&ctx, s.random::<f32>(), Turns::NONE).unwrap();
                 assert_eq!(pmf, tree.pmf(&ctx, light));
                 observed[light as usize * 4 + (u * 4.0) as usize] += 1.0;
             }
@@ -571,17 +545,17 @@ mod tests {
     fn degenerate_sets_are_handled() {
         let ctx = LightCtx::on(Vec3::ZERO, Vec3::Y);
         // None, or none that shines.
-        assert!(tree_of(&[]).sample(&ctx, 0.5).is_none());
+        assert!(tree_of(&[]).sample(&&ctx, 0.5, Turns::NONE).is_none());
         let black = Light::Point { p: Vec3::ONE, intensity: Rgb::BLACK };
         let mesh = TriangleMesh::new(vec![Vec3::ONE, Vec3::ONE, Vec3::X], vec![[0, 1, 2]]).unwrap();
         let flat = area_lights_of(&Shape::Mesh(mesh), &Emission::constant(Rgb::WHITE)).lights.remove(0);
         let dark = [black.clone(), Light::Area(flat), Light::InfiniteConstant { l: Rgb::WHITE }];
         let tree = tree_of(&dark);
-        assert!(tree.is_empty() && tree.sample(&ctx, 0.5).is_none() && tree.pmf(&ctx, 0) == 0.0);
+        assert!(tree.is_empty() && tree.sample(&&ctx, 0.5, Turns::NONE).is_none() && tree.pmf(&ctx, 0) == 0.0);
 
         // One light; the same light many times; lights on a line; the point on a light.
         let one = Light::Point { p: Vec3::ONE, intensity: Rgb::WHITE };
-        assert_eq!(tree_of(&[black, one.clone()]).sample(&ctx, 0.9).map(|s| (s.0, s.1)), Some((1, 1.0)));
+        assert_eq!(tree_of(&[black, one.clone()]).sample(&&ctx, 0.9, Turns::NONE).map(|s| (s.0, s.1)), Some((1, 1.0)));
         let same = vec![one; 1000];
         let line: Vec<Light> = (0..1000)
             .map(|i| Light::Point { p: Vec3::new(1e-3 * 1.01_f32.powi(i), 0.0, 0.0), intensity: Rgb::WHITE })
@@ -608,7 +582,7 @@ mod tests {
         let mut s = pcg32([8, 1, 1]);
         let ctx = random_ctx(&mut s, 1.0);
         for _ in 0..100_000 {
-            let (light, pmf, _) = tree.sample(&ctx, s.random::<f32>()).unwrap();
+            let (light, pmf, _) = tree.sample(&&ctx, s.random::<f32>(), Turns::NONE).unwrap();
             assert!(pmf > 0.0 && light < 100_000);
         }
     }

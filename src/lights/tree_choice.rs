@@ -17,6 +17,15 @@ pub struct TreeChoice {
     odds: f32,
 }
 
+/// One of some lights by `u` in [0, 1), which have the probability `pmf` together.
+#[inline]
+pub(super) fn one_of(lights: &[LightId], u: f32, pmf: f32) -> SampledLight {
+    let x = u * lights.len() as f32;
+    let i = (x as usize).min(lights.len() - 1);
+    let u = (x - i as f32).clamp(0.0, ONE_MINUS_EPSILON);
+    SampledLight { light: lights[i], pmf: pmf / lights.len() as f32, u }
+}
+
 impl TreeChoice {
     /// A choice among `lights` that have power, in a scene of radius `scene_radius` (m); `infinite_fraction` as in [`new`](Self::new).
     pub(super) fn of_lights(lights: &[Light], scene_radius: f32, infinite_fraction: Option<f32>) -> Self {
@@ -64,33 +73,18 @@ impl TreeChoice {
     /// Chooses a light by `u` in [0, 1); `None` if there is none.
     #[inline]
     pub fn sample(&self, ctx: &LightCtx, u: f32) -> Option<SampledLight> {
-        self.choose(u, self.infinite_probability(ctx), |u| self.tree.sample(ctx, u))
+        self.sample_again(&ctx, u, Turns::NONE)
     }
 
     /// [`Self::sample`], where the point's `turns` hold what is known of it.
     #[inline]
     pub fn sample_again(&self, ctx: &impl Deref<Target = LightCtx>, u: f32, turns: Turns<'_>) -> Option<SampledLight> {
         let p_infinite = turns.probability(Turns::BESIDE, || self.infinite_probability(ctx));
-        self.choose(u, p_infinite, |u| self.tree.sample_again(ctx, u, turns))
-    }
-
-    /// Chooses an infinite light, which all together have the probability `p_infinite`, or one by `of_tree(u)`.
-    #[inline]
-    fn choose(
-        &self,
-        u: f32,
-        p_infinite: f32,
-        of_tree: impl FnOnce(f32) -> Option<(LightId, f32, f32)>,
-    ) -> Option<SampledLight> {
-        let infinite = &self.infinite;
         if u < p_infinite {
-            let x = u / p_infinite * infinite.len() as f32;
-            let i = (x as usize).min(infinite.len() - 1);
-            let u = (x - i as f32).clamp(0.0, ONE_MINUS_EPSILON);
-            return Some(SampledLight { light: infinite[i], pmf: p_infinite / infinite.len() as f32, u });
+            return Some(one_of(&self.infinite, u / p_infinite, p_infinite));
         }
         let u = ((u - p_infinite) / (1.0 - p_infinite)).min(ONE_MINUS_EPSILON);
-        let (light, pmf, u) = of_tree(u)?;
+        let (light, pmf, u) = self.tree.sample(ctx, u, turns)?;
         Some(SampledLight { light, pmf: pmf * (1.0 - p_infinite), u })
     }
 

@@ -60,6 +60,25 @@ pub enum ConductorSpectrum {
     Reflectance(RgbTextureId),
 }
 
+/// A dielectric coat.
+#[derive(Clone, Copy, Debug)]
+pub struct Coat {
+    /// Roughness of the interface.
+    pub roughness: Roughness,
+    /// Thickness in mean free paths.
+    pub thickness: FloatTextureId,
+    /// Index of refraction.
+    pub eta: f32,
+    /// Asymmetry of the medium.
+    pub g: FloatTextureId,
+    /// Single-scattering albedo of the medium, clamped to 0..1.
+    pub albedo: RgbTextureId,
+    /// Greatest number of events in the coat.
+    pub max_depth: u32,
+    /// Walks per evaluation, where walks are needed.
+    pub samples: u32,
+}
+
 /// A surface material.
 #[derive(Clone, Copy, Debug, IntoStaticStr)]
 #[strum(serialize_all = "lowercase")]
@@ -101,41 +120,17 @@ pub enum Material {
     CoatedDiffuse {
         /// Albedo of the base, clamped to 0..1.
         reflectance: RgbTextureId,
-        /// Roughness of the interface.
-        roughness: Roughness,
-        /// Thickness in mean free paths.
-        thickness: FloatTextureId,
-        /// Index of refraction of the coat.
-        eta: f32,
-        /// Asymmetry of the medium.
-        g: FloatTextureId,
-        /// Single-scattering albedo of the medium, clamped to 0..1.
-        albedo: RgbTextureId,
-        /// Greatest number of events in the coat.
-        max_depth: u32,
-        /// Walks per evaluation, where walks are needed.
-        samples: u32,
+        /// The coat.
+        coat: Coat,
     },
     /// Metal under a dielectric coat.
     CoatedConductor {
-        /// Roughness of the interface.
-        interface_roughness: Roughness,
-        /// Thickness in mean free paths.
-        thickness: FloatTextureId,
-        /// Index of refraction of the coat.
-        interface_eta: f32,
         /// Optical constants of the metal, relative to vacuum.
         conductor: ConductorSpectrum,
         /// Roughness of the metal.
-        conductor_roughness: Roughness,
-        /// Asymmetry of the medium.
-        g: FloatTextureId,
-        /// Single-scattering albedo of the medium, clamped to 0..1.
-        albedo: RgbTextureId,
-        /// Greatest number of events in the coat.
-        max_depth: u32,
-        /// Walks per evaluation.
-        samples: u32,
+        roughness: Roughness,
+        /// The coat.
+        coat: Coat,
     },
     /// Metal, glossy diffuse or glass under a coat.
     Principled(PrincipledMaterial),
@@ -243,11 +238,6 @@ impl MaterialSet {
         let mut coats: Vec<CoatTable> = keys.par_iter().map(tabulate).collect();
         CoatTable::join(&mut coats);
         MaterialSet { caustics: vec![false; entries.len()], entries, coats, coat_of, measured: Vec::new() }
-    }
-
-    /// The tables of all coats, for kernels.
-    pub fn coat_tables(&self) -> &[f32] {
-        self.coats.first().map_or(&[], CoatTable::directional_rows)
     }
 
     /// With the tables that measured materials refer to.
@@ -390,44 +380,17 @@ impl MaterialSet {
                     transmittance: (t.rgb(transmittance) * scale).clamp(0.0, 1.0),
                 })
             }
-            Material::CoatedDiffuse { reflectance, roughness, thickness, eta, g, albedo, max_depth, samples } => {
-                let (base, albedo) = (t.albedo(reflectance), t.albedo(albedo));
-                let distribution = t.distribution(roughness);
-                if let (Some(coat), true) = (self.coat_of[id as usize], albedo.is_black()) {
-                    let table = &self.coats[coat as usize];
-                    return Some(Bsdf::CoatedDiffuse(CoatedDiffuse::new(table, distribution, base, max_depth)));
+            Material::CoatedDiffuse { reflectance, coat } => {
+                let base = t.albedo(reflectance);
+                if let (Some(table), true) = (self.coat_of[id as usize], t.albedo(coat.albedo).is_black()) {
+                    let (table, distribution) = (&self.coats[table as usize], t.distribution(coat.roughness));
+                    return Some(Bsdf::CoatedDiffuse(CoatedDiffuse::new(table, distribution, base, coat.max_depth)));
                 }
-                Bsdf::Layered(Layered {
-                    top: Dielectric { eta: valid_eta(eta), distribution },
-                    base: Base::Diffuse(Diffuse { reflectance: base }),
-                    thickness: t.thickness(thickness),
-                    albedo,
-                    g: t.asymmetry(g),
-                    max_depth,
-                    samples: samples.max(1),
-                })
+                Bsdf::Layered(t.layered(Base::Diffuse(Diffuse { reflectance: base }), &coat))
             }
-            Material::CoatedConductor {
-                interface_roughness,
-                thickness,
-                interface_eta,
-                conductor,
-                conductor_roughness,
-                g,
-                albedo,
-                max_depth,
-                samples,
-            } => {
-                let eta = valid_eta(interface_eta);
-                Bsdf::Layered(Layered {
-                    top: Dielectric { eta, distribution: t.distribution(interface_roughness) },
-                    base: Base::Conductor(t.conductor(conductor, conductor_roughness, eta)),
-                    thickness: t.thickness(thickness),
-                    albedo: t.albedo(albedo),
-                    g: t.asymmetry(g),
-                    max_depth,
-                    samples: samples.max(1),
-                })
+            Material::CoatedConductor { conductor, roughness, coat } => {
+                let metal = t.conductor(conductor, roughness, valid_eta(coat.eta));
+                Bsdf::Layered(t.layered(Base::Conductor(metal), &coat))
             }
             Material::Principled(material) => Bsdf::Principled(material.bsdf(t)),
             Material::Hair(material) => Bsdf::Hair(material.bsdf(t)),
@@ -442,7 +405,9 @@ impl MaterialSet {
 
 /// The table that a material needs: none unless a closed form can serve it.
 fn coat_key(material: &Material, textures: &TextureSet) -> Option<CoatKey> {
-    let Material::CoatedDiffuse { roughness, thickness, eta, albedo, .. } = material else { return None };
+    let Material::CoatedDiffuse { coat: Coat { roughness, thickness, eta, albedo, .. }, .. } = material else {
+        return None;
+    };
     if textures.constant_rgb(*albedo).is_some_and(|a| !a.clamp(0.0, 1.0).is_black()) {
         return None;
     }
@@ -490,13 +455,18 @@ impl Textures<'_> {
         distribution_of(self.float(roughness.u), self.float(roughness.v), roughness.remap)
     }
 
-    fn thickness(&self, id: FloatTextureId) -> f32 {
-        self.float(id).max(f32::MIN_POSITIVE)
-    }
-
-    fn asymmetry(&self, id: FloatTextureId) -> f32 {
-        // At ±1 the phase function is a delta, which walks cannot connect.
-        self.float(id).clamp(-0.99, 0.99)
+    /// A base under a coat.
+    fn layered(&self, base: Base, coat: &Coat) -> Layered {
+        Layered {
+            top: Dielectric { eta: valid_eta(coat.eta), distribution: self.distribution(coat.roughness) },
+            base,
+            thickness: self.float(coat.thickness).max(f32::MIN_POSITIVE),
+            albedo: self.albedo(coat.albedo),
+            // At ±1 the phase function is a delta, which walks cannot connect.
+            g: self.float(coat.g).clamp(-0.99, 0.99),
+            max_depth: coat.max_depth,
+            samples: coat.samples.max(1),
+        }
     }
 
     /// The metal under a medium of index `outside`.

@@ -82,17 +82,8 @@ impl Bench {
     fn coated(&mut self, roughness: Roughness, albedo: f32) -> MaterialId {
         let (reflectance, thickness, g) = (self.rgb(0.2, 0.5, 0.9), self.float(0.01), self.float(0.0));
         let albedo = self.rgb(albedo, albedo, albedo);
-        let material = Material::CoatedDiffuse {
-            reflectance,
-            roughness,
-            thickness,
-            eta: 1.5,
-            g,
-            albedo,
-            max_depth: 10,
-            samples: 1,
-        };
-        self.material(material)
+        let coat = Coat { roughness, thickness, eta: 1.5, g, albedo, max_depth: 10, samples: 1 };
+        self.material(Material::CoatedDiffuse { reflectance, coat })
     }
 
     fn set(&self) -> MaterialSet {
@@ -251,17 +242,10 @@ fn indices_are_relative_to_the_coat_and_roughness_is_remapped() {
     let (zero, rough, thickness) = (bench.float(0.0), bench.float(0.09), bench.float(0.01));
     let (eta, k, black) = (bench.rgb(0.3, 0.6, 1.2), bench.rgb(3.0, 3.0, 3.0), bench.rgb(0.0, 0.0, 0.0));
     let roughness = |id, remap| Roughness { u: id, v: id, remap };
-    let metal = bench.material(Material::CoatedConductor {
-        interface_roughness: roughness(zero, false),
-        thickness,
-        interface_eta: 1.5,
-        conductor: ConductorSpectrum::EtaK { eta, k },
-        conductor_roughness: roughness(rough, true),
-        g: zero,
-        albedo: black,
-        max_depth: 10,
-        samples: 0,
-    });
+    let smooth = roughness(zero, false);
+    let coat = Coat { roughness: smooth, thickness, eta: 1.5, g: zero, albedo: black, max_depth: 10, samples: 0 };
+    let conductor = ConductorSpectrum::EtaK { eta, k };
+    let metal = bench.material(Material::CoatedConductor { conductor, roughness: roughness(rough, true), coat });
     let glass = bench.material(Material::Dielectric { eta: 0.0, roughness: roughness(rough, false) });
     let (set, hit) = (bench.set(), hit(UP));
     let bsdf = |id| set.bsdf(id, &bench.textures, &hit, &context(&hit), UP).unwrap();

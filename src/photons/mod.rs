@@ -9,7 +9,7 @@
 //! got there ([`Origin`]): straight from a light, scattered by a Lambertian lobe, or by any other one, which makes them
 //! caustic photons, whether the light before that was direct or not.
 //!
-//! Reading order: [`photon`], `tree`, [`map`]; [`light_distribution`], `path`, `walk`; [`importance`], [`rules`],
+//! Reading order: [`photon`], `tree`, [`map`]; [`light_distribution`], `path`, `walk`; [`importance`],
 //! [`trace`]; [`error`].
 
 pub mod error;
@@ -20,7 +20,6 @@ pub mod map;
 mod map_tests;
 pub(crate) mod path;
 pub mod photon;
-pub mod rules;
 pub mod trace;
 mod tree;
 mod walk;
@@ -30,5 +29,4 @@ pub use importance::{Importance, ImportanceSettings, LowImportance, importons, t
 pub use light_distribution::LightDistribution;
 pub use map::{GatherScratch, PhotonMap, Place, Search};
 pub use photon::{Origin, Photon};
-pub use rules::CausticRule;
 pub use trace::{PhotonBudget, Traced, Tracing, path_count, trace_photons};

@@ -5,7 +5,9 @@
 //! is fixed before they are traced, see [`path_count`].
 //!
 //! The photons of the global map (from lights, and scattered by Lambertian surfaces) and those of caustics come from
-//! the same photon paths, see [`super::rules`].
+//! the same photon paths, of which there are more than the global map needs, so that the caustic map is finer [Keller and
+//! Wald 2000, §2.3]: the first ⌊qN⌋ of N paths fill both maps, the others only the caustic map. Photons are stored with
+//! probability p(x), by which their powers are divided.
 
 use super::error::PhotonError;
 use super::importance::Importance;
@@ -13,7 +15,6 @@ use super::light_distribution::LightDistribution;
 use super::map::GatherScratch;
 use super::path::{BATCH, domain, path_stream};
 use super::photon::{Origin, Photon};
-use super::rules::{self, CausticRule};
 use super::walk::{Arrival, Particle, WalkSettings, Walker};
 use crate::bsdfs::dielectric::Transport;
 use crate::lights::LightSet;
@@ -50,8 +51,6 @@ pub struct Tracing<'a> {
     pub max_global_depth: u32,
     /// Fraction q of the photon paths that fill the global map, in (0, 1].
     pub q: f32,
-    /// How the global map is thinned to it.
-    pub caustics: CausticRule,
     /// Fraction of the photon paths distributed evenly over the lights, whatever their powers (0..1).
     pub floor: f32,
     /// Weights that the lights have instead of their powers.
@@ -71,7 +70,6 @@ impl Default for Tracing<'_> {
             max_depth: 16,
             max_global_depth: 16,
             q: 1.0,
-            caustics: CausticRule::default(),
             floor: 0.1,
             light_weights: None,
             max_in_pilot: 1_000_000,
@@ -225,10 +223,7 @@ impl<'a> Run<'a> {
 
     /// The photon paths of the global map among `all`.
     fn global_part(&self, all: u64) -> u64 {
-        match self.tracing.caustics {
-            CausticRule::OneRule | CausticRule::TwoTests => all,
-            CausticRule::FirstPaths => ((f64::from(self.tracing.q) * all as f64) as u64).max(1),
-        }
+        ((f64::from(self.tracing.q) * all as f64) as u64).max(1)
     }
 
     /// The number of photon paths that store about `wanted` photons in the global map, from paths with a separate seed.
@@ -252,11 +247,7 @@ impl<'a> Run<'a> {
 
         // Where only caustics are stored, the number of paths of the pilot
         let of_global = if global > 0 { wanted as f64 * traced as f64 / global as f64 } else { traced as f64 };
-        let all = match self.tracing.caustics {
-            CausticRule::OneRule | CausticRule::TwoTests => of_global,
-            CausticRule::FirstPaths => of_global / f64::from(self.tracing.q),
-        };
-        Ok((all.ceil() as u64).clamp(1, max))
+        Ok(((of_global / f64::from(self.tracing.q)).ceil() as u64).clamp(1, max))
     }
 
     fn check_stop(&self, paths: u64) -> Result<(), PhotonError> {
@@ -342,19 +333,19 @@ impl<'a> Run<'a> {
         fills_global: bool,
         scratch: &mut GatherScratch,
     ) {
-        let mut p = || self.importance.map_or(1.0, |importance| importance.probability(arrival.p, arrival.n, scratch));
-        let xi = arrival.xi();
         let particle = arrival.particle;
-        let (factor, deposits) = match particle.origin {
-            Origin::Caustic => (rules::caustic(xi[0], p()), &mut batch.caustic),
-            Origin::Primary(_) | Origin::Diffuse if arrival.scatterings > self.tracing.max_global_depth => return,
-            Origin::Primary(_) | Origin::Diffuse => {
-                let factor = self.tracing.caustics.global(self.tracing.q, fills_global, xi, p);
-                (factor, &mut batch.global)
+        let deposits = match particle.origin {
+            Origin::Caustic => &mut batch.caustic,
+            Origin::Primary(_) | Origin::Diffuse
+                if !fills_global || arrival.scatterings > self.tracing.max_global_depth =>
+            {
+                return;
             }
+            Origin::Primary(_) | Origin::Diffuse => &mut batch.global,
         };
-        if let Some(factor) = factor {
-            let power = particle.power * factor;
+        let p = self.importance.map_or(1.0, |importance| importance.probability(arrival.p, arrival.n, scratch));
+        if arrival.xi() < p {
+            let power = particle.power * (1.0 / p);
             deposits.push((path, Photon::new(arrival.p, arrival.wi, arrival.n, power, particle.origin)));
         }
     }

@@ -33,7 +33,7 @@ mod domain {
     pub(super) const RESAMPLE: u32 = 1;
     pub(super) const ROULETTE: u32 = 2;
     pub(super) const PART: u32 = 3;
-    /// Two numbers that decide on storage.
+    /// The number that decides on storage.
     pub(super) const DEPOSIT: u32 = 4;
     /// Vertex k has the domain `VERTEX + k` of the photon path.
     pub(super) const VERTEX: u32 = 16;
@@ -75,10 +75,9 @@ pub(super) struct Arrival<'a> {
 }
 
 impl Arrival<'_> {
-    /// Numbers that decide whether it is stored.
-    pub(super) fn xi(&self) -> [f32; 2] {
-        let stream = self.stream.domain(domain::DEPOSIT);
-        [0, 1].map(|key| stream.draw_random(key))
+    /// The number that decides whether it is stored.
+    pub(super) fn xi(&self) -> f32 {
+        self.stream.domain(domain::DEPOSIT).draw_random(0)
     }
 }
 

@@ -20,7 +20,7 @@ pub mod visibility_cache;
 
 pub use preparation::{PlanError, Preparation};
 
-use crate::integrators::{light_layers, light_paths, reuse, through_media};
+use crate::integrators::features::{self, OPTIONAL};
 use crate::scene::RenderJob;
 use crate::settings::table::rows;
 use crate::settings::{Allocation, EstimatorKind, Settings};
@@ -39,8 +39,8 @@ pub struct Plan {
 
 /// Completes what the settings of `job` leave open, or says why there can be no image.
 pub fn prepare(job: &mut RenderJob, how: &Preparation<'_>) -> Result<Plan, PlanError> {
-    if let Some(obstacle) = through_media::obstacle(job) {
-        return Err(PlanError::Media(obstacle));
+    if let Some(conflict) = features::refusal(job, &job.settings().integrator) {
+        return Err(conflict.into());
     }
     let open = *job.settings();
     let mut plan = match how.until_deadline(|how| complete(job, &open, how)) {
@@ -86,16 +86,12 @@ fn complete(job: &mut RenderJob, open: &Settings, how: &Preparation<'_>) -> Resu
 
 /// What settings ask for, and the scene does not allow. Settings that do not apply are said to have no effect where they are given.
 fn warnings(job: &RenderJob) -> Vec<String> {
-    let i = &job.settings().integrator;
-    let applies = |flag| rows().any(|row| row.flag == flag && row.applies.to(job.settings()));
-    let shares = i.path_reuse.is_some_and(|edge| edge > 1) && applies("path-reuse");
-    let has_light_paths = i.light_paths.is_some_and(|n| n > 0.0) && applies("light-paths");
-    let all = [
-        ("pixels do not share paths", reuse::obstacle(job).filter(|_| shares)),
-        ("there are no light paths", light_paths::obstacle(job).filter(|_| has_light_paths)),
-        ("light groups have no layers", light_layers::obstacle(job).filter(|_| light_layers::is_wanted(job))),
-    ];
-    all.into_iter().filter_map(|(what, why)| Some(format!("{what}: {}", why?))).collect()
+    let settings = &job.settings().integrator;
+    let applies = |flag: &str| rows().any(|row| row.flag == flag && row.applies.to(job.settings()));
+    let wanted = OPTIONAL.iter().filter(|(feature, flag, _)| feature.is_wanted(job, settings) && applies(flag));
+    let warning =
+        |(feature, _, without): &_| Some(format!("{without}: {}", features::conflict(job, settings, *feature)?));
+    wanted.filter_map(warning).collect()
 }
 
 /// The settings that differ, either as they are set or by what is recorded of them: where something was open and the choice is

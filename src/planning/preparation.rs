@@ -1,5 +1,6 @@
 //! How an image is prepared, what ends that, and why it may fail.
 
+use crate::integrators::features::Conflict;
 use crate::settings::Settings;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
@@ -87,9 +88,9 @@ pub enum PlanError {
     /// The threads could not be started.
     #[error(transparent)]
     Threads(#[from] ThreadError),
-    /// There are media, and the settings leave them out.
-    #[error("{0}")]
-    Media(String),
+    /// The settings leave out something of the scene.
+    #[error(transparent)]
+    Features(#[from] Conflict),
     /// It was stopped.
     #[error("stopped before the first sample")]
     Stopped,

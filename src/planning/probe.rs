@@ -5,9 +5,9 @@ use crate::film::accumulator::RadianceAccumulator;
 use crate::film::{FeatureSet, PixelSample};
 use crate::integrators::camera_samples::{CameraSampler, Scratch};
 use crate::integrators::cells::Groups;
+use crate::integrators::features::{self, Feature};
 use crate::integrators::light_paths::{self, LightPilot};
 use crate::integrators::path::{BATCH_PATHS, CameraSample};
-use crate::integrators::reuse;
 use crate::integrators::{PathStats, PathTracer};
 use crate::scene::RenderJob;
 use crate::settings::IntegratorSettings;
@@ -49,7 +49,7 @@ pub(super) struct Probe<'a> {
 impl<'a> Probe<'a> {
     /// A probe of an image, whose paths leave to light paths what these find, and which pixels share as they do in the image.
     pub(super) fn new(job: &'a RenderJob, left: &LeftToLightPaths, features: FeatureSet) -> Self {
-        let groups = if reuse::obstacle(job).is_none() { Groups::Grid } else { Groups::None };
+        let groups = if features::allows(job, Feature::Sharing) { Groups::Grid } else { Groups::None };
         let mut tracer = PathTracer::sharing(groups, features);
         tracer.leave(job, left.0.as_ref().map(|(pilot, per_sample)| (pilot, *per_sample)));
         let camera = CameraSampler::new(job, 0);

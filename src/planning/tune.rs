@@ -8,7 +8,7 @@ use super::preparation::{PlanError, Preparation};
 use super::processor_time;
 use super::trials::{Measured, Trials};
 use super::visibility_cache::build_visibility_cache;
-use crate::integrators::{reuse, through_media};
+use crate::integrators::features::{self, Feature};
 use crate::scene::RenderJob;
 use crate::settings::{Allocation, ContributingSettings, EstimatorKind, IntegratorSettings, Settings, bsdf_samples};
 use serde::{Deserialize, Serialize};
@@ -74,11 +74,8 @@ pub(super) fn tune(
 fn steps(open: &Settings, facts: &Facts, job: &RenderJob) -> Vec<Vec<Change>> {
     let i = open.integrator;
     let mut steps: Vec<Vec<Change>> = Vec::new();
-    let knows_media = |estimator| {
-        let s = IntegratorSettings { estimator, ..i };
-        job.world.scene.media.is_empty() || through_media::obstacle_of(&s).is_none()
-    };
-    if facts.lights >= MANY_LIGHTS && knows_media(EstimatorKind::Contributing) && !job.lights.find_glows() {
+    let is_possible = |estimator| features::refusal(job, &IntegratorSettings { estimator, ..i }).is_none();
+    if facts.lights >= MANY_LIGHTS && is_possible(EstimatorKind::Contributing) && !job.lights.find_glows() {
         steps.push(vec![Change::Contributing]);
     }
     if i.infinite_fraction.is_none() && facts.sky > 0.0 && facts.lights > 1 {
@@ -89,17 +86,16 @@ fn steps(open: &Settings, facts: &Facts, job: &RenderJob) -> Vec<Vec<Change>> {
         (i.bsdf_fraction.is_none() && !job.lights.find_glows(), vec![Change::Bsdf(0.5), Change::Bsdf(0.0)]),
         (i.later_samples.is_none() && i.depth() > 1, vec![Change::MoreLater, Change::FewerLater]),
     ];
-    let shares =
-        i.path_reuse.is_none() && open.sampling.allocation == Allocation::Auto && reuse::obstacle(job).is_none();
+    let may_share = open.sampling.allocation == Allocation::Auto && features::allows(job, Feature::Sharing);
     let is_of = |(is_open, changes): &(bool, Vec<Change>)| is_open.then(|| changes.clone());
     steps.extend(numbers.iter().filter_map(is_of));
-    if shares {
+    if i.path_reuse.is_none() && may_share {
         steps.push(vec![Change::LargerBlocks, Change::SmallerBlocks]);
     }
     if i.samples.is_none() {
         steps.push(vec![Change::Double, Change::Halve]);
     }
-    if knows_media(EstimatorKind::Ris) && !job.lights.find_glows() {
+    if is_possible(EstimatorKind::Ris) && !job.lights.find_glows() {
         steps.push(vec![Change::Resampling]);
     }
     steps

@@ -22,8 +22,9 @@ mod worker;
 use crate::direct::Estimator;
 use crate::film::Film;
 pub use crate::integrators::CacheReport;
+use crate::integrators::features::{self, Conflict, Feature};
 pub use crate::integrators::path::BATCH_PATHS;
-use crate::integrators::{LightPathStats, MapStats, PathStats, reuse, through_media};
+use crate::integrators::{LightPathStats, MapStats, PathStats, reuse};
 use crate::photons::PhotonError;
 use crate::planning::PlanError;
 pub use crate::planning::preparation::{ThreadError, thread_pool};
@@ -152,12 +153,9 @@ pub enum RenderError {
     /// The integrator could not prepare its photon maps.
     #[error(transparent)]
     Photons(#[from] PhotonError),
-    /// There are media, and the settings leave them out.
-    #[error("{0}")]
-    Media(String),
-    /// A share of the pixels is asked for, and pixels share paths.
-    #[error("{SHARED}")]
-    Shared,
+    /// The settings leave out something of the scene, or the image cannot be divided.
+    #[error(transparent)]
+    Features(#[from] Conflict),
     /// It was stopped before the first sample.
     #[error("stopped before the first sample")]
     Stopped,
@@ -173,15 +171,11 @@ impl From<PlanError> for RenderError {
     fn from(error: PlanError) -> Self {
         match error {
             PlanError::Threads(error) => RenderError::Threads(error),
-            PlanError::Media(obstacle) => RenderError::Media(obstacle),
+            PlanError::Features(conflict) => conflict.into(),
             PlanError::Stopped => RenderError::Stopped,
         }
     }
 }
-
-/// Why a part of an image whose pixels share paths cannot be a share of the pixels.
-pub(crate) const SHARED: &str = "pixels share paths with others all over the image: divide it with --part-by samples, or render \
-                                 with --path-reuse 1";
 
 /// Renders. `stop` ends it after the tiles under way; `observe` is called from worker threads.
 pub fn render(
@@ -201,11 +195,10 @@ pub fn go_on(
     observe: &(dyn Fn(&Progress) + Sync),
     continuation: Continuation<'_>,
 ) -> Result<Rendering, RenderError> {
-    if let Some(obstacle) = through_media::obstacle(job) {
-        return Err(RenderError::Media(obstacle));
-    }
-    if settings.share.is_some() && reuse::edge(job) > 1 {
-        return Err(RenderError::Shared);
+    let is_divided = settings.share.is_some() && reuse::edge(job) > 1;
+    let division = is_divided.then(|| features::between(Feature::Sharing, Feature::TileShare)).flatten();
+    if let Some(conflict) = features::refusal(job, &job.settings().integrator).or(division) {
+        return Err(conflict.into());
     }
     let pool = thread_pool(settings.threads)?;
     let threads = pool.current_num_threads();

@@ -175,12 +175,10 @@ pub enum Kind {
         /// The words.
         words: &'static [&'static str],
     },
-    /// Two numbers separated by a comma.
+    /// Two numbers separated by a comma, the smaller one first.
     Pair {
         /// The range of both.
         range: Interval,
-        /// True if the second one is at least the first.
-        ascends: bool,
         /// Their unit.
         unit: &'static str,
     },
@@ -210,9 +208,9 @@ impl Kind {
             }),
             Kind::Real { range, words } => named(words, text).or_else(|| Some(Value::Real(real_in(range, text)?))),
             Kind::Percentage { words } => named(words, text).or_else(|| Some(Value::Real(part(text)?))),
-            Kind::Pair { range, ascends, .. } => text.split_once(',').and_then(|(a, b)| {
+            Kind::Pair { range, .. } => text.split_once(',').and_then(|(a, b)| {
                 let pair = [real_in(range, a)?, real_in(range, b)?];
-                (!ascends || pair[0] <= pair[1]).then_some(Value::Pair(pair))
+                (pair[0] <= pair[1]).then_some(Value::Pair(pair))
             }),
             Kind::Graded { plain, graded, range, default } => {
                 let (name, grade) = text.split_once(':').map_or((text, None), |(name, grade)| (name, Some(grade)));
@@ -245,9 +243,8 @@ impl fmt::Display for Kind {
             Kind::Real { range, words } if *range == Interval::POSITIVE => write!(f, "a positive number{}", or(words)),
             Kind::Real { range, words } => write!(f, "a number {range}{}", or(words)),
             Kind::Percentage { words } => write!(f, "a positive number such as 0.02, or 2%{}", or(words)),
-            Kind::Pair { range, ascends, unit } => {
-                let order = if *ascends { ", the smaller one first" } else { "" };
-                write!(f, "two {range} numbers of {unit} separated by a comma{order}")
+            Kind::Pair { range, unit } => {
+                write!(f, "two {range} numbers of {unit} separated by a comma, the smaller one first")
             }
             Kind::Graded { plain, graded, range, .. } => {
                 let graded: Vec<String> = graded.iter().map(|name| format!("{name}:E")).collect();
@@ -363,12 +360,11 @@ mod tests {
     }
 
     #[test]
-    fn pairs_ascend_where_they_must() {
-        let pair = |ascends| Kind::Pair { range: Interval::POSITIVE, ascends, unit: "pixels" };
-        assert_eq!(pair(true).parse("2,2"), Ok(Value::Pair([2.0, 2.0])));
-        assert_eq!(pair(false).parse("3, 2"), Ok(Value::Pair([3.0, 2.0])));
+    fn pairs_ascend() {
+        let pair = Kind::Pair { range: Interval::POSITIVE, unit: "pixels" };
+        assert_eq!(pair.parse("2, 2"), Ok(Value::Pair([2.0, 2.0])));
         for wrong in ["3,2", "0,2", "3", "3,4,5", "3,x", "2,inf"] {
-            assert!(pair(true).parse(wrong).is_err(), "{wrong}");
+            assert!(pair.parse(wrong).is_err(), "{wrong}");
         }
     }
 }

@@ -7,7 +7,7 @@ use lumiris::bsdfs::fresnel::fr_dielectric;
 use lumiris::imaging::oiio::{Part, write_image};
 use lumiris::import::cache::FileCache;
 use lumiris::import::{LoadOptions, load_text};
-use lumiris::integrators::reuse;
+use lumiris::integrators::features::{Feature, allows};
 use lumiris::lights::{EnvironmentFilter, EnvironmentMap, EnvironmentMapping};
 use lumiris::materials::Dispersion;
 use lumiris::scene::{AccelKind, RenderJob};
@@ -112,7 +112,7 @@ fn estimators_and_tracers_agree_on_rough_dispersive_glass() {
         {BOX}"#
     );
     let mut glass = job(&text, AccelKind::Embree);
-    assert!(reuse::obstacle(&glass).is_some_and(|reason| reason.contains("wavelengths")));
+    assert!(!allows(&glass, Feature::Sharing));
     let mut answers = Vec::new();
     for (estimator, settings) in estimators() {
         choose(&mut glass, &settings);

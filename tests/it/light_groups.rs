@@ -3,6 +3,7 @@
 use lumiris::film::{Film, PixelBounds, PixelSums};
 use lumiris::import::cache::FileCache;
 use lumiris::import::{LoadOptions, load_text};
+use lumiris::integrators::features::{Feature, allows};
 use lumiris::integrators::light_layers;
 use lumiris::render::output::{Aov, channels};
 use lumiris::render::{RenderSettings, render};
@@ -176,7 +177,7 @@ fn what_cannot_be_told_apart_has_no_layers() {
     let mut job = job(None);
     for kind in [IntegratorKind::PhotonMap, IntegratorKind::IrradianceCache] {
         job.change(|s| s.integrator.kind = kind);
-        assert!(light_layers::is_wanted(&job) && light_layers::obstacle(&job).is_some());
+        assert!(!allows(&job, Feature::LightGroups));
         assert_eq!(light_layers::count(&job), 0);
     }
     job.change(|s| s.integrator.kind = IntegratorKind::Path);

@@ -5,7 +5,8 @@ use crate::same_light::assert_same_light;
 use lumiris::imaging::oiio::{Part, write_image};
 use lumiris::import::cache::FileCache;
 use lumiris::import::{LoadOptions, load_text};
-use lumiris::integrators::light_paths::{obstacle, per_sample};
+use lumiris::integrators::features::{Feature, allows};
+use lumiris::integrators::light_paths::per_sample;
 use lumiris::render::RenderSettings;
 use lumiris::scene::{AccelKind, PixelSamples, RenderJob};
 use lumiris::settings::{EstimatorKind, IntegratorKind};
@@ -133,7 +134,7 @@ fn images_have_the_light_that_they_have_without_light_paths() {
         let image = |light_paths: f32| {
             let mut job = scene.job(light_paths, [16, 12]);
             job.change(|s| (s.integrator.samples, s.integrator.path_reuse) = (Some(3), Some(edge)));
-            assert_eq!(obstacle(&job), None);
+            assert!(allows(&job, Feature::LightPaths));
             let numbers = differ.then(|| different_numbers(&job, 64));
             image_of_seed(job, numbers, 64)
         };
@@ -189,7 +190,7 @@ fn materials_that_vary_send_all_light_on_once() {
             (integrator.estimator, integrator.light_paths) = (EstimatorKind::Mis, Some(light_paths));
             loaded.settings.sampling.footprint_spp = Some(1);
             let mut job = loaded.job(AccelKind::Embree, None).unwrap();
-            assert_eq!(obstacle(&job), None);
+            assert!(allows(&job, Feature::LightPaths));
             let images = pixel_means(&mut job, seeds, 64);
             mean_of(images.iter().map(|image| image.iter().sum::<f64>()))
         });
@@ -246,7 +247,7 @@ fn images_that_light_paths_cannot_help_are_those_without() {
     ] {
         let before = *job.settings();
         change(&mut job);
-        assert!(obstacle(&job).is_some() && per_sample(&job) == 0.0);
+        assert!(!allows(&job, Feature::LightPaths) && per_sample(&job) == 0.0);
         let with = film(&job, RenderSettings { spp: 2, ..RenderSettings::default() });
         job.change(|s| s.integrator.light_paths = Some(0.0));
         let without = film(&job, RenderSettings { spp: 2, ..RenderSettings::default() });

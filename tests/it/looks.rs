@@ -6,7 +6,7 @@ use crate::same_light::assert_same_light;
 use lumiris::film::Film;
 use lumiris::import::cache::FileCache;
 use lumiris::import::{LoadOptions, load_text};
-use lumiris::integrators::{light_paths, reuse};
+use lumiris::integrators::features::{Feature, allows};
 use lumiris::planning::{Preparation, prepare};
 use lumiris::render::{RenderSettings, render};
 use lumiris::scene::{AccelKind, PixelSamples, RenderJob};
@@ -132,8 +132,8 @@ fn looks_change_no_mean() {
             change(&mut job);
             job.change(|s| s.integrator.estimator = estimator);
             let settings = &job.settings().integrator;
-            assert!(settings.path_reuse.is_none() || reuse::obstacle(&job).is_none());
-            assert!(settings.light_paths.is_none() || light_paths::obstacle(&job).is_none());
+            assert!(settings.path_reuse.is_none() || allows(&job, Feature::Sharing));
+            assert!(settings.light_paths.is_none() || allows(&job, Feature::LightPaths));
             image_of_seed(job, Some(split(SPP, looks)), SPP)
         };
         assert_same_light(&format!("looks: {name}"), image(&[1]), image(&[5, 1, 2, 24]));

@@ -12,6 +12,7 @@ mod cryptomatte;
 mod dispersion;
 mod evaluated;
 mod far_away;
+mod features;
 mod few_samples;
 mod gltf;
 mod hair;

@@ -5,6 +5,7 @@ use crate::same_light::assert_same_light;
 use lumiris::film::{Film, PixelSums};
 use lumiris::import::cache::FileCache;
 use lumiris::import::{LoadOptions, load, load_text};
+use lumiris::integrators::features::{Feature, allows};
 use lumiris::integrators::reuse;
 use lumiris::render::{RenderSettings, render};
 use lumiris::scene::{AccelKind, PixelSamples, RenderJob};
@@ -167,9 +168,9 @@ fn threads_tiles_packets_and_passes_do_not_change_a_bit() {
 fn images_whose_pixels_cannot_share_paths_are_those_without() {
     let path = scene("demo/gallery");
     let mut job = job(&path, [16, 16], 4);
-    assert_eq!(reuse::obstacle(&job), None);
+    assert!(allows(&job, Feature::Sharing));
     job.change(|s| s.integrator.kind = IntegratorKind::Direct);
-    assert!(reuse::obstacle(&job).is_some() && reuse::edge(&job) == 1);
+    assert!(!allows(&job, Feature::Sharing) && reuse::edge(&job) == 1);
     let direct = film(&job, RenderSettings { spp: 2, ..RenderSettings::default() });
     job.change(|s| s.integrator.path_reuse = Some(1));
     let alone = film(&job, RenderSettings { spp: 2, ..RenderSettings::default() });

@@ -5,10 +5,9 @@
 use crate::media::{BOX, assert_answer, assert_they_agree, camera, choose, estimators, has_power, job, limit, means};
 use lumiris::import::cache::FileCache;
 use lumiris::import::{LoadOptions, load_text};
-use lumiris::integrators::through_media;
 use lumiris::materials::HalfSpace;
 use lumiris::scene::AccelKind;
-use lumiris::settings::{EstimatorKind, IntegratorKind};
+use lumiris::settings::EstimatorKind;
 use std::path::Path;
 
 /// A shape of the material in even light of radiance 1; `depth` bounces.
@@ -174,14 +173,4 @@ fn what_cannot_be_an_interior_is_refused_with_its_place() {
         assert!(found.contains(expected) && found.contains("jade:9:"), "{material}:\n{found}");
     }
     assert_eq!(message(r#"Material "subsurface" "string name" "Marble" "float scale" 0.5"#), "");
-}
-
-#[test]
-fn integrators_without_media_say_so() {
-    let mut job = job(&in_even_light("", BOX, 3), AccelKind::Embree);
-    assert_eq!(through_media::obstacle(&job), None);
-    for kind in [IntegratorKind::PhotonMap, IntegratorKind::IrradianceCache] {
-        job.change(|s| s.integrator.kind = kind);
-        assert!(through_media::obstacle(&job).unwrap().contains("path"), "{kind:?}");
-    }
 }

@@ -21,6 +21,7 @@ pub mod ris;
 use super::candidates::Candidates;
 use super::components::Components;
 use super::fits::Fits;
+use super::mixture::{draw_groups, draw_together};
 use super::point::ShadingPoint;
 use super::shadow_segments::Segments;
 use super::t1::{BsdfBuffers, T1};
@@ -170,10 +171,10 @@ impl Estimator {
             Estimator::Mis(mis) => mis.propose(t1),
             Estimator::Ris(ris) => ris.propose_and_draw(t1, &mut batch.ris),
             Estimator::Ocv(Ocv { mis, form: OcvForm::Pixels }) => {
-                batch.components.propose_together(t1, |point| mis.allocation_at(point));
+                batch.components.propose(t1, draw_together, |point| mis.allocation_at(point));
             }
             Estimator::Ocv(Ocv { mis, .. }) | Estimator::OptimalMis(OptimalMis { mis, .. }) => {
-                batch.components.propose(t1, |point| mis.allocation_at(point));
+                batch.components.propose(t1, draw_groups, |point| mis.allocation_at(point));
             }
             Estimator::Correlated(c) => c.propose(t1, &mut batch.correlated),
             Estimator::Contributing(c) => c.propose(t1, &mut batch.contributing),

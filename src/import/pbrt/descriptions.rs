@@ -267,32 +267,26 @@ impl ShapeSource {
     }
 }
 
-/// Arrays of a triangle mesh in object space.
+/// Arrays of a mesh of faces of N corners in object space.
 #[derive(Clone, Debug, Default)]
-pub struct MeshData {
+pub struct FaceData<const N: usize> {
     /// Relative to `origin`.
     pub(super) positions: Vec<Vec3>,
     pub(super) origin: DVec3,
-    pub(super) indices: Vec<[u32; 3]>,
+    pub(super) indices: Vec<[u32; N]>,
     pub(super) normals: Vec<Vec3>,
+    /// Of triangles alone.
     pub(super) tangents: Vec<Vec3>,
     pub(super) uvs: Vec<Vec2>,
     /// Numbers of the faces.
     pub(super) faces: Vec<u32>,
 }
 
-/// Arrays of a bilinear mesh in object space.
-#[derive(Clone, Debug, Default)]
-pub struct PatchData {
-    /// Relative to `origin`.
-    pub(super) positions: Vec<Vec3>,
-    pub(super) origin: DVec3,
-    pub(super) indices: Vec<[u32; 4]>,
-    pub(super) normals: Vec<Vec3>,
-    pub(super) uvs: Vec<Vec2>,
-    /// Numbers of the faces.
-    pub(super) faces: Vec<u32>,
-}
+/// Triangles.
+pub type MeshData = FaceData<3>;
+
+/// Bilinear patches.
+pub type PatchData = FaceData<4>;
 
 /// Curves in object space.
 #[derive(Clone, Debug)]

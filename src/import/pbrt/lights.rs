@@ -17,19 +17,22 @@ use lumiris_numbers::math::{DAffine3, DMat3, DVec3, Mat3, Rgb, Vec3};
 use std::f32::consts::PI;
 use std::sync::Arc;
 
+/// From the space of a light to the world, and the factor of its light.
+type Placed<'a> = (&'a DAffine3, f32);
+
 impl Builder<'_> {
     /// `LightSource "kind"`
     pub fn light(&mut self, kind: &Name, p: &ParamSet, d: &mut Diagnostics) {
         let world_from_light = self.still_transform("lights", p.span, d);
-        let scale = light_scale(p, d);
+        let placed = (&world_from_light, light_scale(p, d));
         let images = self.environments.len();
         let light = match kind.text.as_str() {
-            "point" => self.point(p, &world_from_light, scale, d),
-            "spot" => self.spot(p, &world_from_light, scale, d),
-            "distant" => self.distant(p, &world_from_light, scale, d),
-            "infinite" | "exinfinite" => self.infinite(p, &world_from_light, scale, d),
-            "goniometric" => self.goniometric(p, &world_from_light, scale, d),
-            "projection" => self.projection(p, &world_from_light, scale, d),
+            "point" => self.point(p, placed, d),
+            "spot" => self.spot(p, placed, d),
+            "distant" => self.distant(p, placed, d),
+            "infinite" | "exinfinite" => self.infinite(p, placed, d),
+            "goniometric" => self.goniometric(p, placed, d),
+            "projection" => self.projection(p, placed, d),
             other => {
                 let known = ["point", "spot", "distant", "infinite", "goniometric", "projection"];
                 unknown(other, kind.span, "light", &known, d);
@@ -56,7 +59,7 @@ impl Builder<'_> {
         self.color_param(p, name, SpectrumUse::Illuminant, d).unwrap_or_else(|| self.white())
     }
 
-    fn point(&self, p: &ParamSet, world_from_light: &DAffine3, scale: f32, d: &mut Diagnostics) -> Option<Light> {
+    fn point(&self, p: &ParamSet, (world_from_light, scale): Placed<'_>, d: &mut Diagnostics) -> Option<Light> {
         let intensity = self.emitted(p, "I", d) * scale;
         let from = p.point("from", d).unwrap_or(DVec3::ZERO);
         let power = p.float("power", d).unwrap_or(0.0);
@@ -64,7 +67,7 @@ impl Builder<'_> {
         Some(Light::Point { p: world_from_light.transform_point3(from).as_vec3(), intensity: intensity * factor })
     }
 
-    fn spot(&self, p: &ParamSet, world_from_light: &DAffine3, scale: f32, d: &mut Diagnostics) -> Option<Light> {
+    fn spot(&self, p: &ParamSet, (world_from_light, scale): Placed<'_>, d: &mut Diagnostics) -> Option<Light> {
         let intensity = self.emitted(p, "I", d) * scale;
         let from = p.point("from", d).unwrap_or(DVec3::ZERO);
         let to = p.point("to", d).unwrap_or(DVec3::Z);
@@ -86,7 +89,7 @@ impl Builder<'_> {
         Some(Light::Spot { p: p0.as_vec3(), axis, cos_total, cos_falloff_start, intensity: intensity * factor })
     }
 
-    fn distant(&self, p: &ParamSet, world_from_light: &DAffine3, scale: f32, d: &mut Diagnostics) -> Option<Light> {
+    fn distant(&self, p: &ParamSet, (world_from_light, scale): Placed<'_>, d: &mut Diagnostics) -> Option<Light> {
         let l = self.emitted(p, "L", d) * scale;
         let from = p.point("from", d).unwrap_or(DVec3::ZERO);
         let to = p.point("to", d).unwrap_or(DVec3::Z);
@@ -100,13 +103,7 @@ impl Builder<'_> {
         Some(Light::Distant { wi_world, l })
     }
 
-    fn infinite(
-        &mut self,
-        p: &ParamSet,
-        world_from_light: &DAffine3,
-        scale: f32,
-        d: &mut Diagnostics,
-    ) -> Option<Light> {
+    fn infinite(&mut self, p: &ParamSet, (world_from_light, scale): Placed<'_>, d: &mut Diagnostics) -> Option<Light> {
         let portal = self.portal(p, d);
         self.portals.extend(portal.map(|portal| (portal, p.span_of("portal"))));
         let illuminance = p.float("illuminance", d).unwrap_or(0.0);
@@ -124,7 +121,11 @@ impl Builder<'_> {
         if color.is_some() {
             d.error(p.span_of("L"), "an infinite light has `L` or `filename`, not both");
         }
-        Some(self.wait_for_image((&name, span), ImageUse::Environment { illuminance, portal }, world_from_light, scale))
+        Some(self.wait_for_image(
+            (&name, span),
+            ImageUse::Environment { illuminance, portal },
+            (world_from_light, scale),
+        ))
     }
 
     /// `portal`: corners in world space, whatever the current transformation is.
@@ -142,8 +143,7 @@ impl Builder<'_> {
         &mut self,
         (name, span): (&str, Span),
         image_use: ImageUse,
-        world_from_light: &DAffine3,
-        scale: f32,
+        (world_from_light, scale): Placed<'_>,
     ) -> Light {
         let (path, index) = (file_in(&self.folder, name), self.lights.len());
         let world_from_light = world_from_light.as_affine3a();
@@ -155,8 +155,7 @@ impl Builder<'_> {
     fn goniometric(
         &mut self,
         p: &ParamSet,
-        world_from_light: &DAffine3,
-        scale: f32,
+        (world_from_light, scale): Placed<'_>,
         d: &mut Diagnostics,
     ) -> Option<Light> {
         let intensity = self.emitted(p, "I", d);
@@ -164,15 +163,14 @@ impl Builder<'_> {
         let name = image_of(p, "goniometric", d)?;
         let swap = DAffine3::from_mat3(DMat3::from_cols(DVec3::X, DVec3::Z, DVec3::Y));
         let image_use = ImageUse::Goniometric { intensity, power };
-        Some(self.wait_for_image((&name, p.span_of("filename")), image_use, &(*world_from_light * swap), scale))
+        Some(self.wait_for_image((&name, p.span_of("filename")), image_use, (&(*world_from_light * swap), scale)))
     }
 
     /// `LightSource "projection"`: along z, with the first row of the image at the greatest y.
     fn projection(
         &mut self,
         p: &ParamSet,
-        world_from_light: &DAffine3,
-        scale: f32,
+        (world_from_light, scale): Placed<'_>,
         d: &mut Diagnostics,
     ) -> Option<Light> {
         let fov = p.float("fov", d).unwrap_or(90.0);
@@ -184,7 +182,7 @@ impl Builder<'_> {
         }
         let flip = DAffine3::from_scale(DVec3::new(1.0, -1.0, 1.0));
         let image_use = ImageUse::Projection { fov, power };
-        Some(self.wait_for_image((&name, p.span_of("filename")), image_use, &(*world_from_light * flip), scale))
+        Some(self.wait_for_image((&name, p.span_of("filename")), image_use, (&(*world_from_light * flip), scale)))
     }
 
     /// `AreaLightSource "diffuse"`

@@ -7,9 +7,9 @@ use super::state::Builder;
 use crate::bsdfs::models::LobeAxis;
 use crate::import::images::{ImageChannels, ImageEncoding, ImageRequest};
 use crate::materials::{
-    ConductorSpectrum, Dispersion, EvaluatedMaterial, Material, MaterialEntry, MaterialId, NormalMap, Roughness,
+    Coat, ConductorSpectrum, Dispersion, EvaluatedMaterial, Material, MaterialEntry, MaterialId, NormalMap, Roughness,
 };
-use crate::textures::{Filter, FloatTexture, RgbTexture, RgbTextureId, Wrap};
+use crate::textures::{Filter, RgbTexture, RgbTextureId, Wrap};
 use lumiris_formats::diagnostic::Diagnostics;
 use lumiris_formats::names::{file_in, nfc};
 use lumiris_formats::pbrt::directive::Name;
@@ -19,6 +19,10 @@ use lumiris_formats::spectra;
 use lumiris_numbers::math::Rgb;
 use std::sync::Arc;
 
+/// Parameters of a roughness along both axes, and along each.
+const ROUGHNESS: [&str; 3] = ["roughness", "uroughness", "vroughness"];
+const OF_INTERFACE: [&str; 3] = ["interface.roughness", "interface.uroughness", "interface.vroughness"];
+const OF_CONDUCTOR: [&str; 3] = ["conductor.roughness", "conductor.uroughness", "conductor.vroughness"];
 /// Kinds of pbrt-v4 that are rendered, `principled` and `evaluated`.
 const KINDS: &[&str] = &[
     "diffuse",
@@ -109,12 +113,11 @@ impl Builder<'_> {
             "diffuse" => Material::Diffuse { reflectance: self.albedo(p, "reflectance", grey, d) },
             "conductor" => Material::Conductor {
                 spectrum: self.conductor(p, ["eta", "k", "reflectance"], d),
-                roughness: self.roughness(p, ["roughness", "uroughness", "vroughness"], 0.0, d),
+                roughness: self.roughness(p, ROUGHNESS, 0.0, d),
             },
-            "dielectric" => Material::Dielectric {
-                eta: self.ior(p, "eta", d),
-                roughness: self.roughness(p, ["roughness", "uroughness", "vroughness"], 0.0, d),
-            },
+            "dielectric" => {
+                Material::Dielectric { eta: self.ior(p, "eta", d), roughness: self.roughness(p, ROUGHNESS, 0.0, d) }
+            }
             "thindielectric" => Material::ThinDielectric { eta: self.ior(p, "eta", d) },
             "diffusetransmission" => Material::DiffuseTransmission {
                 reflectance: self.albedo(p, "reflectance", Rgb::splat(0.25), d),
@@ -123,34 +126,12 @@ impl Builder<'_> {
             },
             "coateddiffuse" => Material::CoatedDiffuse {
                 reflectance: self.albedo(p, "reflectance", grey, d),
-                roughness: self.roughness(p, ["roughness", "uroughness", "vroughness"], 0.0, d),
-                thickness: self.float_param(p, "thickness", 0.01, d),
-                eta: self.ior(p, "eta", d),
-                g: self.float_param(p, "g", 0.0, d),
-                albedo: self.albedo(p, "albedo", Rgb::BLACK, d),
-                max_depth: count(p, "maxdepth", 10, d),
-                samples: count(p, "nsamples", 1, d),
+                coat: self.coat(p, (ROUGHNESS, 0.0), "eta", d),
             },
             "coatedconductor" => Material::CoatedConductor {
-                interface_roughness: self.roughness(
-                    p,
-                    ["interface.roughness", "interface.uroughness", "interface.vroughness"],
-                    0.0,
-                    d,
-                ),
-                thickness: self.float_param(p, "thickness", 0.01, d),
-                interface_eta: self.ior(p, "interface.eta", d),
                 conductor: self.conductor(p, ["conductor.eta", "conductor.k", "reflectance"], d),
-                conductor_roughness: self.roughness(
-                    p,
-                    ["conductor.roughness", "conductor.uroughness", "conductor.vroughness"],
-                    0.0,
-                    d,
-                ),
-                g: self.float_param(p, "g", 0.0, d),
-                albedo: self.albedo(p, "albedo", Rgb::BLACK, d),
-                max_depth: count(p, "maxdepth", 10, d),
-                samples: count(p, "nsamples", 1, d),
+                roughness: self.roughness(p, OF_CONDUCTOR, 0.0, d),
+                coat: self.coat(p, (OF_INTERFACE, 0.0), "interface.eta", d),
             },
             "subsurface" => self.subsurface(desc, d),
             "principled" => self.principled(p, d),
@@ -236,31 +217,23 @@ impl Builder<'_> {
                 return Material::Interface;
             }
         }
-        let roughness_names = ["roughness", "uroughness", "vroughness"];
         let material = match kind {
             "matte" => self.matte(p, d),
             "plastic" | "substrate" | "uber" => Material::CoatedDiffuse {
                 reflectance: self.albedo(p, "Kd", Rgb::splat(if kind == "substrate" { 0.5 } else { 0.25 }), d),
-                roughness: self.roughness(p, roughness_names, 0.1, d),
-                thickness: self.textures.add_float(FloatTexture::Constant(0.01)),
-                eta: self.ior(p, "eta", d),
-                g: self.textures.add_float(FloatTexture::Constant(0.0)),
-                albedo: self.textures.add_rgb(RgbTexture::Constant(Rgb::BLACK)),
-                max_depth: 10,
-                samples: 1,
+                coat: self.coat(p, (ROUGHNESS, 0.1), "eta", d),
             },
             "metal" => Material::Conductor {
                 spectrum: self.conductor(p, ["eta", "k", "reflectance"], d),
-                roughness: self.roughness(p, roughness_names, 0.01, d),
+                roughness: self.roughness(p, ROUGHNESS, 0.01, d),
             },
             "mirror" => Material::Conductor {
                 spectrum: ConductorSpectrum::Reflectance(self.albedo(p, "Kr", Rgb::splat(0.9), d)),
-                roughness: self.roughness(p, roughness_names, 0.0, d),
+                roughness: self.roughness(p, ROUGHNESS, 0.0, d),
             },
-            "glass" => Material::Dielectric {
-                eta: self.ior(p, "eta", d),
-                roughness: self.roughness(p, roughness_names, 0.0, d),
-            },
+            "glass" => {
+                Material::Dielectric { eta: self.ior(p, "eta", d), roughness: self.roughness(p, ROUGHNESS, 0.0, d) }
+            }
             _ => Material::DiffuseTransmission {
                 reflectance: self.albedo(p, "Kd", Rgb::splat(0.25), d),
                 transmittance: self.albedo(p, "transmit", Rgb::splat(0.5), d),
@@ -275,6 +248,25 @@ impl Builder<'_> {
             }
         }
         material
+    }
+
+    /// The coat whose roughness and index have these names.
+    fn coat(
+        &mut self,
+        p: &ParamSet,
+        (names, rough): ([&'static str; 3], f32),
+        eta: &'static str,
+        d: &mut Diagnostics,
+    ) -> Coat {
+        Coat {
+            roughness: self.roughness(p, names, rough, d),
+            thickness: self.float_param(p, "thickness", 0.01, d),
+            eta: self.ior(p, eta, d),
+            g: self.float_param(p, "g", 0.0, d),
+            albedo: self.albedo(p, "albedo", Rgb::BLACK, d),
+            max_depth: count(p, "maxdepth", 10, d),
+            samples: count(p, "nsamples", 1, d),
+        }
     }
 
     pub(super) fn albedo(

@@ -172,36 +172,22 @@ fn read(row: &Setting, current: &Settings, p: &ParamSet, d: &mut Diagnostics) ->
     }
 }
 
-/// Two numbers, in one parameter or in one each. A maximum that is not given is at least the minimum.
+/// Two numbers, in one parameter each. A maximum that is not given is at least the minimum.
 fn pair(row: &Setting, current: &Settings, p: &ParamSet, d: &mut Diagnostics) -> Option<Value> {
-    let Kind::Pair { range, ascends, unit } = row.kind else { return None };
-    let (written, name) = match *row.parameters {
-        [min, max] => {
-            let now = (row.get)(current).and_then(|value| value.pair()).unwrap_or_default();
-            let (first, second) = (p.float(min, d), p.float(max, d));
-            if first.is_none() && second.is_none() {
-                return None;
-            }
-            let first = first.unwrap_or(now[0]);
-            let key = if p.type_of(max).is_some() { max } else { min };
-            ([first, second.unwrap_or(now[1].max(first))], (key, format!("{min} and {max}")))
-        }
-        [key] => match *p.floats(key, d)? {
-            [first, second] => ([first, second], (key, key.to_owned())),
-            ref other => {
-                d.error(p.span_of(key), format!("`{key}` takes two values, not {}", other.len()));
-                return None;
-            }
-        },
-        _ => return None,
-    };
-    if written.iter().all(|&x| range.contains(x)) && (!ascends || written[0] <= written[1]) {
-        return Some(Value::Pair(written));
+    let (Kind::Pair { range, unit }, &[min, max]) = (row.kind, row.parameters) else { return None };
+    let now = (row.get)(current).and_then(|value| value.pair()).unwrap_or_default();
+    let (first, second) = (p.float(min, d), p.float(max, d));
+    if first.is_none() && second.is_none() {
+        return None;
     }
-    let ([first, second], (key, names)) = (written, name);
-    let message = format!("{names} must be {range}, and not {first} and {second}");
-    let order = if ascends { "; the smaller one first" } else { "" };
-    d.error(p.span_of(key), message).help(format!("{unit}{order}"));
+    let first = first.unwrap_or(now[0]);
+    let second = second.unwrap_or(now[1].max(first));
+    if range.contains(first) && range.contains(second) && first <= second {
+        return Some(Value::Pair([first, second]));
+    }
+    let key = if p.type_of(max).is_some() { max } else { min };
+    let message = format!("{min} and {max} must be {range}, and not {first} and {second}");
+    d.error(p.span_of(key), message).help(format!("{unit}; the smaller one first"));
     None
 }
 

@@ -2,7 +2,7 @@
 
 use super::checks::{file_name, positive, unknown};
 use super::curves::{curve_data, merged, placed};
-use super::descriptions::{DisplacementDesc, MeshData, PatchData, ShapeDesc, ShapeSource};
+use super::descriptions::{DisplacementDesc, FaceData, MeshData, PatchData, ShapeDesc, ShapeSource};
 use super::state::Builder;
 use super::transform::affine;
 use crate::geometry::displacement::MAX_TRIANGLES;
@@ -47,12 +47,12 @@ impl Builder<'_> {
         let mut name = kind.text.clone();
         let source = match kind.text.as_str() {
             "sphere" | "disk" | "cylinder" => quadric(&kind.text, &p, d).map(ShapeSource::Quadric),
-            "trianglemesh" => mesh_data(&mut p, d).map(ShapeSource::Mesh),
+            "trianglemesh" => face_data(&mut p, d).map(ShapeSource::Mesh),
             "loopsubdiv" => {
                 let levels = p.integer("levels", d).or_else(|| p.integer("nlevels", d)).unwrap_or(3);
                 p.ignore("scheme");
                 match levels {
-                    0..=10 => mesh_data(&mut p, d).map(|m| ShapeSource::Loop(m, levels as u32)),
+                    0..=10 => face_data(&mut p, d).map(|m| ShapeSource::Loop(m, levels as u32)),
                     _ => {
                         d.error(p.span_of("levels"), format!("levels must be from 0 to 10, not {levels}"));
                         None
@@ -77,7 +77,7 @@ impl Builder<'_> {
                         "`emissionfilename` is not used yet: sampling is uniform",
                     );
                 }
-                patch_data(&mut p, d).map(ShapeSource::Bilinear)
+                face_data(&mut p, d).map(ShapeSource::Bilinear)
             }
             "curve" => curve_data(&p, d).map(ShapeSource::Curves),
             "hyperboloid" | "cone" | "paraboloid" | "heightfield" | "nurbs" => {
@@ -274,36 +274,19 @@ fn face_numbers(p: &mut ParamSet, count: usize, d: &mut Diagnostics) -> Vec<u32>
     numbers.into_iter().map(|n| n as u32).collect()
 }
 
-fn mesh_data(p: &mut ParamSet, d: &mut Diagnostics) -> Option<MeshData> {
+fn face_data<const N: usize>(p: &mut ParamSet, d: &mut Diagnostics) -> Option<FaceData<N>> {
     let (positions, origin) = positions(p, d)?;
     let count = positions.len();
     let normals = vec3s(p, "N", NORMALS, d).unwrap_or_default();
-    let tangents = vec3s(p, "S", VECTORS, d).unwrap_or_default();
+    let tangents = if N == 3 { vec3s(p, "S", VECTORS, d).unwrap_or_default() } else { Vec::new() };
     let uvs = uvs(p, d);
-    let indices = indices::<3>(p, count, d)?;
+    let indices = indices(p, count, d)?;
     let faces = face_numbers(p, indices.len(), d);
-    Some(MeshData {
+    Some(FaceData {
         faces,
         indices,
         normals: per_vertex(normals, count, "N", p, d),
         tangents: per_vertex(tangents, count, "S", p, d),
-        uvs: per_vertex(uvs, count, "uv", p, d),
-        positions,
-        origin,
-    })
-}
-
-fn patch_data(p: &mut ParamSet, d: &mut Diagnostics) -> Option<PatchData> {
-    let (positions, origin) = positions(p, d)?;
-    let count = positions.len();
-    let normals = vec3s(p, "N", NORMALS, d).unwrap_or_default();
-    let uvs = uvs(p, d);
-    let indices = indices::<4>(p, count, d)?;
-    let faces = face_numbers(p, indices.len(), d);
-    Some(PatchData {
-        faces,
-        indices,
-        normals: per_vertex(normals, count, "N", p, d),
         uvs: per_vertex(uvs, count, "uv", p, d),
         positions,
         origin,
@@ -401,6 +384,7 @@ impl ShapeDesc {
                         uvs: ply.uvs.clone(),
                         faces: std::mem::take(&mut ply.quad_numbers),
                         origin: ply.origin,
+                        tangents: Vec::new(),
                     };
                     shapes.push(patches(data, &placement).map_err(wrong)?);
                 }

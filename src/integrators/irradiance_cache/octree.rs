@@ -42,11 +42,11 @@ struct Place {
 }
 
 impl Place {
-    /// Centre of child `i`; bit k is the upper half of axis k.
-    fn child_center(&self, i: usize) -> Vec3 {
-        let quarter = 0.5 * self.half;
-        let side = |bit: usize| if i >> bit & 1 == 1 { quarter } else { -quarter };
-        self.center + Vec3::new(side(0), side(1), side(2))
+    /// Child `i`, which is `node`; bit k is the upper half of axis k.
+    fn child(&self, i: usize, node: u32) -> Place {
+        let half = 0.5 * self.half;
+        let side = |bit: usize| if i >> bit & 1 == 1 { half } else { -half };
+        Place { node, center: self.center + Vec3::new(side(0), side(1), side(2)), half, depth: self.depth + 1 }
     }
 
     /// True if child `i` intersects the sphere's box.
@@ -93,12 +93,7 @@ impl Octree {
                     self.nodes.push(Node::new());
                     self.nodes[place.node as usize].children[i] = child;
                 }
-                pending.push(Place {
-                    node: child,
-                    center: place.child_center(i),
-                    half: 0.5 * place.half,
-                    depth: place.depth + 1,
-                });
+                pending.push(place.child(i, child));
             }
         }
     }
@@ -131,12 +126,7 @@ impl Octree {
             node.ids.iter().for_each(|&id| f(id));
             for (i, &child) in node.children.iter().enumerate() {
                 if child != NONE && place.meets(i, p, radius) {
-                    pending.push(Place {
-                        node: child,
-                        center: place.child_center(i),
-                        half: 0.5 * place.half,
-                        depth: place.depth + 1,
-                    });
+                    pending.push(place.child(i, child));
                 }
             }
         }

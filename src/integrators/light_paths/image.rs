@@ -1,7 +1,7 @@
 //! What light paths bring to the pixels, for some of the turns of an image.
 
-use super::conditions::per_sample;
 use super::guide::Guide;
+use super::per_sample;
 use super::pilot::LightPilot;
 use super::trace::{LightPathStats, Scene, Seen, parts, trace};
 use crate::film::{PixelBounds, PixelSample};

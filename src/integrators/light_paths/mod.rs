@@ -20,15 +20,22 @@
 //! images depend on nothing but scene, settings, seed, and samples.
 
 mod chain;
-mod conditions;
 mod guide;
 mod image;
 mod pilot;
 mod trace;
 
 pub(super) use chain::Chain;
-pub use conditions::{obstacle, obstacle_of, per_sample};
 pub(super) use guide::Guide;
 pub(super) use image::LightImage;
 pub use pilot::LightPilot;
 pub use trace::LightPathStats;
+
+use super::features::{self, Feature};
+use crate::scene::RenderJob;
+
+/// Light paths per camera sample; 0 where there are none.
+pub fn per_sample(job: &RenderJob) -> f32 {
+    let wanted = job.settings().integrator.light_paths.unwrap_or(0.0);
+    if wanted > 0.0 && features::allows(job, Feature::LightPaths) { wanted } else { 0.0 }
+}

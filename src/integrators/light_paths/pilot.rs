@@ -1,8 +1,8 @@
 //! The pilot that finds where light paths of use begin, and what they are worth.
 
-use super::conditions::obstacle;
 use super::guide::Guide;
 use super::trace::{LightPathStats, Scene, Walker, parts, trace};
+use crate::integrators::features::{self, Feature};
 use crate::scene::RenderJob;
 use lumiris_numbers::math::hash::pcg4d;
 use rayon::prelude::*;
@@ -36,7 +36,7 @@ pub struct LightPilot {
 impl LightPilot {
     /// The pilot of an image, with a part 1/`divisor` of its paths; `None` if light paths cannot help, or none of use was found.
     pub fn new(job: &RenderJob, divisor: u64) -> Option<Self> {
-        if obstacle(job).is_some() {
+        if !features::allows(job, Feature::LightPaths) {
             return None;
         }
         let (set, bounds) = (&job.world.scene.lights, job.world.scene.film.bounds);

@@ -1,7 +1,8 @@
 //! Which samples of which pixels are asked for.
 
 use super::stored::Stored;
-use crate::render::{RenderSettings, SHARED, TileShare, depends_on_earlier_samples};
+use crate::integrators::features::{Feature, between};
+use crate::render::{RenderSettings, TileShare, depends_on_earlier_samples};
 use crate::settings::{Allocation, EstimatorKind, IntegratorKind, Settings};
 
 /// A part of an image; the whole of it by default.
@@ -71,15 +72,13 @@ impl Extent {
         if settings.sampling.noise.is_some() {
             return Err("parts of an image cannot be limited by --noise: give a number of samples, --spp".into());
         }
-        if self.part.is_some() && self.is_by_tiles && may_share_paths(settings) {
-            return Err(SHARED.into());
-        }
+        let is_share = self.part.is_some() && self.is_by_tiles;
         let is_by_samples = !self.is_by_tiles || self.has_range();
-        if is_by_samples && depends_on_earlier_samples(settings) {
-            let reason = "with a progressive estimator, samples depend on earlier ones of their pixel";
-            return Err(ExtentError(format!("{reason}: divide the image with --part-by tiles")));
-        }
-        Ok(())
+        let shared = (is_share && may_share_paths(settings)).then(|| between(Feature::Sharing, Feature::TileShare));
+        let fitted = (is_by_samples && depends_on_earlier_samples(settings))
+            .then(|| between(Feature::Progressive, Feature::SampleShare));
+        let conflict = shared.or(fitted).flatten();
+        conflict.map_or(Ok(()), |conflict| Err(ExtentError(conflict.to_string())))
     }
 
     /// Sets what is rendered: this part of an image with the samples that are set, or what is stored. `more` is the number of

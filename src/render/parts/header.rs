@@ -214,10 +214,15 @@ fn unescaped(text: &str) -> String {
     out
 }
 
+/// Values, of which there are N.
+pub(super) fn list<T: FromStr, const N: usize>(text: &str, separator: char) -> Option<[T; N]> {
+    let values: Vec<T> = text.split(separator).map(|v| v.parse().ok()).collect::<Option<_>>()?;
+    values.try_into().ok()
+}
+
 /// Numbers, of which there are N.
 fn numbers<const N: usize>(text: &str) -> Option<[u32; N]> {
-    let values: Vec<u32> = text.split(' ').map(u32::from_str).collect::<Result<_, _>>().ok()?;
-    values.try_into().ok()
+    list(text, ' ')
 }
 
 #[cfg(test)]

@@ -2,7 +2,7 @@
 //! is continued and merged.
 
 use super::error::PartError;
-use super::header::{FilmHeader, PLAN_NOTE};
+use super::header::{FilmHeader, PLAN_NOTE, list};
 use super::stored::Stored;
 use crate::cameras::Camera;
 use crate::import::LoadOptions;
@@ -10,7 +10,6 @@ use crate::import::gltf::LightUnits;
 use crate::render::RenderSettings;
 use crate::render::output::{self, Aov};
 use crate::scene::{AccelKind, Choices, RenderJob};
-use std::str::FromStr;
 
 /// Note of the layers that the image is to have.
 const AOV: &str = "aov";
@@ -155,12 +154,6 @@ pub(super) fn asked_aovs(header: &FilmHeader) -> Option<Vec<Aov>> {
 /// True if the sums have the features of first surfaces.
 pub(super) fn has_features(header: &FilmHeader) -> bool {
     header.setting(LAYERS).is_some_and(|layers| layers.split(' ').any(|name| name == FEATURES))
-}
-
-/// Numbers, of which there are N.
-fn list<T: FromStr, const N: usize>(text: &str, separator: char) -> Option<[T; N]> {
-    let values: Vec<T> = text.split(separator).map(|v| v.parse().ok()).collect::<Option<_>>()?;
-    values.try_into().ok()
 }
 
 /// Where the camera stood, as columns of 4 × 4 matrices.

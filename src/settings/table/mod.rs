@@ -2,6 +2,56 @@
 //!
 //! A new setting is a field of [`Settings`] and a row here.
 
+/// A setting that is a field of [`Settings`], by its key, its values and the field: `named` of an enumeration, `count` and `real`;
+/// `open_…` if the renderer chooses where there is none, `count_or` a word.
+macro_rules! row {
+    (named($key:literal, $of:ty, $($field:ident).+)) => {
+        Setting {
+            get: |s| Some(super::Value::Name(s.$($field).+.into())),
+            set: |s, v| v.named().map(|x| s.$($field).+ = x),
+            ..Setting::of($key, "NAME", super::choice(<$of as strum::VariantNames>::VARIANTS))
+        }
+    };
+    (count($key:literal, $min:expr, $max:expr, $($field:ident).+)) => {
+        Setting {
+            get: |s| Some(super::Value::Integer(s.$($field).+.into())),
+            set: |s, v| v.count().map(|n| s.$($field).+ = n),
+            ..Setting::of($key, "N", super::integer($min, $max))
+        }
+    };
+    (open_count($key:literal, $min:expr, $max:expr, $($field:ident).+)) => {
+        Setting {
+            get: |s| s.$($field).+.map(|n| super::Value::Integer(n.into())),
+            set: |s, v| v.count().map(|n| s.$($field).+ = Some(n)),
+            ..Setting::of($key, "N", super::integer($min, $max))
+        }
+    };
+    (count_or($word:literal, $key:literal, $min:expr, $max:expr, $($field:ident).+)) => {
+        Setting {
+            get: |s| Some(s.$($field).+.map_or(super::Value::Name($word), |n| super::Value::Integer(n.into()))),
+            set: |s, v| {
+                s.$($field).+ = if v.name().is_some() { None } else { Some(v.count()?) };
+                Some(())
+            },
+            ..Setting::of($key, "N", super::Kind::Integer { range: super::Integers { min: $min, max: $max }, words: &[$word] })
+        }
+    };
+    (real($key:literal, $range:expr, $($field:ident).+)) => {
+        Setting {
+            get: |s| Some(super::Value::Real(s.$($field).+)),
+            set: |s, v| v.real().map(|x| s.$($field).+ = x),
+            ..Setting::of($key, "X", super::Kind::Real { range: $range, words: &[] })
+        }
+    };
+    (open_real($key:literal, $range:expr, $($field:ident).+)) => {
+        Setting {
+            get: |s| s.$($field).+.map(super::Value::Real),
+            set: |s, v| v.real().map(|x| s.$($field).+ = Some(x)),
+            ..Setting::of($key, "X", super::Kind::Real { range: $range, words: &[] })
+        }
+    };
+}
+
 mod cache;
 mod direct;
 mod photons;
@@ -87,11 +137,9 @@ impl Applies {
 
     /// Which images these are, as the end of a sentence.
     pub fn condition(&self) -> String {
-        let list = |kind: &str, names: Vec<&'static str>| match &names[..] {
-            [first @ .., last] if !first.is_empty() => {
-                format!("it is for the {kind}s {} and {last}", first.join(", "))
-            }
-            names => format!("it is for the {kind} {}", names.concat()),
+        let list = |kind: &str, names: Vec<&str>| {
+            let plural = if names.len() > 1 { "s" } else { "" };
+            format!("it is for the {kind}{plural} {}", joined(&names))
         };
         match self {
             Applies::Always => "it is for all".to_owned(),
@@ -99,6 +147,14 @@ impl Applies {
             Applies::Integrators(kinds) => list("integrator", kinds.iter().map(|&kind| kind.into()).collect()),
             Applies::If(_, condition) => format!("it is for {condition}"),
         }
+    }
+}
+
+/// Names in a sentence: `a, b and c`.
+pub(crate) fn joined(names: &[&str]) -> String {
+    match names {
+        [first @ .., last] if !first.is_empty() => format!("{} and {last}", first.join(", ")),
+        names => names.concat(),
     }
 }
 
@@ -163,6 +219,11 @@ impl Setting {
         resolved: None,
         set: |_, _| None,
     };
+
+    /// With this key, name of values and kind.
+    const fn of(key: &'static str, value_name: &'static str, kind: Kind) -> Setting {
+        Setting { key, value_name, kind, ..Setting::BASE }
+    }
 }
 
 /// One of these names.

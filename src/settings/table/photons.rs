@@ -1,6 +1,6 @@
 //! Photon maps, and the photons of the visibility cache.
 
-use super::{Applies, Group, MAX_SAMPLES, MAX_U32, Setting, integer};
+use super::{Applies, Group, MAX_SAMPLES, MAX_U32, Setting};
 use crate::settings::value::{Integers, Interval, Kind, Value};
 use crate::settings::{IntegratorKind, PhotonStorage, ProgressiveSettings};
 
@@ -12,28 +12,19 @@ pub(super) const PHOTONS: Group = Group {
     rows: &[
         Setting {
             flag: "photons",
-            value_name: "N",
             parameters: &["photons"],
-            key: "photons",
-            kind: integer(1, MAX_U32),
             help: "Approximate number of photons stored in the global map; of a progressive map, in each pass",
             applies: MAPS,
-            get: |s| Some(Value::Integer(s.integrator.photons.photons.into())),
-            set: |s, v| v.count().map(|n| s.integrator.photons.photons = n),
-            ..Setting::BASE
+            ..row!(count("photons", 1, MAX_U32, integrator.photons.photons))
         },
         Setting {
             flag: "caustic-ratio",
             is_option: false,
             value_name: "Q",
             parameters: &["causticratio"],
-            key: "caustic_ratio",
-            kind: Kind::Real { range: Interval::above(0.0, 1.0), words: &[] },
             help: "Fraction q of the photon paths that also fill the global map; all of them fill the caustic map",
             applies: MAPS,
-            get: |s| Some(Value::Real(s.integrator.photons.caustic_ratio)),
-            set: |s, v| v.real().map(|q| s.integrator.photons.caustic_ratio = q),
-            ..Setting::BASE
+            ..row!(real("caustic_ratio", Interval::above(0.0, 1.0), integrator.photons.caustic_ratio))
         },
         Setting {
             flag: "importance",
@@ -72,39 +63,27 @@ pub(super) const PHOTONS: Group = Group {
             is_option: false,
             value_name: "K",
             parameters: &["nearest"],
-            key: "nearest",
-            kind: integer(2, 100_000),
             help: "Photons per density estimate",
             applies: MAPS,
-            get: |s| Some(Value::Integer(s.integrator.photons.nearest.into())),
-            set: |s, v| v.count().map(|n| s.integrator.photons.nearest = n),
-            ..Setting::BASE
+            ..row!(count("nearest", 2, 100_000, integrator.photons.nearest))
         },
         Setting {
             flag: "gather",
             value_name: "G",
             parameters: &["gather"],
-            key: "gather",
-            kind: integer(0, MAX_SAMPLES),
             help: "Final-gather rays per diffuse vertex; 0 visualises the global map directly",
             applies: MAPS,
-            get: |s| Some(Value::Integer(s.integrator.photons.gather.into())),
-            set: |s, v| v.count().map(|n| s.integrator.photons.gather = n),
-            ..Setting::BASE
+            ..row!(count("gather", 0, MAX_SAMPLES, integrator.photons.gather))
         },
         Setting {
             flag: "gather-guide",
             is_option: false,
             value_name: "FRACTION",
             parameters: &["gatherguide"],
-            key: "gather_guide",
             // Not all: there may be no photons from where light comes
-            kind: Kind::Real { range: Interval::closed(0.0, 0.95), words: &[] },
             help: "Fraction of the final-gather rays that are guided by photons",
             applies: MAPS,
-            get: |s| Some(Value::Real(s.integrator.photons.guide)),
-            set: |s, v| v.real().map(|fraction| s.integrator.photons.guide = fraction),
-            ..Setting::BASE
+            ..row!(real("gather_guide", Interval::closed(0.0, 0.95), integrator.photons.guide))
         },
         Setting {
             flag: "progressive",
@@ -147,11 +126,8 @@ pub(super) const PHOTONS: Group = Group {
             flag: "visibility-photons",
             is_option: false,
             aliases: &["light-photons"],
-            value_name: "N",
             parameters: &["visibilityphotons"],
             old_parameters: &[("visibilityphotons", "lightphotons")],
-            key: "visibility_photons",
-            kind: integer(1, MAX_U32),
             help: "Photon paths traced for the visibility cache, which --light-sampler photons, --target visibility \
                    and --estimator contributing use",
             default: "262144",
@@ -159,9 +135,7 @@ pub(super) const PHOTONS: Group = Group {
                 |s| s.integrator.uses_visibility_cache(),
                 "the light sampler photons, the estimator contributing and the targets visibility and visibility-control",
             ),
-            get: |s| s.integrator.photons.visibility_photons.map(|n| Value::Integer(n.into())),
-            set: |s, v| v.count().map(|n| s.integrator.photons.visibility_photons = Some(n)),
-            ..Setting::BASE
+            ..row!(open_count("visibility_photons", 1, MAX_U32, integrator.photons.visibility_photons))
         },
         Setting {
             flag: "photon-paths",

@@ -1,9 +1,9 @@
 //! What is computed, and with which random numbers.
 
-use super::{Applies, Directive, Group, MAX_SAMPLES, MAX_U32, Setting, choice, integer};
+use super::{Applies, Directive, Group, MAX_SAMPLES, MAX_U32, Setting, choice};
 use crate::bsdfs::ProposalDensity;
 use crate::lights::LightSamplerKind;
-use crate::settings::value::{Integers, Interval, Kind, Value};
+use crate::settings::value::{Interval, Kind, Value};
 use crate::settings::{Allocation, IntegratorKind};
 use lumiris_numbers::samplers::SamplerKind;
 use strum::VariantNames;
@@ -37,47 +37,29 @@ pub(super) const TRANSPORT: Group = Group {
             flag: "max-depth",
             value_name: "D",
             parameters: &["maxdepth"],
-            key: "max_depth",
-            kind: integer(0, 10_000),
             help: "Maximum number of bounces; `direct` has at most one",
-            get: |s| Some(Value::Integer(s.integrator.max_depth.into())),
             resolved: Some(|s| Some(Value::Integer(s.integrator.depth().into()))),
-            set: |s, v| v.count().map(|n| s.integrator.max_depth = n),
-            ..Setting::BASE
+            ..row!(count("max_depth", 0, 10_000, integrator.max_depth))
         },
         Setting {
             flag: "roulette-depth",
             value_name: "D",
             parameters: &["roulettedepth"],
-            key: "roulette_depth",
-            kind: Kind::Integer { range: Integers { min: 1, max: 10_000 }, words: &["off"] },
             help: "First bounce that Russian roulette may end a path before, or `off`: fewer and noisier paths in less \
                    time, or all of them up to the maximum number of bounces",
             applies: Applies::If(|s| s.integrator.depth() > 1, "paths of more than one bounce"),
-            get: |s| Some(s.integrator.roulette_depth.map_or(Value::Name("off"), |n| Value::Integer(n.into()))),
-            set: |s, v| {
-                s.integrator.roulette_depth = if v.name().is_some() { None } else { Some(v.count()?) };
-                Some(())
-            },
-            ..Setting::BASE
+            ..row!(count_or("off", "roulette_depth", 1, 10_000, integrator.roulette_depth))
         },
         Setting {
             flag: "path-reuse",
             value_name: "E",
             parameters: &["pathreuse"],
-            key: "path_reuse",
-            kind: Kind::Integer { range: Integers { min: 1, max: 16 }, words: &["auto"] },
             help: "Blocks of E × E pixels share what their paths find from the second diffuse vertex on, by E² − 1 shadow rays \
                    more for each path: less noise, which is correlated within a block; 1: none do",
             default: "auto: what --estimator auto chooses; 1 with others",
             applies: PATHS,
-            get: |s| Some(s.integrator.path_reuse.map_or(Value::Name("auto"), |n| Value::Integer(n.into()))),
             resolved: Some(|s| Some(Value::Integer(s.integrator.path_reuse.unwrap_or(1).into()))),
-            set: |s, v| {
-                s.integrator.path_reuse = if v.name().is_some() { None } else { Some(v.count()?) };
-                Some(())
-            },
-            ..Setting::BASE
+            ..row!(count_or("auto", "path_reuse", 1, 16, integrator.path_reuse))
         },
         Setting {
             flag: "light-paths",
@@ -128,37 +110,25 @@ pub(super) const TRANSPORT: Group = Group {
             flag: "infinite-fraction",
             value_name: "FRACTION",
             parameters: &["infinitefraction"],
-            key: "infinite_fraction",
-            kind: Kind::Real { range: Interval::open(0.0, 1.0), words: &[] },
             help: "Fraction of the light samples by the light tree that go to lights at infinity: skies and suns",
             applies: Applies::If(|s| s.integrator.has_light_tree(), "the light samplers tree and photons"),
             default: "as many to each of them as to all other lights together; auto measures what is best",
-            get: |s| s.integrator.infinite_fraction.map(Value::Real),
-            set: |s, v| v.real().map(|fraction| s.integrator.infinite_fraction = Some(fraction)),
-            ..Setting::BASE
+            ..row!(open_real("infinite_fraction", Interval::open(0.0, 1.0), integrator.infinite_fraction))
         },
         Setting {
             flag: "bsdf-proposals",
             is_option: false,
             value_name: "M",
             parameters: &["bsdfproposals"],
-            key: "bsdf_proposals",
-            kind: integer(1, MAX_SAMPLES),
             help: "Proposals per bounce off materials whose BSDF can only be evaluated, not sampled",
-            get: |s| Some(Value::Integer(s.integrator.bsdf_proposals.into())),
-            set: |s, v| v.count().map(|n| s.integrator.bsdf_proposals = n),
-            ..Setting::BASE
+            ..row!(count("bsdf_proposals", 1, MAX_SAMPLES, integrator.bsdf_proposals))
         },
         Setting {
             flag: "bsdf-density",
             is_option: false,
             parameters: &["bsdfdensity"],
-            key: "bsdf_density",
-            kind: choice(ProposalDensity::VARIANTS),
             help: "Sampling density of these proposals",
-            get: |s| Some(Value::Name(s.integrator.bsdf_density.into())),
-            set: |s, v| v.named().map(|density| s.integrator.bsdf_density = density),
-            ..Setting::BASE
+            ..row!(named("bsdf_density", ProposalDensity, integrator.bsdf_density))
         },
     ],
 };
@@ -170,39 +140,27 @@ pub(super) const SAMPLING: Group = Group {
         Setting {
             flag: "sampler",
             directive: Directive::Sampler,
-            key: "sampler",
-            kind: choice(SamplerKind::VARIANTS),
             help: "Sample sequence",
-            get: |s| Some(Value::Name(s.sampling.sampler.into())),
-            set: |s, v| v.named().map(|kind| s.sampling.sampler = kind),
-            ..Setting::BASE
+            ..row!(named("sampler", SamplerKind, sampling.sampler))
         },
         Setting {
             flag: "spp",
             value_name: "K",
             directive: Directive::Sampler,
             parameters: &["pixelsamples"],
-            key: "spp",
-            kind: integer(1, MAX_U32),
             help: "Camera samples per pixel",
-            get: |s| Some(Value::Integer(s.sampling.spp.into())),
-            set: |s, v| v.count().map(|n| s.sampling.spp = n),
-            ..Setting::BASE
+            ..row!(count("spp", 1, MAX_U32, sampling.spp))
         },
         Setting {
             flag: "allocation",
             directive: Directive::Sampler,
             parameters: &["allocation"],
-            key: "allocation",
-            kind: choice(Allocation::VARIANTS),
             help: "Distribution of the camera samples over the pixels: as many in each, or more where a pilot finds more \
                    noise, in about the time of --spp in each. Adaptive numbers are for the integrators direct and path, \
                    from 8 samples per pixel on",
             default: "auto: adaptive with --estimator auto, otherwise uniform",
-            get: |s| Some(Value::Name(s.sampling.allocation.into())),
             resolved: Some(|s| Some(Value::Name(s.allocation().into()))),
-            set: |s, v| v.named().map(|allocation| s.sampling.allocation = allocation),
-            ..Setting::BASE
+            ..row!(named("allocation", Allocation, sampling.allocation))
         },
         Setting {
             flag: "noise",
@@ -228,15 +186,11 @@ pub(super) const SAMPLING: Group = Group {
             value_name: "K",
             directive: Directive::Sampler,
             parameters: &["footprintspp"],
-            key: "footprint_spp",
-            kind: integer(1, MAX_U32),
             help: "Camera samples per pixel that texture filtering assumes: the footprint is 1/sqrt(K) of a pixel \
                    wide, at least an eighth. For an image that is rendered in parts, give the total of all parts",
             default: "--spp",
-            get: |s| s.sampling.footprint_spp.map(|n| Value::Integer(n.into())),
             resolved: Some(|s| Some(Value::Integer(s.sampling.footprint_spp().into()))),
-            set: |s, v| v.count().map(|n| s.sampling.footprint_spp = Some(n)),
-            ..Setting::BASE
+            ..row!(open_count("footprint_spp", 1, MAX_U32, sampling.footprint_spp))
         },
         Setting {
             flag: "pilot-spp",
@@ -244,26 +198,18 @@ pub(super) const SAMPLING: Group = Group {
             value_name: "K",
             directive: Directive::Sampler,
             parameters: &["pilotspp"],
-            key: "pilot_spp",
-            kind: integer(1, MAX_U32),
             help: "Camera samples per pixel that pilots are made for, if that is less than --spp: pilots take a part of their \
                    time",
             default: "--spp; with --time 64, or fewer where the time is short for the pixels",
-            get: |s| s.sampling.pilot_spp.map(|n| Value::Integer(n.into())),
-            set: |s, v| v.count().map(|n| s.sampling.pilot_spp = Some(n)),
-            ..Setting::BASE
+            ..row!(open_count("pilot_spp", 1, MAX_U32, sampling.pilot_spp))
         },
         Setting {
             flag: "seed",
             value_name: "S",
             directive: Directive::Sampler,
             parameters: &["seed"],
-            key: "seed",
-            kind: Kind::Integer { range: Integers::ALL, words: &[] },
             help: "Random seed; images with different seeds are independent",
-            get: |s| Some(Value::Integer(s.sampling.seed.into())),
-            set: |s, v| v.count().map(|n| s.sampling.seed = n),
-            ..Setting::BASE
+            ..row!(count("seed", 0, MAX_U32, sampling.seed))
         },
     ],
 };

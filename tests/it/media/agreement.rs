@@ -3,7 +3,7 @@
 use super::{BOX, assert_answer, assert_they_agree, camera, choose, estimators, grid, job, means, media};
 use crate::path_reuse::image_of_seed;
 use crate::same_light::assert_same_light;
-use lumiris::integrators::reuse;
+use lumiris::integrators::features::{Feature, allows};
 use lumiris::lights::LightCtx;
 use lumiris::media::Medium;
 use lumiris::render::{RenderSettings, render};
@@ -82,7 +82,7 @@ fn behind_glass_alone_media_leave_shadow_segments_and_shared_paths_as_they_are()
             )
     };
     let mut job = job(&text("0.2 0.5 1"), AccelKind::Embree);
-    assert_eq!(reuse::obstacle(&job), None);
+    assert!(allows(&job, Feature::Sharing));
     let mut answers = Vec::new();
     for (estimator, samples, edge) in
         [(EstimatorKind::Ris, 2, 1), (EstimatorKind::Mis, 2, 1), (EstimatorKind::Mis, 4, 1), (EstimatorKind::Mis, 2, 4)]
@@ -110,7 +110,7 @@ fn surfaces_that_rays_may_pass_let_light_through_where_there_are_no_media() {
             Material "mix" "string materials" [ "nothing" "black" ] "float amount" 0.5
             Shape "bilinearmesh" "point3 P" [ -9 -9 1.5  9 -9 1.5  -9 9 1.5  9 9 1.5 ]"#;
         let mut job = job(&text, AccelKind::Embree);
-        assert!(job.world.scene.media.is_empty() && reuse::obstacle(&job).is_some());
+        assert!(job.world.scene.media.is_empty() && !allows(&job, Feature::Sharing));
         let answer = [1.0, 2.0, 4.0].map(|i| 0.5 / std::f64::consts::PI * i / 4.0 * 0.5);
         for (name, settings) in estimators() {
             choose(&mut job, &settings);

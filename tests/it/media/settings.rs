@@ -3,6 +3,7 @@
 use super::{BOX, camera, cloud, film, job, media};
 use lumiris::import::cache::FileCache;
 use lumiris::import::{LoadOptions, load_text};
+use lumiris::integrators::features::{Feature, allows};
 use lumiris::integrators::reuse;
 use lumiris::planning::{Preparation, prepare};
 use lumiris::render::{RenderSettings, render};
@@ -57,7 +58,7 @@ fn settings_that_leave_media_out_are_refused() {
     }
     // Paths are not shared, and say so
     job.change(|s| (s.integrator.kind, s.integrator.path_reuse) = (IntegratorKind::Path, Some(4)));
-    assert!(reuse::obstacle(&job).unwrap().contains("media"));
+    assert!(!allows(&job, Feature::Sharing));
     let plan = prepare(&mut job, &Preparation::on(None)).unwrap();
     assert!(plan.warnings.iter().any(|w| w.contains("media")), "{:?}", plan.warnings);
 }

@@ -9,8 +9,9 @@ use super::settings_args::SettingsArgs;
 use anyhow::Context;
 use clap::Args;
 use lumiris::import::cache::FileCache;
-use lumiris::integrators::through_media;
+use lumiris::integrators::features;
 use lumiris::lights::LightSamplerKind;
+use lumiris::scene::RenderJob;
 use lumiris::settings::{EstimatorKind, IntegratorKind, Settings};
 use lumiris_bench::efficiency::{Case, Efficiency, Row, first_look, measure_efficiency};
 use lumiris_formats::output::write_text;
@@ -156,9 +157,7 @@ pub(super) fn efficiency(scene_args: &SceneArgs, own: &EfficiencyArgs, json: Opt
         for &kind in kinds {
             let base = Settings { integrator: base.integrator.of_kind(kind), ..base };
             let mut cases = cases(own, &base);
-            if !job.world.scene.media.is_empty() {
-                cases.retain(|case| is_possible(case, path));
-            }
+            cases.retain(|case| is_possible(case, (&job, path)));
             if cases.is_empty() {
                 continue;
             }
@@ -205,13 +204,13 @@ pub(super) fn efficiency(scene_args: &SceneArgs, own: &EfficiencyArgs, json: Opt
     Ok(())
 }
 
-/// Says why a case is left out of a scene with media, if it is.
-fn is_possible(case: &Case, scene: &Path) -> bool {
-    let obstacle = through_media::obstacle_of(&case.settings.integrator);
-    if let Some(obstacle) = &obstacle {
-        progress::say(&format!("{}: {} is left out: {obstacle}", scene.display(), case.name));
+/// Says why a case is left out, if it does not render a scene.
+fn is_possible(case: &Case, (job, scene): (&RenderJob, &Path)) -> bool {
+    let refusal = features::refusal(job, &case.settings.integrator);
+    if let Some(conflict) = refusal {
+        progress::say(&format!("{}: {} is left out: {conflict}", scene.display(), case.name));
     }
-    obstacle.is_none()
+    refusal.is_none()
 }
 
 fn cases(args: &EfficiencyArgs, base: &Settings) -> Vec<Case> {
