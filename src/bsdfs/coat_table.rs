@@ -7,8 +7,8 @@
 //! - R_in = (1/π) ∫∫ cos θ e(θ) f_r(w, w') cos θ' e(θ') dw dw', both inside, e(θ) = exp(−t/cos θ);
 //! - T̄ = (1/π) ∫ T(w) cos θ dw.
 //!
-//! With visible-normal sampling f cos/pdf = (F or 1 − F) G/G1, so that each integral is a mean over the unit square
-//! of a smooth function, taken by the midpoint rule. Tables are linear in √cos θ, in which T has bounded curvature
+//! With visible-normal sampling f cos/pdf = (F or 1 − F) G/G1. Each integral is therefore a mean over the unit square
+//! of a smooth function, computed by the midpoint rule. Tables are linear in √cos θ, in which T has bounded curvature
 //! down to the horizon.
 
 use super::dielectric::Dielectric;
@@ -71,7 +71,7 @@ pub struct CoatTable {
     axis: Axis,
     /// R_in and T̄ of the rows.
     hemispherical: Vec<Hemispherical>,
-    /// Rows of (T, R), also those of other tables.
+    /// Rows of (T, R), shared with other tables after [`Self::join`].
     directional: Arc<[f32]>,
     /// The first row of this table.
     first: usize,
@@ -86,7 +86,7 @@ impl CoatTable {
         CoatTable { eta, thickness, axis, hemispherical, directional, first: 0, smooth }
     }
 
-    /// Lets all tables have their rows in one array, so that points of different coats are rows of one kernel.
+    /// Stores the rows of all tables in one array, so that points of different coats are rows of one kernel.
     pub fn join(tables: &mut [CoatTable]) {
         let all: Arc<[f32]> = tables.iter().flat_map(|table| table.directional.iter().copied()).collect();
         let mut first = 0;
@@ -96,12 +96,12 @@ impl CoatTable {
         }
     }
 
-    /// The rows of (T, R) of this table and of those it was joined with.
+    /// The rows of (T, R) of this table and of all tables joined with it.
     pub fn directional_rows(&self) -> &[f32] {
         &self.directional
     }
 
-    /// For one roughness, which is exact for anisotropic ones too.
+    /// A table for one roughness, exact for anisotropic roughness too.
     pub fn for_roughness(eta: f32, thickness: f32, distribution: TrowbridgeReitz) -> Self {
         let thickness = thickness.max(0.0);
         let interface = Dielectric { eta, distribution };
@@ -116,7 +116,7 @@ impl CoatTable {
         CoatTable::new(eta, thickness, axis, &rows)
     }
 
-    /// For all isotropic roughnesses up to alpha 1, where the roughness is textured.
+    /// A table for all isotropic roughnesses up to alpha 1, for textured roughness.
     pub fn for_all_roughness(eta: f32, thickness: f32) -> Self {
         let thickness = thickness.max(0.0);
         let row = |i| {
@@ -132,7 +132,7 @@ impl CoatTable {
         self.eta
     }
 
-    /// Position of a roughness in the table, to pass to the other methods.
+    /// Position of a roughness in the table, an argument of the other methods.
     pub fn row(&self, distribution: TrowbridgeReitz) -> f32 {
         match self.axis {
             Axis::Fixed | Axis::Azimuth => 0.0,
@@ -144,7 +144,7 @@ impl CoatTable {
         }
     }
 
-    /// T and R of the outside direction `w`, in the upper hemisphere, for a rough interface.
+    /// T and R of the direction `w`, in the upper hemisphere outside, for a rough interface.
     #[inline]
     pub fn directional(&self, w: Vec3, row: f32) -> [f32; 2] {
         let row = match self.axis {
@@ -154,7 +154,8 @@ impl CoatTable {
         coated::rough_directional(&self.directional, self.place(row), w.z)
     }
 
-    /// The row at `row`, among all rows of [`Self::directional_rows`], and the place between it and the next.
+    /// Index of the row below `row` in [`Self::directional_rows`], and the relative position between it and the next
+    /// row.
     #[inline]
     pub(super) fn place(&self, row: f32) -> [f32; 2] {
         let i = (row as usize).min(self.hemispherical.len().saturating_sub(1));
@@ -177,7 +178,7 @@ impl CoatTable {
     pub fn hemispherical(&self, row: f32) -> Hemispherical {
         match self.axis {
             Axis::Fixed => self.hemispherical[0],
-            // The trapezoidal mean over the quarter turn.
+            // Mean over the quarter turn by the trapezoidal rule.
             Axis::Azimuth => {
                 let mut mean = Hemispherical::default();
                 for pair in self.hemispherical.windows(2) {
@@ -232,8 +233,8 @@ impl Row {
     }
 }
 
-/// Fourth root of alpha at position `t` in 0..1 of the rows over the roughness: at grazing angles T changes where alpha
-/// is as small as the cosine.
+/// Fourth root of alpha at position `t` in 0..1 of the roughness rows: at grazing angles T varies where alpha is as
+/// small as the cosine.
 fn alpha_axis(t: f32) -> f32 {
     let lo = SMOOTH_ALPHA.sqrt().sqrt();
     lo + (1.0 - lo) * t
@@ -248,7 +249,7 @@ struct Scatter {
     reflected_attenuated: f32,
 }
 
-/// The fractions of light from `w`, in the upper hemisphere, that `interface` scatters once.
+/// The fractions of light from `w`, in the upper hemisphere, after one scattering event at `interface`.
 fn scatter(interface: &Dielectric, w: Vec3, thickness: f32) -> Scatter {
     let distribution = &interface.distribution;
     let g1 = distribution.g1(w);

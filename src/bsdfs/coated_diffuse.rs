@@ -1,14 +1,15 @@
 //! A Lambertian base under a dielectric coat, in closed form.
 //!
-//! The base forgets directions, so the random walk between interface and base is a geometric series:
+//! The base reflects independently of the incident direction, so the random walk between interface and base is a
+//! geometric series:
 //!
 //! f(wo, wi) = f_r(wo, wi) + T(wo) T(wi) / (π η²) · Σ_{k<N} ρ (ρ R_in)^k
 //!
-//! with the integrals T and R_in of [`super::coat_table`]; 1/η² is the reciprocity factor between the outside and
-//! the layer. It is the expectation of the position-free walk [Guo et al. 2018] that pbrt-v4 runs, whose depth counts
-//! the events at both interfaces after entry, alternating and beginning with the base: a walk of `max_depth` events
-//! scatters at the base N = ⌈max_depth/2⌉ times. The layer absorbs with unit extinction, hence the thickness in T
-//! and R_in. Both sides of the surface are coated.
+//! with the integrals T and R_in of [`super::coat_table`]. 1/η² is the reciprocity factor between the outside and the
+//! layer. This is the expectation of the position-free walk [Guo et al. 2018] of pbrt-v4. The depth of a walk counts
+//! the events at both interfaces after entry, alternating and beginning with the base. A walk of `max_depth` events
+//! scatters at the base N = ⌈max_depth/2⌉ times. The layer absorbs with unit extinction, hence the thickness in T and
+//! R_in. Both sides of the surface are coated.
 
 use super::coat_table::{CoatTable, Hemispherical};
 use super::dielectric::Dielectric;
@@ -30,7 +31,7 @@ pub struct CoatedDiffuse<'a> {
     row: f32,
     /// Σ ρ (ρ R_in)^k / (π η²).
     base: Rgb,
-    /// T̄ for the albedo of the base.
+    /// T̄, for the albedo of the base.
     mean_transmittance: f32,
 }
 
@@ -70,14 +71,14 @@ impl<'a> CoatedDiffuse<'a> {
         self.interface.distribution
     }
 
-    /// Albedo for light to `wo`: interface and base.
+    /// Albedo towards `wo`: interface and base.
     pub fn albedo(&self, wo: Vec3) -> Rgb {
         let [t, r] = self.directional(if wo.z < 0.0 { -wo } else { wo });
         Rgb::splat(r) + self.base * (PI * self.mean_transmittance * t)
     }
 
-    /// Albedo of the base seen from `wo`, under light that arrives evenly from all directions: what the base reflects
-    /// is Lambertian but for the factor T(wi), of which this has the mean.
+    /// Albedo of the base as seen from `wo`, under uniform illumination. The reflection of the base is Lambertian
+    /// except for the factor T(wi), which this replaces by its mean.
     pub(super) fn base_albedo(&self, wo: Vec3) -> Rgb {
         self.base * (PI * self.mean_transmittance * self.directional(if wo.z < 0.0 { -wo } else { wo })[0])
     }
@@ -94,7 +95,7 @@ impl<'a> CoatedDiffuse<'a> {
         coated::p_interface(self.base_weight(), self.directional(wo))
     }
 
-    /// True if the interface reflects like a mirror.
+    /// True if the interface is a perfect mirror.
     #[inline]
     pub fn has_specular(&self) -> bool {
         self.interface.is_specular()
@@ -147,7 +148,7 @@ impl<'a> CoatedDiffuse<'a> {
         self.p_interface(if wo.z < 0.0 { -wo } else { wo })
     }
 
-    /// Density of the interface alone, times its probability, see [`super::Bsdf::pdf_first_lobe`].
+    /// Density of sampling the interface, including its probability, see [`super::Bsdf::pdf_first_lobe`].
     pub(super) fn pdf_first_lobe(&self, wo: Vec3, wi: Vec3) -> f32 {
         let Some((wo, wi)) = super::to_upper(wo, wi) else { return 0.0 };
         if self.interface.is_specular() {
@@ -156,7 +157,7 @@ impl<'a> CoatedDiffuse<'a> {
         self.p_interface(wo) * coated::interface(&self.params(), wo.into(), wi.into()).0
     }
 
-    /// The interface or the cosine, in proportion to the albedos.
+    /// Samples the interface or the cosine lobe, in proportion to the albedos.
     pub fn sample(&self, wo: Vec3, uc: f32, u: [f32; 2]) -> Option<BsdfSample> {
         let (p, u) = (self.params(), [uc, u[0], u[1]]);
         of_drawn(match self.kernel() {

@@ -16,7 +16,7 @@ pub struct Conductor {
 }
 
 impl Conductor {
-    /// η and k of a metal of the given reflectance at normal incidence: η = 1, k = 2√r/√(1 − r), as pbrt-v4.
+    /// η and k of a metal of the given reflectance at normal incidence: η = 1, k = 2√r/√(1 − r), as in pbrt-v4.
     pub fn eta_k_of_reflectance(reflectance: Rgb) -> (Rgb, Rgb) {
         let k = reflectance.clamp(0.0, 0.9999).map(|r| 2.0 * r.sqrt() / (1.0 - r).sqrt());
         (Rgb::WHITE, k)

@@ -5,10 +5,10 @@
 //!
 //! p(wi) = w_c |cos θi|/π + w_m p_α(wi; α_m) + w_r p_α(R wi; α_r),   R (x, y, z) = (−x, −y, z)
 //!
-//! where p_α(wi) = D_wo(m)/(4 wo·m) is the density of reflection by the visible normals of a GGX surface and m the half
-//! vector. GGX has long tails, so that a single width serves BSDF lobes of many widths, and its lobes have the right
-//! shape at grazing angles. Directions below the horizon of `wo` are failed samples: p integrates to slightly less than
-//! 1 and remains exact.
+//! where p_α(wi) = D_wo(m)/(4 wo·m) is the density of reflection by the visible normals of a GGX surface, and m is the
+//! half vector. GGX has long tails, so that a single width serves BSDF lobes of many widths, and its lobes have the
+//! correct shape at grazing angles. Directions below the horizon of `wo` are failed samples: p integrates to slightly
+//! less than 1 and remains exact.
 //!
 //! Weights and widths were chosen by the relative variance (∫ g²/p)/(∫ g)² − 1 of g = f |cos θi| over four angles of 18
 //! BSDFs (Lambert, Oren-Nayar, Beckmann of slope 0.1 to 0.5, cosine lobes of exponent 10 to 150 of both kinds,
@@ -23,7 +23,7 @@
 //! | 0.5, 0.3, 0.2 with α = 0.1, 0.15 (used) | 1.16 | 22 |
 //! | 0.4, 0.2, 0.2, 0.2 with two mirror lobes, α = 0.1, 0.3, and 0.15 | 1.15 | 22 |
 //!
-//! A Lambertian BSDF, which the cosine alone would match, has a relative variance of 0.34 to 0.69.
+//! A Lambertian BSDF, which a pure cosine density would match, has a relative variance of 0.34 to 0.69.
 
 use super::fresnel::reflect;
 use super::{Lobe, TrowbridgeReitz};
@@ -41,7 +41,7 @@ const MIRROR: TrowbridgeReitz = TrowbridgeReitz { alpha_x: 0.1, alpha_y: 0.1 };
 /// Width of the retroreflective lobe.
 const RETRO: TrowbridgeReitz = TrowbridgeReitz { alpha_x: 0.15, alpha_y: 0.15 };
 
-/// A density of directions on the side of `wo`, whatever the reflection.
+/// A sampling density on the side of `wo`, independent of the BSDF.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, EnumIter, EnumString, IntoStaticStr, VariantNames)]
 #[strum(serialize_all = "kebab-case")]
 pub enum ProposalDensity {
@@ -53,8 +53,8 @@ pub enum ProposalDensity {
 }
 
 impl ProposalDensity {
-    /// A direction on the side of `wo`, by `uc` among the lobes and `u` within one; `None` if it falls below the
-    /// horizon.
+    /// Samples a direction on the side of `wo`: a lobe by `uc`, a direction within it by `u`. `None` if the direction
+    /// is below the horizon.
     #[inline]
     pub fn sample(self, wo: Vec3, uc: f32, u: [f32; 2]) -> Option<(Vec3, Lobe)> {
         let flip = if wo.z < 0.0 { -1.0 } else { 1.0 };
@@ -73,7 +73,7 @@ impl ProposalDensity {
         }
     }
 
-    /// Density of that lobe, times its probability, see [`super::Bsdf::pdf_first_lobe`].
+    /// Density of the cosine lobe, including its probability, see [`super::Bsdf::pdf_first_lobe`].
     pub(super) fn pdf_first_lobe(self, wo: Vec3, wi: Vec3) -> f32 {
         match (self, super::to_upper(wo, wi)) {
             (_, None) => 0.0,
@@ -109,7 +109,7 @@ fn pdf_lobes(wo: Vec3, wi: Vec3) -> f32 {
         + RETRO_WEIGHT * RETRO.pdf_reflection(wo, turn(wi))
 }
 
-/// Half a turn about the normal.
+/// Rotates by 180° about the normal.
 fn turn(w: Vec3) -> Vec3 {
     Vec3::new(-w.x, -w.y, w.z)
 }

@@ -10,14 +10,14 @@ use lumiris_numbers::math::Vec3;
 /// Interface between the outside (+z) and a dielectric (−z).
 #[derive(Clone, Copy, Debug)]
 pub struct Dielectric {
-    /// Index of refraction of the side of −z relative to that of +z.
+    /// Index of refraction on the −z side relative to the +z side.
     pub eta: f32,
     /// Microfacets.
     pub distribution: TrowbridgeReitz,
 }
 
 impl Dielectric {
-    /// True if all scattering is by deltas.
+    /// True if all scattering is specular.
     #[inline]
     pub fn is_specular(&self) -> bool {
         self.interface().is_specular()
@@ -39,7 +39,7 @@ impl Dielectric {
         self.interface().evaluate(wo.into(), wi.into(), select, Transport::Radiance).1
     }
 
-    /// [`Self::sample`] of the selected lobes only.
+    /// [`Self::sample`] restricted to the selected lobes.
     pub fn sample_select(
         &self,
         wo: Vec3,

@@ -1,7 +1,7 @@
-//! BSDFs of which only the value f(wo, wi) is known, sampled by a density that ignores their shape.
+//! BSDFs that are given only by their value f(wo, wi), sampled by a density independent of their shape.
 //!
-//! Sample and density are those of [`ProposalDensity`] and are exact, so they can be combined with light sampling by
-//! MIS. They fit badly; [`super::resample()`] samples f |cos θi| itself in the limit of many proposals.
+//! Sampling and density are those of [`ProposalDensity`] and exact, so that MIS with light sampling is possible. The
+//! density fits badly. [`super::resample()`] samples f |cos θi| itself in the limit of many proposals.
 
 use super::{BsdfSample, Model, ProposalDensity};
 use lumiris_numbers::math::{Rgb, Vec3};
@@ -28,7 +28,7 @@ impl Evaluated {
         self.density.pdf(wo, wi)
     }
 
-    /// A direction of the proposal density.
+    /// Samples the proposal density.
     #[inline]
     pub fn sample(&self, wo: Vec3, uc: f32, u: [f32; 2]) -> Option<BsdfSample> {
         let (wi, lobe) = self.density.sample(wo, uc, u)?;

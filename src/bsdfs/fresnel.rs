@@ -1,20 +1,20 @@
 //! Reflection, refraction and the Fresnel reflectance of smooth interfaces for single directions, see
 //! [`lumiris_lanes::kernels::fresnel`].
 //!
-//! η is the index of refraction of the side that `-n` points to, relative to the side that `+n` points to.
+//! η is the index of refraction on the side of `-n`, relative to the side of `+n`.
 
 use lumiris_lanes::kernels::fresnel;
 pub use lumiris_lanes::kernels::fresnel::{fr_complex, fr_dielectric};
 use lumiris_numbers::math::{Rgb, Vec3};
 
-/// Mirror of `w` about `n`; both point away from the surface.
+/// Reflection of `w` about `n`; both point away from the surface.
 #[inline]
 pub fn reflect(w: Vec3, n: Vec3) -> Vec3 {
     fresnel::reflect(w.into(), n.into()).into()
 }
 
-/// Direction to which `w` refracts at a surface with normal `n`, and η along that path (`eta`, or its inverse if `w`
-/// lies on the side of `-n`). `None` at total internal reflection.
+/// Refraction of `w` at a surface with normal `n`, and η along that path (`eta`, or its inverse if `w` is on the side
+/// of `-n`). `None` for total internal reflection.
 #[inline]
 pub fn refract(w: Vec3, n: Vec3, eta: f32) -> Option<(Vec3, f32)> {
     let (refracted, inverse, passes) = fresnel::refract(w.into(), n.into(), eta);

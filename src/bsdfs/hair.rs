@@ -1,21 +1,22 @@
 //! Fibres: hair and fur by [Chiang et al. 2016], after [Marschner et al. 2003] and [d'Eon et al. 2011], with the
 //! conventions of pbrt-v4.
 //!
-//! The frame has x along the fibre. θ is the elevation above the plane perpendicular to it, sin θ = x, and φ the azimuth
-//! in this plane, from y to z. h in −1..1 is where across the fibre the light path meets it, along y. With
-//! γo = asin h, the light that takes the path p — R, TT, TRT, and all longer ones — is scattered by
+//! The frame has x along the fibre. θ is the elevation above the plane perpendicular to it, sin θ = x, and φ is the
+//! azimuth in this plane, from y to z. h in −1..1 is the offset of the light path across the fibre, along y. With γo =
+//! asin h, the light of path p — R, TT, TRT, and all longer ones — scatters by
 //!
-//! Σ_p M_p(θo, θi) A_p(θo) N_p(φi − φo) / |cos θi|: M is the longitudinal lobe of variance v_p, A the attenuation and N
-//! the azimuthal lobe, a logistic distribution of scale s cut to a turn about Φ(p) = 2pγt − 2γo + pπ. Scales of the
-//! cuticle tilt the lobes by α. Each M·cos θ and N integrates to 1 and ΣA = 1 without absorption, so nothing is lost.
-//! It is not reciprocal: A depends on θo alone, and the lobes are tilted on one side.
+//! Σ_p M_p(θo, θi) A_p(θo) N_p(φi − φo) / |cos θi|: M is the longitudinal lobe of variance v_p, and A is the
+//! attenuation. N is the azimuthal lobe, a logistic distribution of scale s trimmed to a full turn about Φ(p) = 2pγt −
+//! 2γo + pπ. Scales of the cuticle tilt the lobes by α. Each M·cos θ and N integrates to 1, and ΣA = 1 without
+//! absorption, so energy is conserved. The BSDF is not reciprocal: A depends on θo only, and the lobes are tilted to
+//! one side.
 
 use super::fresnel::fr_dielectric;
 use super::{BsdfSample, Lobe};
 use lumiris_numbers::math::{Rgb, Vec3, safe_sqrt, sqr};
 use std::f32::consts::{FRAC_1_PI, LN_2, PI, TAU};
 
-/// Paths that are told apart, besides all longer ones.
+/// Number of separate paths, besides all longer ones.
 const P_MAX: usize = 3;
 
 /// A fibre at one offset across it.
@@ -33,7 +34,7 @@ pub struct Hair {
     tilt: [[f32; 2]; 3],
 }
 
-/// How rough a fibre is.
+/// Roughness and tilt of a fibre.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct HairLobes {
     /// Longitudinal roughness, 0..1.
@@ -59,8 +60,8 @@ impl Angles {
 }
 
 impl Hair {
-    /// A fibre met at `h` in −1..1, of index of refraction `eta` above 0 other than 1, and absorption `sigma_a` per
-    /// radius of it.
+    /// A fibre at the offset `h` in −1..1, with index of refraction `eta` above 0 other than 1, and absorption
+    /// `sigma_a` per radius of the fibre.
     pub fn new(h: f32, eta: f32, sigma_a: Rgb, lobes: HairLobes) -> Self {
         let [m, n] = [lobes.beta_m, lobes.beta_n].map(|beta| beta.clamp(0.01, 1.0));
         let v0 = sqr(0.726 * m + 0.812 * m * m + 3.7 * m.powi(20));
@@ -114,7 +115,7 @@ impl Hair {
         [o.sin * c + o.cos * s, (o.cos * c - o.sin * s).abs()]
     }
 
-    /// Azimuth of the lobe of path p below the last, relative to φo.
+    /// Azimuth of the lobe of path p (below the last), relative to φo.
     fn center(&self, p: usize, gamma_t: f32) -> f32 {
         2.0 * p as f32 * gamma_t - 2.0 * self.h.asin() + p as f32 * PI
     }
@@ -155,7 +156,7 @@ impl Hair {
         Self::choice(&a).iter().zip(self.lobes(&o, &i, gamma_t)).map(|(p, lobe)| p * lobe).sum()
     }
 
-    /// A direction of one path, which `uc` chooses.
+    /// Samples a direction of one path, chosen by `uc`.
     pub fn sample(&self, wo: Vec3, uc: f32, u: [f32; 2]) -> Option<BsdfSample> {
         let o = Angles::of(wo);
         let (a, gamma_t) = self.attenuation(&o);
@@ -186,11 +187,11 @@ impl Hair {
     }
 }
 
-/// M: density of the elevation per solid angle over a turn, ∫ M cos θi dθi = 1 [d'Eon et al. 2011, Eq. 7], by logarithms
-/// where the variance is small [d'Eon et al. 2013].
+/// M: density of the elevation per solid angle over a turn, ∫ M cos θi dθi = 1 [d'Eon et al. 2011, Eq. 7]. Computed by
+/// logarithms if the variance is small [d'Eon et al. 2013].
 fn longitudinal([sin_o, cos_o]: [f32; 2], [sin_i, cos_i]: [f32; 2], v: f32) -> f32 {
     let a = cos_i * cos_o / v;
-    // The lobe is about −θo with pbrt's sign of the tilt
+    // With pbrt's sign of the tilt, the lobe is about −θo
     let b = sin_i * sin_o / v;
     if v <= 0.1 {
         return (log_bessel_i0(a) - b - 1.0 / v + LN_2 + (1.0 / (2.0 * v)).ln()).exp();
@@ -216,7 +217,7 @@ fn log_bessel_i0(x: f32) -> f32 {
     bessel_i0(x).ln()
 }
 
-/// An angle in −π..π.
+/// The angle reduced to −π..π.
 fn wrapped(angle: f32) -> f32 {
     let turns = (angle * (0.5 * FRAC_1_PI)).round();
     (angle - turns * TAU).clamp(-PI, PI)
@@ -227,13 +228,13 @@ fn logistic_cdf(x: f32, s: f32) -> f32 {
     1.0 / (1.0 + (-x / s).exp())
 }
 
-/// Density of the logistic distribution cut to −π..π.
+/// Density of the logistic distribution trimmed to −π..π.
 fn trimmed_logistic(x: f32, s: f32) -> f32 {
     let e = (-x.abs() / s).exp();
     e / (s * sqr(1.0 + e)) / (logistic_cdf(PI, s) - logistic_cdf(-PI, s))
 }
 
-/// An angle by [`trimmed_logistic`].
+/// Samples [`trimmed_logistic`].
 fn sample_trimmed_logistic(u: f32, s: f32) -> f32 {
     let (from, to) = (logistic_cdf(-PI, s), logistic_cdf(PI, s));
     let x = from + u * (to - from);

@@ -5,9 +5,9 @@ use lumiris_lanes::kernels::{BsdfKernel, Drawn, Value};
 pub use lumiris_lanes::kernels::{Kernel, MAX_PARAMS};
 use lumiris_numbers::math::{Rgb, Vec3};
 
-/// A BSDF that is a kernel with its parameters.
+/// A BSDF whose formulas are a kernel with parameters.
 pub trait KernelBsdf {
-    /// The formulas.
+    /// The kernel.
     type Formulas: BsdfKernel;
 
     /// The parameters, an array.
@@ -39,7 +39,7 @@ pub trait KernelBsdf {
         self.f_cos_and_pdf(wo, wi).1
     }
 
-    /// A direction, by `uc` among the lobes and `u` within one.
+    /// Samples a direction: a lobe by `uc`, a direction within it by `u`.
     #[inline]
     fn sample(&self, wo: Vec3, uc: f32, u: [f32; 2]) -> Option<BsdfSample> {
         let params = self.params();
@@ -54,14 +54,14 @@ pub(super) fn evaluate<K: BsdfKernel>(p: &[f32], tables: &[f32], wo: Vec3, wi: V
     (Rgb::from_array(f_cos), pdf)
 }
 
-/// f of f·|cos θi|; black along the surface, where it is not finite.
+/// f from f·|cos θi|; black along the surface, where the quotient is not finite.
 #[inline]
 pub(super) fn without_cos(f_cos: Rgb, wi: Vec3) -> Rgb {
     let f = f_cos / wi.z.abs();
     if f.is_finite() { f } else { Rgb::BLACK }
 }
 
-/// The sample, if there is one.
+/// The sample; `None` if it is invalid.
 #[inline]
 pub(super) fn of_drawn(drawn: Drawn<f32>) -> Option<BsdfSample> {
     let wi = drawn.wi.into();
@@ -78,7 +78,7 @@ fn padded(params: &[f32]) -> [f32; MAX_PARAMS] {
 }
 
 impl Bsdf<'_> {
-    /// The parameters of its kernel, of which there are [`Kernel::params`].
+    /// The [`Kernel::params`] parameters of its kernel.
     pub fn params(&self) -> [f32; MAX_PARAMS] {
         match self {
             Bsdf::Diffuse(b) => padded(&b.params()),
@@ -93,7 +93,7 @@ impl Bsdf<'_> {
         }
     }
 
-    /// The kernel that evaluates it, if there is one.
+    /// The kernel that evaluates it; `None` without one.
     #[inline]
     pub fn kernel(&self) -> Option<Kernel> {
         match self {
@@ -109,7 +109,7 @@ impl Bsdf<'_> {
         }
     }
 
-    /// The tables of its kernel; those of all coats of a scene are the same.
+    /// The tables of its kernel; the coats of a scene share them.
     pub fn tables(&self) -> &[f32] {
         if let Bsdf::CoatedDiffuse(b) = self { b.tables() } else { &[] }
     }

@@ -1,16 +1,17 @@
 //! A dielectric coat over a base, with a scattering medium between them: the position-free random walk of
 //! [Guo, Hašan and Zhao 2018] in the form of pbrt-v4's layered BxDF.
 //!
-//! f is an expectation over walks that enter at `wo` and are connected to `wi` through the interface, both by sampling
-//! the interface from `wi` and by letting the walk leave, combined by the power heuristic. The random numbers of the
-//! walk are a hash of (wo, wi), so that f is a function, though a noisy one; averaged over directions it is unbiased.
-//! Directions are sampled from fixed lobes of known density rather than by the walk, so that `pdf` is exact.
+//! f is an expectation over walks that enter at `wo` and are connected to `wi` through the interface. Two techniques
+//! connect them, combined by the power heuristic: sampling the interface from `wi`, and letting the walk leave. The
+//! random numbers of the walk are a hash of (wo, wi). f is therefore a function, though a noisy one, and unbiased when
+//! averaged over directions. Directions are sampled from fixed lobes of known density rather than by the walk, so that
+//! `pdf` is exact.
 //!
 //! The heuristic weights both techniques by their densities of the direction inside the layer. pbrt-v4 weights one of
-//! them by the density of `wi` instead, so that its weights do not sum to one where interface and base are both rough:
-//! light leaving a Lambertian base is 2–11 % too bright for alphas 0.1–0.6 and steep directions, and more at grazing
-//! ones, where f is evaluated but not where it is sampled (pbrt-v4 issue 187 is a consequence). It also omits the
-//! mirror reflections after the last scattering event where interface and base are both smooth.
+//! them by the density of `wi` instead, so that its weights do not sum to one if interface and base are both rough.
+//! Light leaving a Lambertian base is then 2–11 % too bright for alphas 0.1–0.6 and steep directions, and more at
+//! grazing ones, where f is evaluated but not where it is sampled (pbrt-v4 issue 187 is a consequence). pbrt-v4 also
+//! omits the mirror reflections after the last scattering event if interface and base are both smooth.
 
 use super::dielectric::{Dielectric, Select, Transport};
 use super::fresnel::{fr_conductor, fr_dielectric, reflect};
@@ -25,7 +26,7 @@ use std::f32::consts::{PI, TAU};
 pub enum Base {
     /// Lambertian.
     Diffuse(Diffuse),
-    /// Metal; its index is relative to the coat.
+    /// Metal; its index of refraction is relative to the coat.
     Conductor(Conductor),
 }
 
@@ -72,7 +73,7 @@ pub struct Layered {
     pub albedo: Rgb,
     /// Henyey-Greenstein asymmetry.
     pub g: f32,
-    /// Greatest number of events of a walk.
+    /// Maximum number of events of a walk.
     pub max_depth: u32,
     /// Walks per evaluation of f.
     pub samples: u32,
@@ -82,7 +83,7 @@ pub struct Layered {
 struct Lobes {
     /// Reflection by the interface: a mirror if it is smooth.
     interface: f32,
-    /// GGX reflection that is about as wide as the light from the base.
+    /// A GGX reflection about as wide as the light from the base.
     base: f32,
     /// Cosine.
     cosine: f32,
@@ -94,12 +95,12 @@ impl Layered {
         !self.albedo.is_black()
     }
 
-    /// True if f is not always 0.
+    /// True if f is not 0 everywhere.
     pub fn has_non_specular(&self) -> bool {
         !self.top.is_specular() || !self.base.is_specular() || self.has_medium()
     }
 
-    /// True if a mirror reflection is part of the BSDF.
+    /// True if the BSDF includes a mirror reflection.
     pub fn has_specular(&self) -> bool {
         self.top.is_specular()
     }
@@ -136,7 +137,7 @@ impl Layered {
 
         for depth in 0..self.max_depth {
             walk.remaining -= 1;
-            // Possibly end the walk by Russian roulette.
+            // Russian roulette.
             let q = 1.0 - walk.beta.max_component();
             if depth > 3 && q > 0.75 {
                 if s.next_f32() < q {
@@ -179,8 +180,8 @@ impl Layered {
         walk.f
     }
 
-    /// The GGX lobe that stands for the light from a metallic base: outside, refraction widens the base's reflection
-    /// by η, and the two passages through a rough interface add (η − 1)α each to half of it.
+    /// The GGX lobe that approximates the light from a metallic base. Refraction widens the base's reflection by η, and
+    /// each passage through a rough interface adds (η − 1)α to half of its width.
     fn base_lobe(&self, base: &Conductor) -> TrowbridgeReitz {
         let eta = self.top.eta;
         let widen = |base: f32, top: f32| (sqr(eta * base) + 0.5 * sqr((eta - 1.0) * top)).sqrt().clamp(2e-3, 1.0);
@@ -188,7 +189,7 @@ impl Layered {
         TrowbridgeReitz::new(widen(b.alpha_x, t.alpha_x), widen(b.alpha_y, t.alpha_y))
     }
 
-    /// Probabilities of the lobes by rough albedos; `wo` is in the upper hemisphere.
+    /// Probabilities of the lobes by approximate albedos; `wo` is in the upper hemisphere.
     fn lobes(&self, wo: Vec3) -> Lobes {
         let fresnel = fr_dielectric(wo.z, self.top.eta);
         let entering = 1.0 - fresnel;
@@ -203,7 +204,7 @@ impl Layered {
                 } else if self.top.is_specular() && self.base.is_specular() {
                     (fresnel + metal, 0.0, entering * medium.max(0.05))
                 } else {
-                    // A tenth covers what the lobe misses: light reflected several times.
+                    // A tenth covers directions outside the lobe: light reflected several times.
                     (fresnel, 0.9 * metal, 0.1 * metal + entering * medium)
                 }
             }
@@ -222,7 +223,7 @@ impl Layered {
         lobes.interface + lobes.base
     }
 
-    /// The strongest lobe that is not the cosine, see [`super::Bsdf::glossy_lobe`].
+    /// The strongest lobe other than the cosine, see [`super::Bsdf::glossy_lobe`].
     pub(super) fn glossy_lobe(&self, wo: Vec3) -> (TrowbridgeReitz, f32) {
         let lobes = self.lobes(if wo.z < 0.0 { -wo } else { wo });
         match &self.base {
@@ -231,7 +232,7 @@ impl Layered {
         }
     }
 
-    /// Density of these, times their probabilities, see [`super::Bsdf::pdf_first_lobe`].
+    /// Density of these lobes, including their probabilities, see [`super::Bsdf::pdf_first_lobe`].
     pub(super) fn pdf_first_lobe(&self, wo: Vec3, wi: Vec3) -> f32 {
         let Some((wo, wi)) = super::to_upper(wo, wi) else { return 0.0 };
         self.pdf_upper(wo, wi, &Lobes { cosine: 0.0, ..self.lobes(wo) })
@@ -254,7 +255,7 @@ impl Layered {
         pdf
     }
 
-    /// One of the lobes; f is evaluated by walks as in [`Self::f`].
+    /// Samples one of the lobes; f is evaluated by walks as in [`Self::f`].
     pub fn sample(&self, wo: Vec3, uc: f32, u: [f32; 2]) -> Option<BsdfSample> {
         let flip = if wo.z < 0.0 { -1.0 } else { 1.0 };
         let wo = wo * flip;
@@ -280,9 +281,9 @@ impl Layered {
         Some(BsdfSample { f, wi: wi * flip, pdf, lobe: lobe | Lobe::REFLECTION, eta: 1.0 })
     }
 
-    /// Mirror reflectance at a smooth interface: its own, and if the base is smooth too, that of all paths which no
-    /// medium deflects, F + (1 − F)² τ Σ_{k<N} c (c F τ)^k, where c is the base's reflectance, τ the transmittance down
-    /// and up, and N = ⌊max_depth/2⌋ as many round trips as a walk can make and still leave.
+    /// Mirror reflectance at a smooth interface: the reflectance of the interface, plus, for a smooth base, all paths
+    /// without scattering in the medium: F + (1 − F)² τ Σ_{k<N} c (c F τ)^k. Here c is the base's reflectance, τ the
+    /// transmittance down and up, and N = ⌊max_depth/2⌋ the maximum number of round trips of a walk that leaves.
     fn mirror_albedo(&self, cos: f32) -> Rgb {
         let fresnel = fr_dielectric(cos, self.top.eta);
         let Base::Conductor(c) = &self.base else { return Rgb::splat(fresnel) };
@@ -299,7 +300,7 @@ impl Layered {
     }
 }
 
-/// A walk in progress: its weight and what it has gathered towards `wi`.
+/// A walk in progress: its weight and its accumulated contribution to `wi`.
 struct Walk<'a> {
     layer: &'a Layered,
     wi: Vec3,
@@ -307,13 +308,13 @@ struct Walk<'a> {
     exit: Option<BsdfSample>,
     beta: Rgb,
     f: Rgb,
-    /// Events that may follow the present one.
+    /// Number of events that may follow the current one.
     remaining: u32,
 }
 
 impl Walk<'_> {
-    /// Connects along the presampled exit, from depth `z`: `event` is the scattering function times cosine towards it
-    /// and `pdf` the density by which the walk itself would choose it.
+    /// Connects the event at depth `z` to the presampled exit. `event` gives the scattering function times cosine
+    /// towards the exit, and the density with which the walk itself would sample it.
     fn connect_exit(&mut self, z: f32, event: impl Fn(Vec3) -> (Rgb, f32)) {
         let Some(exit) = &self.exit else { return };
         let (value, pdf) = event(-exit.wi);
@@ -322,9 +323,9 @@ impl Walk<'_> {
         self.f += self.beta * value * exit.f * (transmittance * weight / exit.pdf);
     }
 
-    /// Between a smooth interface and a smooth base, connects a scattering event in the medium, at `z`, by all chains
-    /// of mirror reflections: neither technique of the walk finds them. Upwards, the chains have k ≥ 1 reflections at
-    /// interface and base; downwards they begin with another one at the base.
+    /// Connects a scattering event in the medium, at `z` between a smooth interface and a smooth base, by all chains of
+    /// mirror reflections, which neither technique of the walk can sample. Upward chains have k ≥ 1 reflections at
+    /// interface and base; downward chains begin with another reflection at the base.
     fn connect_mirrors(&mut self, z: f32, w: Vec3) {
         let (layer, Some(exit)) = (self.layer, &self.exit) else { return };
         let Base::Conductor(base) = &layer.base else { return };
@@ -350,8 +351,8 @@ impl Walk<'_> {
         self.f += self.beta * layer.albedo * sum * exit.f / exit.pdf;
     }
 
-    /// Lets the walk, at depth `z` in direction `w` which it sampled with density `pdf` (`None`: a delta), leave
-    /// through a rough interface.
+    /// Lets the walk leave through a rough interface, from depth `z` in direction `w`. `pdf` is the density with which
+    /// the walk sampled `w` (`None`: a delta).
     fn leave(&mut self, z: f32, w: Vec3, pdf: Option<f32>) {
         if self.layer.top.is_specular() || w.z <= 0.0 {
             return;
@@ -364,7 +365,7 @@ impl Walk<'_> {
         }
     }
 
-    /// Scatters in the medium; the new direction.
+    /// Scatters in the medium; returns the new direction.
     fn scatter_in_medium(&mut self, z: f32, w: Vec3, u: [f32; 2]) -> Option<Vec3> {
         let (albedo, g) = (self.layer.albedo, self.layer.g);
         self.connect_exit(z, |out| {
@@ -379,7 +380,7 @@ impl Walk<'_> {
         (next.z != 0.0).then_some(next)
     }
 
-    /// Scatters at the base; the new direction.
+    /// Scatters at the base; returns the new direction.
     fn scatter_at_base(&mut self, w: Vec3, u: [f32; 2]) -> Option<Vec3> {
         let base = self.layer.base;
         let specular = base.is_specular();
@@ -392,7 +393,7 @@ impl Walk<'_> {
         Some(sample.wi)
     }
 
-    /// Reflects at the interface from below; the new direction.
+    /// Reflects at the interface from below; returns the new direction.
     fn reflect_at_top(&mut self, w: Vec3, uc: f32, u: [f32; 2]) -> Option<Vec3> {
         let sample = self.layer.top.sample_select(-w, uc, u, Transport::Radiance, Select::Reflection);
         let sample = sample.filter(|s| s.pdf > 0.0 && s.wi.z != 0.0)?;
@@ -401,7 +402,7 @@ impl Walk<'_> {
     }
 }
 
-/// Weight of a sample of density `a` against a technique of density `b`, one sample of each.
+/// MIS weight (power heuristic) of a sample of density `a` against a technique of density `b`, with one sample of each.
 #[inline]
 fn power_weight(a: f32, b: f32) -> f32 {
     let [a, b] = [a, b].map(|p| Technique { n: 1.0, p });
@@ -415,7 +416,7 @@ fn henyey_greenstein(cos: f32, g: f32) -> f32 {
     (1.0 - sqr(g)) / (2.0 * TAU * denominator.max(1e-7).powf(1.5))
 }
 
-/// Direction by the density [`henyey_greenstein`] about `wo`.
+/// Samples [`henyey_greenstein`] about `wo`.
 fn sample_henyey_greenstein(wo: Vec3, g: f32, u: [f32; 2]) -> Vec3 {
     let cos = if g.abs() < 1e-3 {
         1.0 - 2.0 * u[0]

@@ -1,15 +1,15 @@
-//! Samples of a BSDF, and the lobes that they are of.
+//! BSDF samples and their lobes.
 
 use lumiris_lanes::kernels::lobe;
 use lumiris_numbers::math::{Rgb, Vec3};
 use std::ops::BitOr;
 
-/// What kind of scattering a sample is: a set of flags.
+/// The kind of scattering of a sample: a set of flags.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Lobe(u8);
 
 impl Lobe {
-    /// Of a sum of flags of [`lobe`].
+    /// From a sum of flags of [`lobe`].
     #[inline]
     pub const fn of_flags(flags: u8) -> Lobe {
         Lobe(flags)
@@ -21,15 +21,15 @@ impl Lobe {
         self.0
     }
 
-    /// To the side of `wo`.
+    /// On the side of `wo`.
     pub const REFLECTION: Lobe = Lobe(lobe::REFLECTION);
-    /// To the other side.
+    /// On the other side.
     pub const TRANSMISSION: Lobe = Lobe(lobe::TRANSMISSION);
-    /// Lambertian or as wide.
+    /// Lambertian, or similarly wide.
     pub const DIFFUSE: Lobe = Lobe(lobe::DIFFUSE);
     /// A rough peak.
     pub const GLOSSY: Lobe = Lobe(lobe::GLOSSY);
-    /// A delta: `pdf` is a probability, and f and pdf of the methods leave it out.
+    /// A delta: `pdf` is a probability. The methods for f and pdf exclude it.
     pub const SPECULAR: Lobe = Lobe(lobe::SPECULAR);
 
     /// True if all flags of `other` are set.
@@ -62,14 +62,14 @@ impl BitOr for Lobe {
 /// A sampled direction. The weight of the path is `f·|cos θi|/pdf` for all lobes.
 #[derive(Clone, Copy, Debug)]
 pub struct BsdfSample {
-    /// Value without cosine (1/sr); of a delta, its weight over |cos θi|, times `pdf`.
+    /// Value without cosine (1/sr). For a delta, its weight over |cos θi|, times `pdf`.
     pub f: Rgb,
     /// Direction to the light.
     pub wi: Vec3,
-    /// Density per steradian; of a delta, its probability.
+    /// Density per steradian; the probability of a delta.
     pub pdf: f32,
     /// Kind of scattering.
     pub lobe: Lobe,
-    /// Index of refraction of the side of `wi` relative to that of `wo`; 1 for reflection.
+    /// Index of refraction on the side of `wi` relative to the side of `wo`; 1 for reflection.
     pub eta: f32,
 }

@@ -1,14 +1,15 @@
 //! Measured reflection in the adaptive parameterisation of [Dupuy and Jakob 2018], on both sides of the surface.
 //!
-//! Light goes to wo as if from facets: wi is wo mirrored at a normal m. Directions are points of the unit square, by
-//! (√(2θ/π), (φ + π)/2π), for isotropic surfaces with the φ of m from that of wo. The table of visible normals is a density
-//! over this square for each of some wo; sampling it is the map R of random numbers u to m, and
+//! Reflection is parameterised by facet normals: wi is the reflection of wo about a normal m. Directions map to points
+//! (√(2θ/π), (φ + π)/2π) of the unit square; for isotropic surfaces the φ of m is relative to the φ of wo. For each of
+//! some directions wo, a table of visible normals is a density over this square. Sampling it is a map R from random
+//! numbers u to m, and
 //!
 //! f cos θi = s(u) D(m)/(4 σ(wo)), u = R⁻¹(m),
 //!
-//! where s is the table of colours, D the one of normals and σ that of projected areas: s is what samples of R weigh, and
-//! changes little with u. Samples draw u by the luminance of s. With p(u) and p(m) the densities over the square, that of wi
-//! per steradian is p(u) p(m)/(2π² √(2θm/π) sin θm · 4 (wo·m)).
+//! where s is the table of colours, D the table of normals, and σ the table of projected areas. s is the weight of a
+//! sample of R and varies slowly with u. Samples draw u by the luminance of s. With p(u) and p(m) the densities over
+//! the square, the density of wi per steradian is p(u) p(m)/(2π² √(2θm/π) sin θm · 4 (wo·m)).
 
 use super::fresnel::reflect;
 use super::{BsdfSample, Lobe, to_upper};
@@ -16,24 +17,24 @@ use lumiris_formats::bsdf_file::MeasuredBsdf;
 use lumiris_numbers::math::{BilinearTables, Blend, ParameterGrid, PiecewiseBilinear2D, Rgb, Vec2, Vec3};
 use std::f32::consts::{FRAC_PI_2, PI, TAU};
 
-/// How far the azimuths of the tables may be from a whole, a half or a quarter turn, in turns.
+/// Maximum deviation of the azimuths of the tables from a whole, a half or a quarter turn, in turns.
 const AZIMUTH_TOLERANCE: f32 = 0.01;
 
-/// What the azimuth of wo means to the surface.
+/// The symmetry of the surface, which determines how it depends on the azimuth of wo.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Symmetry {
-    /// Nothing.
+    /// Independent of the azimuth.
     Isotropic,
-    /// All azimuths have tables.
+    /// No symmetry: there are tables for all azimuths.
     None,
-    /// Half a turn about n changes nothing: tables are for the side of this direction.
+    /// Symmetric under rotation by 180° about n: there are tables for the side of this direction.
     HalfTurn(Vec2),
-    /// Reflection at both axes changes nothing: tables are for the quadrant of this direction.
+    /// Symmetric under reflection at both axes: there are tables for the quadrant of this direction.
     Quadrants(Vec2),
 }
 
 impl Symmetry {
-    /// By the azimuths of tables (radians).
+    /// The symmetry implied by the azimuths of the tables (radians).
     fn of(phi: &[f32]) -> Result<Self, String> {
         let (&[first, .., last], 3..) = (phi, phi.len()) else { return Ok(Symmetry::Isotropic) };
         let middle = Vec2::from_angle(0.5 * (first + last));
@@ -50,7 +51,7 @@ impl Symmetry {
         ))
     }
 
-    /// Factors of x and y that bring a direction to where tables are.
+    /// Signs of x and y that map a direction to the range of the tables.
     fn signs(self, w: Vec3) -> Vec2 {
         let sign = |product: f32| if product < 0.0 { -1.0 } else { 1.0 };
         match self {
@@ -61,7 +62,7 @@ impl Symmetry {
     }
 }
 
-/// D and σ, by which colours are given.
+/// D and σ, which normalise the colours.
 #[derive(Clone, Debug)]
 struct Facets {
     ndf: BilinearTables<f32>,
@@ -74,17 +75,19 @@ pub struct MeasuredTables {
     /// Azimuth and polar angle of wo.
     grid: ParameterGrid,
     symmetry: Symmetry,
-    /// `None` if colours are f cos θi themselves.
+    /// `None` if the colours are f cos θi itself.
     facets: Option<Facets>,
     visible: PiecewiseBilinear2D,
     luminance: PiecewiseBilinear2D,
     color: BilinearTables<Rgb>,
-    /// tan θ of the cone about n that has half of the facets.
+    /// tan θ of the cone about n that contains half of the facets.
     alpha: f32,
 }
 
 impl MeasuredTables {
-    /// From what a file holds; `Err` says what does not fit.
+    /// Builds the tables from the content of a file.
+    ///
+    /// Returns `Err` with a message if tables are inconsistent.
     pub fn new(bsdf: MeasuredBsdf) -> Result<Self, String> {
         let symmetry = Symmetry::of(&bsdf.phi)?;
         let sizes = || "its tables do not have the sizes that they should have".to_owned();
@@ -96,7 +99,7 @@ impl MeasuredTables {
         if !is_whole {
             return Err(sizes());
         }
-        // Noise of the measurement may be below 0
+        // Measurement noise may be negative
         let areas = |values: Vec<f32>| values.into_iter().map(|x| x.max(0.0)).collect();
         let ndf = BilinearTables::new(bsdf.ndf_size, areas(bsdf.ndf)).ok_or_else(sizes)?;
         let sigma = BilinearTables::new(bsdf.sigma_size, areas(bsdf.sigma)).ok_or_else(sizes)?;
@@ -112,7 +115,7 @@ impl MeasuredTables {
     }
 }
 
-/// tan θ of the cone about n that has half of ∫ D cos θ: α, were D that of GGX.
+/// tan θ of the cone about n that contains half of ∫ D cos θ; for a GGX distribution this is α.
 fn median_slope(ndf: &BilinearTables<f32>) -> f32 {
     const POLAR: usize = 256;
     const AZIMUTH: usize = 32;
@@ -134,17 +137,17 @@ fn median_slope(ndf: &BilinearTables<f32>) -> f32 {
     if alpha > 0.0 { alpha.min(1.0) } else { 1.0 }
 }
 
-/// θ of a coordinate of the square.
+/// θ of a coordinate of the unit square.
 fn polar_of(x: f32) -> f32 {
     x * x * FRAC_PI_2
 }
 
-/// The polar angle of a direction, which keeps its digits near n.
+/// The polar angle of a direction, accurate near n.
 fn theta_of(w: Vec3) -> f32 {
     w.truncate().length().atan2(w.z)
 }
 
-/// The point of the square for a polar angle and an azimuth.
+/// The point of the unit square for a polar angle and an azimuth.
 fn square(theta: f32, phi: f32) -> Vec2 {
     let turns = phi / TAU + 0.5;
     Vec2::new((theta / FRAC_PI_2).max(0.0).sqrt(), turns - turns.floor())
@@ -153,17 +156,17 @@ fn square(theta: f32, phi: f32) -> Vec2 {
 /// Measured reflection.
 #[derive(Clone, Copy, Debug)]
 pub struct Measured<'a> {
-    /// What was measured.
+    /// The tables of the measurement.
     pub tables: &'a MeasuredTables,
 }
 
-/// What follows from wo, which is in the upper hemisphere and where tables are.
+/// Data for a direction wo, in the upper hemisphere and in the range of the tables.
 struct Seen {
     wo: Vec3,
     blend: Blend,
-    /// What is added to azimuths within the square.
+    /// Added to azimuths within the square.
     turned: f32,
-    /// Its place in the square.
+    /// Its point in the square.
     place: Vec2,
 }
 
@@ -174,14 +177,14 @@ impl Measured<'_> {
         Seen { wo, blend: self.tables.grid.at([phi, theta]), turned, place: square(theta, phi) }
     }
 
-    /// Both directions where tables are; `None` if they are on different sides.
+    /// Both directions, mapped to the range of the tables; `None` if they are on different sides.
     fn folded(&self, wo: Vec3, wi: Vec3) -> Option<(Vec3, Vec3)> {
         let (wo, wi) = to_upper(wo, wi)?;
         let signs = self.tables.symmetry.signs(wo).extend(1.0);
         Some((wo * signs, wi * signs))
     }
 
-    /// f cos θi (1/sr) at a normal whose place in the square is `m`, and whose random number is `u`.
+    /// f cos θi (1/sr) for the normal at the point `m` of the square, whose random number is `u`.
     fn f_cos(&self, seen: &Seen, m: Vec2, u: Vec2) -> Rgb {
         let color = self.tables.color.at(&seen.blend, u);
         let relative = |facets: &Facets| {
@@ -212,7 +215,7 @@ impl Measured<'_> {
         density / steradians(place.x, m, wo)
     }
 
-    /// The reflection by a visible normal, by the luminance that there is of it.
+    /// Samples a reflection by visible normals, in proportion to their luminance.
     pub fn sample(&self, wo: Vec3, u: [f32; 2]) -> Option<BsdfSample> {
         let side = Vec3::splat(wo.z.signum());
         let signs = self.tables.symmetry.signs(wo * side).extend(1.0);
@@ -235,14 +238,14 @@ impl Measured<'_> {
         Some(BsdfSample { f, wi: wi * signs * side, pdf, lobe: Lobe::GLOSSY | Lobe::REFLECTION, eta: 1.0 })
     }
 
-    /// How wide the distribution of normals is: the α of a GGX whose median slope is that of the facets.
+    /// Width of the distribution of normals: the α of a GGX with the same median slope.
     pub fn alpha(&self) -> f32 {
         self.tables.alpha
     }
 }
 
-/// Steradians of wi per area of the square of m, whose first coordinate is `x`. At n itself, where they are 0, a number
-/// that keeps densities finite.
+/// Jacobian: steradians of wi per area of the square of m, whose first coordinate is `x`. At n itself, where it is 0, a
+/// small number that keeps densities finite.
 fn steradians(x: f32, m: Vec3, wo: Vec3) -> f32 {
     let normals = 2.0 * PI * PI * x * m.truncate().length();
     normals.max(1e-12) * 4.0 * wo.dot(m)

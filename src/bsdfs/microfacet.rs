@@ -16,7 +16,8 @@ pub struct TrowbridgeReitz {
 }
 
 impl TrowbridgeReitz {
-    /// From the alphas; unless the surface is smooth, both are raised to at least 1e-4. Negative alphas and NaN are 0.
+    /// From the alphas. Unless the surface is smooth, both are raised to at least 1e-4. Negative alphas and NaN become
+    /// 0.
     pub fn new(alpha_x: f32, alpha_y: f32) -> Self {
         let raw = TrowbridgeReitz { alpha_x: alpha_x.max(0.0), alpha_y: alpha_y.max(0.0) };
         if raw.is_smooth() {
@@ -48,13 +49,13 @@ impl TrowbridgeReitz {
         self.facets().d(m.into())
     }
 
-    /// Fraction of the microfacets that face `w` and that `w` sees.
+    /// Fraction of the microfacets facing `w` that are visible from `w`.
     #[inline]
     pub fn g1(&self, w: Vec3) -> f32 {
         4.0 * w.z.abs() * Facets::g1_over_cos(w.z, self.facets().l(w.into()))
     }
 
-    /// Fraction that both `wo` and `wi` see.
+    /// Fraction visible from both `wo` and `wi`.
     #[inline]
     pub fn g(&self, wo: Vec3, wi: Vec3) -> f32 {
         let [l_o, l_i] = [wo, wi].map(|w| self.facets().l(w.into()));
@@ -67,13 +68,13 @@ impl TrowbridgeReitz {
         4.0 * Facets::g1_over_cos(w.z, self.facets().l(w.into())) * self.d(m) * w.dot(m).abs()
     }
 
-    /// Density of reflection by the normals that `wo` sees (1/sr), on its side.
+    /// Density of reflection by the normals visible from `wo` (1/sr), on its side.
     #[inline]
     pub fn pdf_reflection(&self, wo: Vec3, wi: Vec3) -> f32 {
         self.facets().pdf_reflection(wo.into(), wi.into())
     }
 
-    /// A normal visible from `w` (or from `-w` if `w` is below the horizon), in the upper hemisphere.
+    /// Samples a normal visible from `w` (or from `-w` if `w` is below the horizon), in the upper hemisphere.
     #[inline]
     pub fn sample_m(&self, w: Vec3, u: [f32; 2]) -> Vec3 {
         self.facets().sample_m(w.into(), u).into()
@@ -106,7 +107,7 @@ mod tests {
 
     #[test]
     fn visible_normals_project_to_the_cosine() {
-        // ∫ G1(w) D(m) max(0, w·m) dm = cos θ_w, that is ∫ pdf_m = 1, by sampling m by its own cosine.
+        // ∫ G1(w) D(m) max(0, w·m) dm = cos θ_w, which means ∫ pdf_m = 1; m is sampled by its own cosine.
         let t = TrowbridgeReitz::new(0.4, 0.25);
         for cos in [0.05, 0.3, 0.8, 1.0] {
             let w = warp::direction(cos, 0.7);

@@ -1,9 +1,10 @@
-//! Scattering at surfaces. Local frame: n = +z; `wo` to the viewer, `wi` to the light, both unit and away from the
-//! surface. The models are those of pbrt-v4 [Pharr et al. 2023, ch. 9 and 14]; f of transmission is for radiance, that
-//! is scaled by 1/η².
+//! Scattering at surfaces. In the local frame n = +z, `wo` points to the viewer and `wi` to the light, both unit and
+//! away from the surface. The models are those of pbrt-v4 [Pharr et al. 2023, ch. 9 and 14]. f of transmission is for
+//! radiance, so it includes the factor 1/η².
 //!
-//! Reading order: [`lobe`], [`fresnel`], [`microfacet`], [`kernel`], [`diffuse`], [`diffuse_transmission`], [`conductor`], [`dielectric`],
-//! [`thin_dielectric`], [`coat_table`], [`coated_diffuse`], [`layered`], [`sheen`], [`principled`], [`hair`], [`measured`]; [`phase`] in media; then what can only be evaluated: [`models`],
+//! Reading order: [`lobe`], [`fresnel`], [`microfacet`], [`kernel`], [`diffuse`], [`diffuse_transmission`],
+//! [`conductor`], [`dielectric`], [`thin_dielectric`], [`coat_table`], [`coated_diffuse`], [`layered`], [`sheen`],
+//! [`principled`], [`hair`], [`measured`]; [`phase`] in media; then BSDFs that can only be evaluated: [`models`],
 //! [`default_lobes`], [`evaluated`], [`mod@resample`].
 
 pub mod coat_table;
@@ -55,7 +56,7 @@ use kernel::{evaluate, without_cos};
 use lumiris_lanes::kernels;
 use lumiris_numbers::math::{Rgb, Vec3};
 
-/// Most lobes that [`Bsdf::first_lobe`] tells apart.
+/// Maximum number of lobes that [`Bsdf::first_lobe`] distinguishes.
 pub const MAX_LOBES: usize = 2;
 
 /// The scattering of one surface point.
@@ -69,7 +70,8 @@ pub enum Bsdf<'a> {
     Conductor(Conductor),
     /// Glass.
     Dielectric(Dielectric),
-    /// Refraction by an interface, without the reflection: out of an interior whose reflections are no vertices.
+    /// Refraction without reflection at an interface: the exit from an interior whose internal reflections are not path
+    /// vertices.
     Exit(Dielectric),
     /// A sheet of glass.
     ThinDielectric(ThinDielectric),
@@ -81,20 +83,20 @@ pub enum Bsdf<'a> {
     Principled(Principled),
     /// A fibre.
     Hair(Hair),
-    /// Reflection by tables of a measurement.
+    /// Reflection by measured tables.
     Measured(Measured<'a>),
     /// Reflection that can only be evaluated.
     Evaluated(Evaluated),
-    /// Scattering in a medium: no surface, and no cosine.
+    /// Scattering in a medium, without a surface and without a cosine.
     Phase(Phase),
 }
 
-/// The roughness up to which surfaces are said to make caustics.
+/// Maximum roughness of surfaces that make caustics.
 const MAX_CAUSTIC_ALPHA: f32 = 0.3;
-/// The part of a surface that must be metal or glass for it.
+/// Minimum fraction of metal or glass of surfaces that make caustics.
 const CAUSTIC_PART: f32 = 0.5;
 
-/// The part of a BSDF that needs of the light no more than its irradiance, and what remains.
+/// The part of a BSDF that depends only on the irradiance, and the rest.
 #[derive(Clone, Copy, Debug)]
 pub struct Lambertian<'a> {
     /// Albedo for light that arrives on the side of `wo`.
@@ -105,7 +107,8 @@ pub struct Lambertian<'a> {
     pub rest: Option<Bsdf<'a>>,
 }
 
-/// Both directions in the upper hemisphere, the whole surface being symmetric; `None` if they are on different sides.
+/// Both directions mirrored to the upper hemisphere, by the symmetry of the surface; `None` if they are on different
+/// sides.
 #[inline]
 fn to_upper(wo: Vec3, wi: Vec3) -> Option<(Vec3, Vec3)> {
     if wo.z * wi.z <= 0.0 {
@@ -130,14 +133,14 @@ impl<'a> Bsdf<'a> {
         self.f_cos_and_pdf(wo, wi).1
     }
 
-    /// [`Self::f`] and [`Self::pdf`].
+    /// [`Self::f`] and [`Self::pdf`] together.
     #[inline]
     pub fn f_and_pdf(&self, wo: Vec3, wi: Vec3) -> (Rgb, f32) {
         let (f_cos, pdf) = self.f_cos_and_pdf(wo, wi);
         (if self.has_surface() { without_cos(f_cos, wi) } else { f_cos }, pdf)
     }
 
-    /// [`Self::f`] times [`Self::cos`], and [`Self::pdf`]: the bits of the kernel if there is one.
+    /// [`Self::f`] times [`Self::cos`], and [`Self::pdf`]; bit-identical to the kernel, if there is one.
     #[inline]
     pub fn f_cos_and_pdf(&self, wo: Vec3, wi: Vec3) -> (Rgb, f32) {
         let (f, pdf) = match self {
@@ -160,9 +163,9 @@ impl<'a> Bsdf<'a> {
         (if f_cos.is_finite() { f_cos } else { Rgb::BLACK }, if pdf.is_finite() { pdf } else { 0.0 })
     }
 
-    /// Probability that [`Self::sample`] samples the first of at most two lobes, which it does if `uc` is less: the
-    /// interface of a coat, the reflection of a diffuse transmitter, the cosine lobe of a proposal density. 1 for BSDFs
-    /// of one lobe.
+    /// Probability that [`Self::sample`] samples the first of at most two lobes, which it does if `uc` is less. The
+    /// first lobe is the interface of a coat, the reflection of a diffuse transmitter, or the cosine lobe of a proposal
+    /// density. 1 for BSDFs with one lobe.
     #[inline]
     pub fn first_lobe(&self, wo: Vec3) -> f32 {
         match self {
@@ -182,7 +185,7 @@ impl<'a> Bsdf<'a> {
         }
     }
 
-    /// The part of [`Self::pdf`], whose value `pdf` is, that the first lobe contributes (1/sr).
+    /// The contribution of the first lobe to [`Self::pdf`], whose value is `pdf` (1/sr).
     #[inline]
     pub fn pdf_first_lobe(&self, wo: Vec3, wi: Vec3, pdf: f32) -> f32 {
         let first = match self {
@@ -201,12 +204,13 @@ impl<'a> Bsdf<'a> {
             Bsdf::Principled(b) => b.pdf_first_lobe(wo, wi),
             Bsdf::Evaluated(b) => b.density.pdf_first_lobe(wo, wi),
         };
-        // Not finite or, by rounding, more than the whole
+        // May be non-finite or, by rounding, more than the whole
         if first > 0.0 { first.min(pdf) } else { 0.0 }
     }
 
-    /// The strongest rough lobe about the mirror direction of `wo`: its α, the greater one where it is anisotropic, and its
-    /// part of the albedo (0 to 1). `None` if there is none, or if light passes as well, of which it would tell nothing.
+    /// The strongest rough lobe about the mirror direction of `wo`: its α (the greater one if it is anisotropic) and
+    /// its fraction of the albedo (0 to 1). `None` if there is none, or if the BSDF also transmits light, which the
+    /// lobe does not describe.
     #[inline]
     pub fn glossy_lobe(&self, wo: Vec3) -> Option<(f32, f32)> {
         let (distribution, share) = match self {
@@ -227,7 +231,7 @@ impl<'a> Bsdf<'a> {
         (!distribution.is_smooth()).then_some((distribution.alpha_x.max(distribution.alpha_y), share))
     }
 
-    /// True for metals and glass that are smooth or nearly so: light that they send on is bundled to caustics.
+    /// True for metals and glass that are smooth or nearly so: their reflection or refraction makes caustics.
     pub fn makes_caustics(&self) -> bool {
         let is_narrow = |d: &TrowbridgeReitz| d.is_smooth() || d.alpha_x.max(d.alpha_y) <= MAX_CAUSTIC_ALPHA;
         match self {
@@ -239,25 +243,25 @@ impl<'a> Bsdf<'a> {
         }
     }
 
-    /// True if f and pdf are functions of the directions, and pdf is that of sampled directions: not estimates by random
-    /// walks, not of what can only be evaluated, and not of interiors.
+    /// True if f and pdf are deterministic functions of the directions, and pdf is the density of sampled directions.
+    /// False for estimates by random walks, for BSDFs that can only be evaluated, and for interiors.
     pub fn is_evaluated_exactly(&self) -> bool {
         !matches!(self, Bsdf::Exit(_) | Bsdf::Layered(_) | Bsdf::Hair(_) | Bsdf::Evaluated(_) | Bsdf::Phase(_))
     }
 
-    /// False in a medium, where directions along the horizon of the frame are no others, and there is no cosine.
+    /// False in a medium, where the horizon of the frame has no meaning and there is no cosine.
     #[inline]
     pub fn has_surface(&self) -> bool {
         !matches!(self, Bsdf::Phase(_))
     }
 
-    /// |cos θ| of a direction in the frame, by which f is multiplied; 1 in a medium.
+    /// |cos θ| of a direction in the frame, the factor of f; 1 in a medium.
     #[inline]
     pub fn cos(&self, w: Vec3) -> f32 {
         if self.has_surface() { w.z.abs() } else { 1.0 }
     }
 
-    /// The index of refraction of light that passes, where another takes its place for one wavelength.
+    /// The index of refraction for transmitted light, which dispersion replaces for one wavelength.
     #[inline]
     pub fn eta_mut(&mut self) -> Option<&mut f32> {
         match self {
@@ -277,7 +281,7 @@ impl<'a> Bsdf<'a> {
         }
     }
 
-    /// True if light that arrives on the other side than that of `wo` may reach it.
+    /// True if light from the side opposite to `wo` may scatter to `wo`.
     #[inline]
     pub fn transmits(&self) -> bool {
         match self {
@@ -297,9 +301,9 @@ impl<'a> Bsdf<'a> {
         }
     }
 
-    /// Probability of a lobe of [`Self::sample`] whose density is that of the cosine or uniform, on the side of `wo`:
-    /// |cos θi|/pdf is at most 2π over this everywhere there, and directions are found that no f tells of. 0 for BSDFs
-    /// without such a lobe.
+    /// Probability of a lobe of [`Self::sample`] with a cosine or uniform density on the side of `wo`. |cos θi|/pdf is
+    /// then at most 2π over this probability, and all directions of that side are sampled, independent of f. 0 for
+    /// BSDFs without such a lobe.
     pub fn wide_lobe(&self, wo: Vec3) -> f32 {
         match self {
             Bsdf::Diffuse(_) => 1.0,
@@ -316,14 +320,14 @@ impl<'a> Bsdf<'a> {
         }
     }
 
-    /// A direction `wi`, by `uc` among the lobes and `u` within one. `None` if the sample carries no light.
+    /// Samples a direction `wi`: a lobe by `uc`, a direction within it by `u`. `None` if the sample carries no light.
     #[inline]
     pub fn sample(&self, wo: Vec3, uc: f32, u: [f32; 2]) -> Option<BsdfSample> {
         self.sample_direction(wo, uc, u).filter(|s| s.f.is_finite() && !s.f.is_black())
     }
 
-    /// As [`Self::sample`], but also directions that carry no light: `None` only where the density has a defect. So the
-    /// directions of non-specular samples are distributed by [`Self::pdf`].
+    /// As [`Self::sample`], but includes directions that carry no light; `None` only where the density has a defect.
+    /// Non-specular samples are therefore distributed by [`Self::pdf`].
     #[inline]
     pub fn sample_direction(&self, wo: Vec3, uc: f32, u: [f32; 2]) -> Option<BsdfSample> {
         let has_surface = self.has_surface();
@@ -348,7 +352,7 @@ impl<'a> Bsdf<'a> {
         sample.filter(|s| s.pdf > 0.0 && s.pdf.is_finite() && (s.wi.z != 0.0 || !has_surface))
     }
 
-    /// True if [`Self::f`] is not always 0: the point can be lit by sampling lights.
+    /// True if [`Self::f`] is not 0 everywhere: light sampling can contribute.
     #[inline]
     pub fn has_non_specular(&self) -> bool {
         match self {
@@ -386,15 +390,16 @@ impl<'a> Bsdf<'a> {
         }
     }
 
-    /// True if [`Self::sample`] follows a density that knows nothing of [`Self::f`], so that [`resample()`] pays.
+    /// True if [`Self::sample`] follows a density that is independent of [`Self::f`], so that [`resample()`] is
+    /// worthwhile.
     #[inline]
     pub fn is_only_evaluated(&self) -> bool {
         matches!(self, Bsdf::Evaluated(_))
     }
 
-    /// The Lambertian part as seen from `wo`; `None` if there is none. Exact but for the base below a coat, whose
-    /// dependence on the direction of the light (the coat's transmittance) is replaced by its mean: exact under even
-    /// light.
+    /// The Lambertian part for the direction `wo`; `None` if there is none. For the base below a coat, the dependence
+    /// on the incident direction (the coat's transmittance) is replaced by its mean, which is exact under uniform
+    /// illumination. All others are exact.
     pub fn lambertian(&self, wo: Vec3) -> Option<Lambertian<'a>> {
         let of = |reflectance, transmittance, rest| Some(Lambertian { reflectance, transmittance, rest });
         match self {
@@ -415,10 +420,9 @@ impl<'a> Bsdf<'a> {
         }
     }
 
-    /// Fraction of uniform light that reaches `wo`, for the albedo image: exact for the Lambertian and coated ones,
-    /// otherwise the unbiased estimate f |cos θ|/pdf of one sample, drawn by the numbers that `u` gives. One is enough:
-    /// an image has a sample of its own for each camera sample, and many for each would cost more than all light
-    /// transport.
+    /// Fraction of uniform light that is scattered to `wo`, for the albedo image. Exact for Lambertian and coated
+    /// BSDFs. Otherwise the unbiased estimate f |cos θ|/pdf of one sample, drawn by the random numbers of `u`. One
+    /// sample suffices: each camera sample has its own, and several would cost more than the light transport.
     pub fn albedo_estimate(&self, wo: Vec3, u: impl FnOnce() -> [f32; 3]) -> Rgb {
         match self {
             Bsdf::Diffuse(b) => b.reflectance,

@@ -1,5 +1,5 @@
-//! Reflectance models of which only the value is given: no sampler, no density. Directions are in the upper hemisphere
-//! and f has no cosine; all of them are reciprocal.
+//! Reflectance models that are given only by their value, without sampler or density. Directions are in the upper
+//! hemisphere, and f excludes the cosine. All models are reciprocal.
 //!
 //! | model | f(wo, wi) | source |
 //! |---|---|---|
@@ -9,8 +9,8 @@
 //! | cosine lobe | ρd/π + ρs (n + 2)/(2π) max(0, wi·axis)ⁿ, axis = mirror direction of wo, or wo | [Lafortune and Willems 1994]; about wo [Lafortune et al. 1997] |
 //! | Ashikhmin-Shirley | diffuse and anisotropic lobe, see [`AshikhminShirley`] | [Ashikhmin and Shirley 2000] |
 //!
-//! None reflects more light than it receives but Oren-Nayar: its albedo at grazing angles is ρ (A + B/2), up to 1.5 %
-//! above ρ near σ = 11°, which the source leaves so.
+//! All models conserve energy except Oren-Nayar. Its albedo at grazing angles is ρ (A + B/2), up to 1.5 % above ρ near
+//! σ = 11°, as in the source.
 
 use super::fresnel::fr_dielectric;
 use lumiris_numbers::math::{Rgb, Vec3, sqr};
@@ -26,14 +26,14 @@ pub struct OrenNayar {
 }
 
 impl OrenNayar {
-    /// `sigma`: standard deviation of the facets' slope angle (radians), kept to 0..π/2.
+    /// `sigma`: standard deviation of the facets' slope angle (radians), clamped to 0..π/2.
     pub fn new(reflectance: Rgb, sigma: f32) -> Self {
         let s2 = sqr(sigma.clamp(0.0, 0.5 * PI));
         let (a, b) = (1.0 - s2 / (2.0 * (s2 + 0.33)), 0.45 * s2 / (s2 + 0.09));
         OrenNayar { base: reflectance * FRAC_1_PI, a, b }
     }
 
-    /// A, which is the albedo over ρ seen along the normal.
+    /// A, the ratio of the albedo for the normal direction to ρ.
     pub fn a(&self) -> f32 {
         self.a
     }
@@ -58,15 +58,15 @@ pub struct CookTorrance {
     base: Rgb,
     /// s.
     amount: f32,
-    /// Index of refraction that gives the reflectance at normal incidence.
+    /// Index of refraction, from the reflectance at normal incidence.
     eta: Rgb,
     /// m: root mean square slope of the facets.
     slope: f32,
 }
 
 impl CookTorrance {
-    /// ρ of the base, reflectance of the facets at normal incidence, their root mean square slope m, and s, the part of
-    /// the surface that is facets (0..1).
+    /// ρ of the base, reflectance of the facets at normal incidence, their root mean square slope m, and s, the facets'
+    /// fraction of the surface (0..1).
     pub fn new(reflectance: Rgb, specular: Rgb, slope: f32, amount: f32) -> Self {
         let amount = amount.clamp(0.0, 1.0);
         let eta = specular.clamp(0.0, 0.9999).map(|f0| (1.0 + f0.sqrt()) / (1.0 - f0.sqrt()));
@@ -86,7 +86,7 @@ impl CookTorrance {
     }
 }
 
-/// What a cosine lobe is about.
+/// The axis of a cosine lobe.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LobeAxis {
     /// The mirror direction of `wo`: the modified Phong model.
@@ -108,7 +108,7 @@ pub struct CosineLobe {
 }
 
 impl CosineLobe {
-    /// ρd, ρs (no more than 1 − ρd, so that energy is kept), n ≥ 0, and the axis.
+    /// ρd, ρs (at most 1 − ρd, so that energy is conserved), n ≥ 0, and the axis.
     pub fn new(reflectance: Rgb, specular: Rgb, exponent: f32, axis: LobeAxis) -> Self {
         let exponent = exponent.max(0.0);
         let part = |s: f32, d: f32| s.min(1.0 - d).max(0.0) * (exponent + 2.0) * (0.5 * FRAC_1_PI);
@@ -128,7 +128,7 @@ impl CosineLobe {
     }
 }
 
-/// Anisotropic lobe over a diffuse base that gives way to it at grazing angles:
+/// Anisotropic lobe over a diffuse base, which loses energy to the lobe at grazing angles:
 ///
 /// f = 28ρd/(23π) (1 − ρs)(1 − (1 − cos θi/2)⁵)(1 − (1 − cos θo/2)⁵)
 ///   + √((nu + 1)(nv + 1))/(8π) (n·h)^((nu hx² + nv hy²)/(1 − hz²)) F(wo·h)/((wo·h) max(cos θi, cos θo)),
@@ -145,7 +145,7 @@ pub struct AshikhminShirley {
 }
 
 impl AshikhminShirley {
-    /// ρd, ρs and the exponents along x and y, which are at least 0.
+    /// ρd, ρs and the exponents along x and y, clamped to at least 0.
     pub fn new(reflectance: Rgb, specular: Rgb, exponents: [f32; 2]) -> Self {
         let [nu, nv] = exponents.map(|n| n.max(0.0));
         let base = reflectance * (Rgb::WHITE - specular) * (28.0 / 23.0 * FRAC_1_PI);
@@ -170,7 +170,7 @@ impl AshikhminShirley {
     }
 }
 
-/// A reflectance that can be evaluated and nothing else.
+/// A reflectance model that can only be evaluated.
 #[derive(Clone, Copy, Debug)]
 pub enum Model {
     /// Lambertian of the given albedo.
@@ -186,7 +186,7 @@ pub enum Model {
 }
 
 impl Model {
-    /// Value without cosine (1/sr) on the side of `wo`; the surface has two equal sides.
+    /// Value without cosine (1/sr) on the side of `wo`; both sides of the surface are equal.
     #[inline]
     pub fn f(&self, wo: Vec3, wi: Vec3) -> Rgb {
         let Some((wo, wi)) = super::to_upper(wo, wi) else { return Rgb::BLACK };

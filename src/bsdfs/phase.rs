@@ -1,7 +1,7 @@
 //! Scattering in a medium, as a BSDF without a surface: the phase function of [Henyey and Greenstein 1941].
 //!
-//! p(θ) = (1 − g²)/(4π (1 + g² + 2g cos θ)^(3/2)), where θ is the angle between `wo` and `wi`, both away from the point: light
-//! that goes straight on has cos θ = −1. It is a density over the sphere, so the weight of a sample is 1, and there is no
+//! p(θ) = (1 − g²)/(4π (1 + g² + 2g cos θ)^(3/2)), where θ is the angle between `wo` and `wi`, both away from the
+//! point: unscattered light has cos θ = −1. p is a density over the sphere, so the weight of a sample is 1. There is no
 //! cosine: [`crate::materials::SurfaceBsdf::cos`] is 1.
 
 use super::{BsdfSample, Lobe};
@@ -11,17 +11,17 @@ use std::f32::consts::{PI, TAU};
 /// The phase function of a medium.
 #[derive(Clone, Copy, Debug)]
 pub struct Phase {
-    /// Mean cosine between the directions of light before and after, −1..1.
+    /// Mean cosine between the directions of propagation before and after scattering, −1..1.
     g: f32,
 }
 
-/// |g| up to which a phase function has a density that f32 can evaluate.
+/// Maximum |g| for which f32 can evaluate the density.
 const MAX_G: f32 = 0.99;
-/// |g| below which it is isotropic.
+/// |g| below which the phase function is isotropic.
 const ISOTROPIC: f32 = 1e-3;
 
 impl Phase {
-    /// Of the asymmetry `g`, which is kept to −0.99..=0.99.
+    /// With the asymmetry `g`, clamped to −0.99..=0.99.
     pub fn new(g: f32) -> Self {
         Phase { g: g.clamp(-MAX_G, MAX_G) }
     }
@@ -31,16 +31,16 @@ impl Phase {
         self.g
     }
 
-    /// p (1/sr), which is also the density of [`Self::sample`].
+    /// p (1/sr), the density of [`Self::sample`].
     #[inline]
     pub fn p(&self, wo: Vec3, wi: Vec3) -> f32 {
         let g = self.g;
-        // The square of a distance, which is positive
+        // A squared distance, which is positive
         let square = (1.0 + g * g + 2.0 * g * wo.dot(wi)).max((1.0 - g.abs()) * (1.0 - g.abs()));
         (1.0 - g * g) / (4.0 * PI * square * square.sqrt())
     }
 
-    /// A direction.
+    /// Samples a direction.
     #[inline]
     pub fn sample(&self, wo: Vec3, u: [f32; 2]) -> Option<BsdfSample> {
         let g = self.g;
@@ -106,7 +106,7 @@ mod tests {
             assert!(!chi.rejected, "g = {g}: {chi:?}");
             let z = z_test(mean.mean(), f64::from(g), mean.standard_error());
             assert!(z.p_value > 1e-4, "the mean cosine of g = {g}: {mean:?}");
-            // Of these, the test finds an asymmetry that is wrong by 0.03
+            // The test detects an error of the asymmetry of 0.03 in these
             let wrong = |i: usize| up_to(f64::from(g) + 0.03, bound(i + 1)) - up_to(f64::from(g) + 0.03, bound(i));
             let expected: Vec<f64> =
                 (0..COSINES * AZIMUTHS).map(|b| wrong(b / AZIMUTHS) / AZIMUTHS as f64 * SAMPLES as f64).collect();

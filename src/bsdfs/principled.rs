@@ -7,12 +7,12 @@ use lumiris_lanes::kernels;
 use lumiris_lanes::kernels::principled::{Choice, PARAMS, Params};
 use lumiris_numbers::math::{Rgb, Vec3};
 
-/// How light passes through.
+/// The interior of the glass.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Interior {
     /// A sheet without thickness.
     Thin,
-    /// A solid of this index of refraction, other than 1.
+    /// A solid with this index of refraction, other than 1.
     Solid(f32),
 }
 
@@ -21,33 +21,33 @@ pub enum Interior {
 pub struct Principled {
     /// Reflectance of the metal, albedo of the diffuse base, transmittance of the glass.
     pub base_color: Rgb,
-    /// Part that is metal.
+    /// Fraction of metal.
     pub metalness: f32,
     /// Reflectance of the dielectric at normal incidence.
     pub f0: Rgb,
     /// Reflectance of the dielectric at grazing angles.
     pub f90: f32,
-    /// Facets; not smooth.
+    /// Microfacets; not smooth.
     pub distribution: TrowbridgeReitz,
-    /// Part of the dielectric that is glass.
+    /// Fraction of glass in the dielectric.
     pub transmission: f32,
-    /// What the glass is.
+    /// The interior of the glass.
     pub interior: Interior,
-    /// Fibres on the base.
+    /// Sheen of fibres on the base.
     pub sheen: Sheen,
     /// Weight of the coat.
     pub coat: f32,
-    /// Facets of the coat; not smooth.
+    /// Microfacets of the coat; not smooth.
     pub coat_distribution: TrowbridgeReitz,
 }
 
-/// Facets that are smooth made as rough as what counts as rough.
+/// Raises the roughness of smooth microfacets to the minimum that is not smooth.
 pub fn rough(distribution: TrowbridgeReitz) -> TrowbridgeReitz {
     TrowbridgeReitz { alpha_x: distribution.alpha_x.max(SMOOTH_ALPHA), alpha_y: distribution.alpha_y.max(SMOOTH_ALPHA) }
 }
 
 impl Principled {
-    /// The index of what is a solid that lets light in.
+    /// The index of refraction of a transmitting solid; `None` for others.
     pub(super) fn eta_mut(&mut self) -> Option<&mut f32> {
         match &mut self.interior {
             Interior::Solid(eta) if self.transmission > 0.0 && self.metalness < 1.0 => Some(eta),
@@ -55,7 +55,7 @@ impl Principled {
         }
     }
 
-    /// The part that is metal or glass.
+    /// Fraction of metal or glass.
     pub fn metal_or_glass(&self) -> f32 {
         self.metalness + (1.0 - self.metalness) * self.transmission
     }
@@ -64,12 +64,12 @@ impl Principled {
         Params::new(&self.params()).choice(wo.into())
     }
 
-    /// Probability of the facets, see [`super::Bsdf::first_lobe`].
+    /// Probability of the microfacet lobes, see [`super::Bsdf::first_lobe`].
     pub(super) fn first_lobe(&self, wo: Vec3) -> f32 {
         self.choice(wo).facets
     }
 
-    /// The strongest lobe that is reflected, see [`super::Bsdf::glossy_lobe`].
+    /// The strongest reflected lobe, see [`super::Bsdf::glossy_lobe`].
     pub(super) fn glossy_lobe(&self, wo: Vec3) -> Option<(TrowbridgeReitz, f32)> {
         let choice = self.choice(wo);
         if self.transmission > 0.0 {
@@ -81,12 +81,12 @@ impl Principled {
         }
     }
 
-    /// Probability of the cosine, see [`super::Bsdf::wide_lobe`].
+    /// Probability of the cosine lobe, see [`super::Bsdf::wide_lobe`].
     pub(super) fn wide_lobe(&self, wo: Vec3) -> f32 {
         self.choice(wo).diffuse
     }
 
-    /// Density of the facets alone, times their probability, see [`super::Bsdf::pdf_first_lobe`].
+    /// Density of the microfacet lobes, including their probability, see [`super::Bsdf::pdf_first_lobe`].
     pub(super) fn pdf_first_lobe(&self, wo: Vec3, wi: Vec3) -> f32 {
         if wo.z * wi.z <= 0.0 {
             return 0.0;

@@ -9,7 +9,7 @@
 //! With M = 1, W = 1/p. In the limit y has the density q̂/∫q̂, which for a grey surface is proportional to f |cos θ|.
 //!
 //! This works for any BSDF model. Specular lobes take part with probabilities in place of p, since f is relative to the
-//! same measure; stochastic values (layered BSDFs) do as well, f being the value that came with the sample.
+//! same measure. So do stochastic values (layered BSDFs), where f is the value returned with the sample.
 
 use super::{Bsdf, Lobe};
 use lumiris_numbers::estimators::ris::Reservoir;
@@ -18,20 +18,20 @@ use lumiris_numbers::math::{Rgb, Vec3};
 /// A resampled direction. The weight of the path is `f·|cos θi|·weight` for all lobes.
 #[derive(Clone, Copy, Debug)]
 pub struct Resampled {
-    /// Value without cosine (1/sr); as the sampler gives it for deltas.
+    /// Value without cosine (1/sr); for deltas, as returned by the sampler.
     pub f: Rgb,
     /// Direction to the light.
     pub wi: Vec3,
-    /// W: what takes the place of 1/pdf (sr).
+    /// W, in place of 1/pdf (sr).
     pub weight: f32,
     /// Kind of scattering.
     pub lobe: Lobe,
-    /// Index of refraction of the side of `wi` relative to that of `wo`; 1 for reflection.
+    /// Index of refraction on the side of `wi` relative to the side of `wo`; 1 for reflection.
     pub eta: f32,
 }
 
-/// Draws one of `proposals` (M, at least 1) samples of `bsdf`. `u_proposal(j)` are the numbers of proposal j, the first
-/// of them chooses the lobe; `u_choice` chooses among the proposals. `None` if no proposal carries light.
+/// Chooses one of `proposals` (M, at least 1) samples of `bsdf`. `u_proposal(j)` are the random numbers of proposal j,
+/// the first of which chooses the lobe; `u_choice` chooses among the proposals. `None` if no proposal carries light.
 pub fn resample(
     bsdf: &Bsdf<'_>,
     wo: Vec3,

@@ -6,7 +6,7 @@ use lumiris_numbers::math::Rgb;
 /// A layer of sheen.
 #[derive(Clone, Copy, Debug)]
 pub struct Sheen {
-    /// Its colour; black is none.
+    /// Its colour; black for no sheen.
     pub color: Rgb,
     /// Its roughness, from [`LEAST_ALPHA`] to 1.
     pub alpha: f32,
@@ -40,7 +40,7 @@ mod tests {
 
     #[test]
     fn facets_cover_the_surface() {
-        // ∫ D cos θ = 1, which D's factor is for
+        // ∫ D cos θ = 1, by the normalisation of D
         for alpha in [0.1, 0.5, 1.0_f32] {
             let n = 20_000;
             let sum: f32 = (0..n)

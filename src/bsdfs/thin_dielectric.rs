@@ -3,7 +3,7 @@
 use super::KernelBsdf;
 use lumiris_lanes::kernels;
 
-/// Thin sheet: mirror and straight transmission.
+/// Thin sheet: mirror reflection and straight transmission.
 #[derive(Clone, Copy, Debug)]
 pub struct ThinDielectric {
     /// Index of refraction of the sheet relative to both sides.

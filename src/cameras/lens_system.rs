@@ -1,45 +1,45 @@
 //! Systems of spherical lenses, traced surface by surface [Kolb et al. 1995].
 //!
-//! The film lies in the plane z = 0, the scene is at greater z. Lengths are metres, as in pbrt-v4. Directions of a point of the film are chosen
-//! in the *exit pupil*: the part of the plane of the rear surface's vertex that light leaves through, seen from that point. Its
-//! bounds are found in advance for rings of the film. The measured quantity is irradiance
-//! E = ∫ L cos⁴θ / s² dA over the pupil, where s is the distance of the plane.
+//! The film lies in the plane z = 0, and the scene has greater z. Lengths are in metres, as in pbrt-v4. Rays from a
+//! point of the film are sampled in its *exit pupil*: the part of the rear vertex plane through which light reaches
+//! that point. Bounds of the exit pupils are precomputed for rings of the film. The measured quantity is the irradiance
+//! E = ∫ L cos⁴θ / s² dA over the pupil, where s is the distance of the plane from the film.
 
 use lumiris_numbers::math::{DVec2, DVec3, Vec2, Vec3};
 use rayon::prelude::*;
 use std::f64::consts::{FRAC_PI_4, PI};
 
-/// Rings of the film that have an exit pupil each.
+/// Number of film rings, each with its exit pupil.
 const RINGS: usize = 64;
-/// Points along each edge of the square that is searched for an exit pupil, and places in a ring.
+/// Points along each edge of the search square for an exit pupil, and film positions within a ring.
 const SEARCH: [usize; 2] = [96, 3];
-/// Half that square's edge, relative to the radius of the rear surface.
+/// Half the edge of the search square, relative to the radius of the rear surface.
 const SEARCHED: f64 = 1.5;
 
 /// A surface of a lens system.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LensElement {
-    /// Radius of curvature (m): positive where the centre is on the side of the film, 0 for the aperture stop.
+    /// Radius of curvature (m): positive if the centre is on the film side; 0 for the aperture stop.
     pub curvature_radius: f64,
-    /// Distance to the next surface on the side of the film (m).
+    /// Distance to the next surface on the film side (m).
     pub thickness: f64,
-    /// Index of refraction of what is between them; 0 and 1 are air.
+    /// Index of refraction of the medium up to that surface; 0 and 1 are air.
     pub eta: f64,
     /// Radius of the opening (m).
     pub aperture_radius: f64,
 }
 
-/// What the stop lets through, within its radius.
+/// Transmission of the stop within its radius.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub enum Aperture {
     /// Everything.
     #[default]
     Circle,
-    /// Less towards the edge.
+    /// Transmission that decreases towards the edge.
     Gaussian,
-    /// What is in a star-shaped polygon around the centre: its corners, in order.
+    /// A star-shaped polygon around the centre: its corners, in order.
     Polygon(Vec<[f64; 2]>),
-    /// What an image says: its texels over −1..1 in both directions, rows from the top.
+    /// Transmission by an image: its texels over −1..1 in both directions, rows from the top.
     Image(Vec<f32>, [usize; 2]),
 }
 
@@ -50,29 +50,29 @@ pub struct LensRay {
     pub o: Vec3,
     /// Unit direction.
     pub d: Vec3,
-    /// cos⁴θ/s² over the density of the point of the pupil, times what the stop lets through; 0 where the lenses stop light,
-    /// and the ray is that of the middle of the pupil.
+    /// cos⁴θ/s² times the transmission of the stop, over the density of the pupil point. 0 if the lenses block the
+    /// light; the ray is then the ray through the middle of the pupil.
     pub weight: f32,
 }
 
-/// An exit pupil, as seen from a ring of the film where it meets the x axis.
+/// An exit pupil for a ring of the film, at the intersection of the ring with the x axis.
 #[derive(Clone, Copy, Debug)]
 struct Pupil {
     min: DVec2,
     max: DVec2,
-    /// The mean of the points that light passes.
+    /// The mean of the points that transmit light.
     middle: DVec2,
 }
 
 /// A lens system in front of a film, in focus.
 #[derive(Clone, Debug)]
 pub struct LensSystem {
-    /// From the front to the rear.
+    /// Surfaces from front to rear.
     elements: Vec<LensElement>,
     /// Distances of the vertices from the film.
     z: Vec<f64>,
     aperture: Aperture,
-    /// By which weights are multiplied, so that all shapes of the aperture let as much through as a circle.
+    /// Factor of the weights that gives all aperture shapes the same total transmission as a circle.
     aperture_scale: f64,
     /// Half the diagonal of the film.
     film_radius: f64,
@@ -83,8 +83,10 @@ pub struct LensSystem {
 }
 
 impl LensSystem {
-    /// Places the film so that points at `focus_distance` (m, from the film) are sharp near the axis. `diagonal` is the film's (m).
-    /// `Err` says what is wrong with the lenses, or that they cannot focus.
+    /// Positions the film such that points at `focus_distance` (m, from the film) are in focus near the axis.
+    /// `diagonal` is the diagonal of the film (m).
+    ///
+    /// Returns `Err` with a message if the lenses are invalid or cannot focus.
     pub fn new(
         elements: &[LensElement],
         aperture: Aperture,
@@ -134,7 +136,7 @@ impl LensSystem {
         self.focal_length
     }
 
-    /// A ray of the film point (x, y), through the point of the exit pupil that `u` chooses.
+    /// A ray from the film point (x, y) through the point of the exit pupil given by `u`.
     pub fn sample(&self, film: Vec2, u: [f32; 2]) -> LensRay {
         let film = film.as_dvec2();
         let r = film.length();
@@ -149,19 +151,19 @@ impl LensSystem {
         middle.unwrap_or(LensRay { o: Vec3::Z * self.z[0] as f32, d: Vec3::Z, weight: 0.0 })
     }
 
-    /// Angle between the rays of film points at (x, y) whose distance is 1 m, as far as it is small (radians).
+    /// Angle between the rays of film points 1 m apart around (x, y), by linearisation (radians).
     pub fn spread(&self, film: Vec2) -> f32 {
         let tangent = f64::from(film.length()) / self.image_distance;
         self.spread_towards((1.0 / (1.0 + tangent * tangent).sqrt()) as f32)
     }
 
-    /// The same towards points at the cosine `cos` to the axis.
+    /// The same for points in a direction at the cosine `cos` to the axis.
     pub fn spread_towards(&self, cos: f32) -> f32 {
         (f64::from(cos).powf(1.5) / self.image_distance) as f32
     }
 
-    /// The ray (of weight 0) from a film point through a point of the rear plane, which is given for film points on the x
-    /// axis and turned to this one; cos⁴θ/s², and what the stop lets through.
+    /// The ray (with weight 0) from a film point through a point of the rear plane; cos⁴θ/s²; and the transmission of
+    /// the stop. `rear` is given for film points on the x axis and is rotated to this one.
     fn through(&self, film: DVec2, rear: DVec2) -> Option<((LensRay, f64), f64)> {
         let r = film.length();
         let axis = if r > 0.0 { film / r } else { DVec2::X };
@@ -177,8 +179,8 @@ impl LensSystem {
         self.z[self.z.len() - 1]
     }
 
-    /// Follows a ray from the film to where it leaves the front surface: its point there, its direction, and the fraction
-    /// of the light that the stop lets through.
+    /// Traces a ray from the film to the front surface. Returns its exit point, its direction, and the transmission of
+    /// the stop.
     fn trace(&self, mut o: DVec3, mut d: DVec3) -> Option<(DVec3, DVec3, f64)> {
         let mut through = 1.0;
         for (i, element) in self.elements.iter().enumerate().rev() {
@@ -187,6 +189,8 @@ impl LensSystem {
             if t < 0.0 {
                 return None;
             }
+
+            // Vignetting by the rim
             o += d * t;
             if o.truncate().length_squared() > element.aperture_radius * element.aperture_radius {
                 return None;
@@ -198,6 +202,8 @@ impl LensSystem {
                 }
                 continue;
             }
+
+            // Refraction
             let n = (DVec3::Z * (z - radius) - o) / radius;
             let [from, to] = [element.eta, self.eta_before(i)];
             d = refract(d, if n.dot(d) < 0.0 { n } else { -n }, from.max(1.0) / to)?;
@@ -205,21 +211,21 @@ impl LensSystem {
         Some((o, d, through))
     }
 
-    /// Index of refraction on the scene's side of a surface.
+    /// Index of refraction on the scene side of a surface.
     fn eta_before(&self, i: usize) -> f64 {
         if i == 0 { 1.0 } else { self.elements[i - 1].eta.max(1.0) }
     }
 
-    /// Where light of a ring of the film passes the rear plane; nothing: a pupil of negative size.
+    /// The exit pupil of a ring of the film. It has a negative size if no light passes.
     fn pupil(&self, ring: usize) -> Pupil {
         let half = DVec2::splat(SEARCHED * self.elements[self.elements.len() - 1].aperture_radius);
         let everywhere = Pupil { min: -half, max: half, middle: DVec2::ZERO };
-        // Of a narrow stop, the first search finds few points, and the second those around them
+        // For a narrow stop, the first search finds few points; the second one refines around them
         let found = self.search(ring, &everywhere).and_then(|near| self.search(ring, &near));
         found.unwrap_or(Pupil { min: DVec2::ZERO, max: DVec2::NEG_INFINITY, middle: DVec2::ZERO })
     }
 
-    /// Where light of a ring passes a rectangle of the rear plane.
+    /// Bounds of the points in a rectangle of the rear plane that transmit light to a ring.
     fn search(&self, ring: usize, within: &Pupil) -> Option<Pupil> {
         let cell = (within.max - within.min) / SEARCH[0] as f64;
         let (mut min, mut max, mut sum, mut count) = (DVec2::INFINITY, DVec2::NEG_INFINITY, DVec2::ZERO, 0.0);
@@ -234,13 +240,13 @@ impl LensSystem {
                 }
             }
         }
-        // What the search misses is less than a cell away
+        // The search is exact up to one cell
         (count > 0.0).then(|| Pupil { min: min - cell, max: max + cell, middle: sum / count })
     }
 }
 
 impl Aperture {
-    /// A shape by the name that pbrt-v4 gives it.
+    /// An aperture shape by its name in pbrt-v4.
     pub fn named(name: &str) -> Option<Self> {
         let polygon = |corners: usize, radii: [f64; 2], turn: f64| {
             let corner = |i: usize| {
@@ -262,7 +268,7 @@ impl Aperture {
     /// The names of all shapes.
     pub const NAMES: [&str; 5] = ["circle", "gaussian", "square", "pentagon", "star"];
 
-    /// The fraction that passes at a point of the unit disk.
+    /// The transmission at a point of the unit disk.
     fn at(&self, p: DVec2) -> f64 {
         match self {
             Aperture::Circle => 1.0,
@@ -281,7 +287,7 @@ impl Aperture {
         }
     }
 
-    /// By how much more a circle lets through; 1 where nothing passes.
+    /// Ratio of a circle's total transmission to this shape's; 1 if the shape is opaque.
     fn scale(&self) -> f64 {
         const POINTS: usize = 512;
         let place = |i: usize| (i as f64 + 0.5) / POINTS as f64 * 2.0 - 1.0;
@@ -292,7 +298,7 @@ impl Aperture {
     }
 }
 
-/// `Err` says which surface is impossible.
+/// Returns `Err` with a message if a surface is invalid.
 fn check(elements: &[LensElement]) -> Result<(), String> {
     if elements.is_empty() {
         return Err("there are no surfaces".to_owned());
@@ -318,7 +324,7 @@ fn check(elements: &[LensElement]) -> Result<(), String> {
     }
 }
 
-/// The matrix [A, B, C, D] that takes (height, angle) at the rear surface to those at the front, for rays near the axis.
+/// The paraxial matrix [A, B, C, D] that takes (height, angle) at the rear surface to the front surface.
 fn paraxial(elements: &[LensElement]) -> [f64; 4] {
     let mut m = [1.0, 0.0, 0.0, 1.0];
     for (i, e) in elements.iter().enumerate().rev() {
@@ -334,16 +340,16 @@ fn paraxial(elements: &[LensElement]) -> [f64; 4] {
     m
 }
 
-/// Where a ray meets a sphere around (0, 0, `center`), on the side of its vertex.
+/// Ray parameter of the intersection with a sphere around (0, 0, `center`), on the side of its vertex.
 fn at_sphere(o: DVec3, d: DVec3, center: f64, radius: f64) -> Option<f64> {
     let to = o - DVec3::Z * center;
     let b = to.dot(d);
     let root = b * b - to.length_squared() + radius * radius;
-    // A vertex towards the scene is where rays leave the sphere
+    // If the vertex points to the scene, take the exit of the sphere
     (root >= 0.0).then(|| -b + root.sqrt().copysign(radius))
 }
 
-/// The refracted direction; `n` is against `d`, `eta` the ratio of indices. `None`: total reflection.
+/// The refracted direction. `n` points against `d`; `eta` is the ratio of the indices. `None` for total reflection.
 fn refract(d: DVec3, n: DVec3, eta: f64) -> Option<DVec3> {
     let cos = -d.dot(n);
     let root = 1.0 - eta * eta * (1.0 - cos * cos);

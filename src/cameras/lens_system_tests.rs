@@ -19,7 +19,7 @@ const DOUBLE_GAUSS: [[f64; 4]; 11] = [
 /// A film of 24 mm × 36 mm.
 const DIAGONAL: f64 = 0.0432666;
 
-/// With a stop of a diameter (mm).
+/// The lens with a stop of the given diameter (mm).
 fn elements(stop: f64) -> Vec<LensElement> {
     let of = |[radius, thickness, eta, diameter]: [f64; 4]| LensElement {
         curvature_radius: radius / 1e3,
@@ -42,7 +42,7 @@ fn the_focal_length_is_that_of_the_patent_and_the_film_is_where_points_are_sharp
     let object = 1.0 / (1.0 / lens.focal_length() - 1.0 / lens.image_distance);
     assert!((object / 1.5 - 1.0).abs() < 0.06, "{object}");
 
-    // Rays of a point of the film meet in the plane that is in focus, where it is seen at a magnification of image/object
+    // Rays of a film point meet in the focus plane, with a magnification of image/object
     for focus in [0.6, 1.5, 30.0] {
         let lens = double_gauss(0.5, focus);
         let mut stream = pcg32([1, 2, 3]);
@@ -64,7 +64,7 @@ fn samples_have_the_irradiance_of_all_directions() {
     for stop in [17.1, 6.0] {
         let lens = double_gauss(stop, 2.0);
         for film in [Vec2::ZERO, Vec2::new(0.009, 0.004), Vec2::new(-0.015, -0.01)] {
-            // ∫ cos⁴θ/s² over all of the rear plane that light can pass
+            // ∫ cos⁴θ/s² over the part of the rear plane that transmits light
             let (half, n) = (2.0 * lens.elements[10].aperture_radius, 500);
             let cell = 2.0 * half / f64::from(n);
             let place = |i: i32| (f64::from(i) + 0.5) * cell - half;
@@ -77,7 +77,7 @@ fn samples_have_the_irradiance_of_all_directions() {
             let (sum, squares) = (0..samples).map(of).fold((0.0, 0.0), |(s, q), w| (s + w, q + w * w));
             let mean = sum / f64::from(samples);
             let error = ((squares / f64::from(samples) - mean * mean) / f64::from(samples)).sqrt();
-            // Rounding of the grid at the edge of the pupil, and noise; 2 % would be found
+            // Tolerance: rounding of the grid at the edge of the pupil, and noise; an error of 2 % would be detected
             assert!((mean / expected - 1.0).abs() < 0.004 + 4.0 * error / expected, "{stop} {film}: {mean} {expected}");
             assert!(error < 0.004 * mean);
             if film == Vec2::ZERO && stop == 17.1 {

@@ -1,16 +1,16 @@
-//! What compositing programs want to know of a camera: the matrices of OpenEXR's standard attributes.
+//! Camera matrices for compositing programs: the standard attributes of OpenEXR.
 
 use super::Camera;
 use lumiris_numbers::math::{Mat4, Vec4};
 
 impl Camera {
-    /// From world space to the space of the camera when its motion begins: x right, y up, z forward.
+    /// From world space to camera space at the start of the motion: x right, y up, z forward.
     pub fn camera_from_world(&self) -> Mat4 {
         Mat4::from(self.base().world_from_camera[0].inverse())
     }
 
-    /// From world space to the image: (0, 0) is its upper left corner, (1, 1) the lower right one, after division by w.
-    /// Spherical cameras have no such matrix, and those with lenses none that is exact.
+    /// From world space to the image, after division by w: (0, 0) is its upper left corner, (1, 1) the lower right one.
+    /// `None` for spherical cameras, which have no such matrix, and for lens systems, for which no matrix is exact.
     pub fn ndc_from_world(&self) -> Option<Mat4> {
         let (window, scale, is_perspective) = match self {
             Camera::Perspective { screen_window, tan_half_fov, .. } => (screen_window, *tan_half_fov, true),

@@ -1,8 +1,8 @@
 //! Cameras: generate a ray from a film position, a lens sample and a time.
 //!
-//! Camera space is that of pbrt: x right, y up, z forward. The camera transform may mirror and scale. Raster
-//! coordinates have their origin at the upper left, one unit per pixel, y down. The screen window `[x0, x1, y0, y1]` is
-//! the part of the screen covered by the film; by default it spans −1..1 on the shorter axis.
+//! Camera space is as in pbrt: x right, y up, z forward. The camera transform may reflect and scale. Raster coordinates
+//! have their origin at the upper left, one unit per pixel, y down. The screen window `[x0, x1, y0, y1]` is the part of
+//! the screen covered by the film; by default it spans −1..1 on the shorter axis.
 
 mod lens_system;
 mod matrices;
@@ -29,7 +29,7 @@ pub struct CameraRay {
     pub weight: f32,
 }
 
-/// Where the camera sees a point.
+/// The projection of a point onto the film.
 #[derive(Clone, Copy, Debug)]
 pub struct Projection {
     /// The raster point.
@@ -40,7 +40,7 @@ pub struct Projection {
     pub density: f32,
 }
 
-/// How a spherical camera maps its film.
+/// Mapping from the film of a spherical camera to directions.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SphericalMapping {
     /// Longitude and colatitude.
@@ -49,10 +49,10 @@ pub enum SphericalMapping {
     EqualArea,
 }
 
-/// What all cameras have.
+/// The common part of all cameras.
 #[derive(Clone, Debug)]
 pub struct CameraBase {
-    /// At equidistant times 0..=1, linear between them; one if the camera does not move.
+    /// Transforms at equidistant times 0..=1, interpolated linearly; a single one if the camera does not move.
     world_from_camera: Arc<[Affine3A]>,
     resolution: Vec2,
     shutter: [f32; 2],
@@ -63,7 +63,7 @@ pub struct CameraBase {
 pub struct Lens {
     /// Radius of the aperture; 0 for a pinhole.
     pub radius: f32,
-    /// Distance of the plane in focus, along z.
+    /// Distance of the focus plane, along z.
     pub focal_distance: f32,
 }
 
@@ -76,7 +76,7 @@ pub enum Camera {
         base: CameraBase,
         /// Screen window.
         screen_window: [f32; 4],
-        /// Half the width of the plane z = 1 that is one screen unit.
+        /// Length of one screen unit on the plane z = 1.
         tan_half_fov: f32,
         /// Lens.
         lens: Lens,
@@ -90,7 +90,7 @@ pub enum Camera {
         /// Lens.
         lens: Lens,
     },
-    /// All directions from a point; y is up, the middle of an equirectangular film looks along −x.
+    /// All directions from a point; y is up, the middle of an equirectangular film faces −x.
     Spherical {
         /// Common part.
         base: CameraBase,
@@ -108,7 +108,7 @@ pub enum Camera {
     },
 }
 
-/// The screen window of a frame of the given width over height: −1..1 on the shorter axis.
+/// The screen window for a frame of the given aspect ratio (width over height): −1..1 on the shorter axis.
 pub fn default_screen_window(frame_aspect: f32) -> [f32; 4] {
     if frame_aspect > 1.0 {
         [-frame_aspect, frame_aspect, -1.0, 1.0]
@@ -123,7 +123,7 @@ impl CameraBase {
         CameraBase { world_from_camera: Arc::new([world_from_camera]), resolution, shutter: [0.0, 1.0] }
     }
 
-    /// The ray of a point and a direction of camera space.
+    /// The ray of a point and a direction given in camera space.
     #[inline]
     fn ray(&self, o: Vec3, d: Vec3, time_u: f32) -> Ray {
         let time = self.time(time_u);
@@ -132,13 +132,13 @@ impl CameraBase {
         Ray { o: world_from_camera.transform_point3(o), d, t_max: f32::INFINITY, time }
     }
 
-    /// Time of the number `time_u` in 0..1.
+    /// Time for the random number `time_u` in 0..1.
     #[inline]
     fn time(&self, time_u: f32) -> f32 {
         self.shutter[0] + time_u * (self.shutter[1] - self.shutter[0])
     }
 
-    /// Film to screen.
+    /// Film coordinates to screen coordinates.
     #[inline]
     fn screen_point(&self, window: &[f32; 4], film_xy: Vec2) -> Vec2 {
         let p = film_xy / self.resolution;
@@ -158,7 +158,7 @@ impl CameraBase {
         (self.pixel_area(window) * cos).sqrt() * cos * tan_half_fov
     }
 
-    /// The same of a spherical camera, at the sine `sin` to its upward axis.
+    /// The same for a spherical camera, at the sine `sin` to its upward axis.
     #[inline]
     fn spherical_spread(&self, mapping: SphericalMapping, sin: f32) -> f32 {
         let pixels = self.resolution.x * self.resolution.y;
@@ -179,8 +179,8 @@ impl CameraBase {
 }
 
 impl Lens {
-    /// The same ray through a point of the lens: all rays of one film point meet in the plane z = focal distance.
-    /// `d.z` is positive.
+    /// The ray through a point of the lens: all rays of one film point meet in the plane z = focal distance. `d.z` must
+    /// be positive.
     #[inline]
     fn through(&self, o: Vec3, d: Vec3, u: [f32; 2]) -> (Vec3, Vec3) {
         if self.radius <= 0.0 {
@@ -193,8 +193,8 @@ impl Lens {
 }
 
 impl Camera {
-    /// A perspective camera. `fov_degrees` is the angle that −1..1 of the screen subtends, so with the default screen
-    /// window that of the shorter axis.
+    /// A perspective camera. `fov_degrees` is the angle of −1..1 on the screen; with the default screen window this is
+    /// the field of view of the shorter axis.
     pub fn perspective(
         world_from_camera: Affine3A,
         fov_degrees: f32,
@@ -220,35 +220,35 @@ impl Camera {
         Camera::Orthographic { base: CameraBase::new(world_from_camera, resolution), screen_window, lens }
     }
 
-    /// A camera that sees all directions.
+    /// A camera with all directions.
     pub fn spherical(world_from_camera: Affine3A, resolution: [u32; 2], mapping: SphericalMapping) -> Self {
         Camera::Spherical { base: CameraBase::new(world_from_camera, resolution), mapping }
     }
 
-    /// A camera whose film, with a diagonal (m), lies behind lenses.
+    /// A camera with a film of the given diagonal (m) behind lenses.
     pub fn realistic(world_from_camera: Affine3A, resolution: [u32; 2], diagonal: f32, lens: LensSystem) -> Self {
         let base = CameraBase::new(world_from_camera, resolution);
         let film_size = base.resolution * (diagonal / base.resolution.length());
         Camera::Realistic { base, film_size, lens: Arc::new(lens) }
     }
 
-    /// The same camera with a shutter that is open from `open` to `close`, in the unit of time in which instances move
-    /// from 0 to 1. Without this it is open from 0 to 1.
+    /// Sets the shutter interval from `open` to `close`, in the time unit in which instances move from 0 to 1. The
+    /// default is from 0 to 1.
     #[must_use]
     pub fn with_shutter(mut self, open: f32, close: f32) -> Self {
         self.base_mut().shutter = [open, close];
         self
     }
 
-    /// The same camera, placed at equidistant times 0..=1, in which instances move from 0 to 1. It moves linearly between
-    /// them. There is at least one.
+    /// Sets the transforms at equidistant times 0..=1, in the time unit in which instances move from 0 to 1. The camera
+    /// moves linearly between them. There must be at least one.
     #[must_use]
     pub fn moving(mut self, world_from_camera: &[Affine3A]) -> Self {
         self.base_mut().world_from_camera = world_from_camera.into();
         self
     }
 
-    /// True if it moves, so that time matters.
+    /// True if the camera moves, so that time matters.
     pub fn is_moving(&self) -> bool {
         self.base().world_from_camera.len() > 1
     }
@@ -271,7 +271,7 @@ impl Camera {
         }
     }
 
-    /// What makes many rays at once, if the camera has no lens and does not move, and the point that they come from.
+    /// A batch generator of rays and their common origin; `None` if the camera has a lens or moves.
     pub fn pinhole(&self) -> Option<(Pinhole, Vec3)> {
         let Camera::Perspective { base, screen_window, tan_half_fov, lens } = self else { return None };
         let [world_from_camera] = &*base.world_from_camera else { return None };
@@ -285,7 +285,7 @@ impl Camera {
         (lens.radius <= 0.0).then(|| (pinhole, world_from_camera.transform_point3(Vec3::ZERO)))
     }
 
-    /// Time of the number `time_u` in 0..1.
+    /// Time for the random number `time_u` in 0..1.
     pub fn time(&self, time_u: f32) -> f32 {
         self.base().time(time_u)
     }
@@ -318,7 +318,7 @@ impl Camera {
                 CameraRay { ray: base.ray(Vec3::ZERO, d, time_u), spread, width0: 0.0, weight: 1.0 }
             }
             Camera::Realistic { base, film_size, lens } => {
-                // The film sees the scene upside down and mirrored: its upper left corner is at the lower right
+                // The image on the film is upside down and mirrored: its upper left corner is at the lower right
                 let p = (film_xy / base.resolution - 0.5) * *film_size * Vec2::new(-1.0, 1.0);
                 let s = lens.sample(p, u_lens);
                 let spread = lens.spread(p) * film_size.x / base.resolution.x;
@@ -329,9 +329,9 @@ impl Camera {
 }
 
 impl Camera {
-    /// Width of a pixel (scene units) at the point `p` of world space if the camera saw it directly at the time `time`,
-    /// beside the image or behind the camera by the same formula. Unlike the width along a path it depends on nothing but
-    /// the point, so all techniques that find a path agree on it [Pharr et al. 2023, §10.1.3].
+    /// Width of a pixel (scene units) at the point `p` of world space, as seen directly by the camera at the time
+    /// `time`. Points outside of the image or behind the camera use the same formula. Unlike the width along a path, it
+    /// depends only on the point, so all techniques that sample a path agree on it [Pharr et al. 2023, §10.1.3].
     #[inline]
     pub fn pixel_width(&self, p: Vec3, time: f32) -> f32 {
         let base = self.base();
@@ -357,13 +357,14 @@ impl Camera {
         }
     }
 
-    /// True if [`Self::project`] knows where it sees points.
+    /// True if the camera supports [`Self::project`].
     pub fn projects(&self) -> bool {
         matches!(self, Camera::Perspective { .. })
     }
 
-    /// Where the point `p` of world space is seen through the point `u_lens` of the lens at `time_u` of the shutter
-    /// interval, on the film or beside it; `None` behind the camera, and for cameras that are not perspective.
+    /// Projects the point `p` of world space through the point `u_lens` of the lens at `time_u` of the shutter
+    /// interval, onto the film or beyond its edges. `None` for points behind the camera, and for cameras that are not
+    /// perspective.
     pub fn project(&self, p: Vec3, u_lens: [f32; 2], time_u: f32) -> Option<Projection> {
         let Camera::Perspective { base, screen_window, tan_half_fov, lens } = self else { return None };
         let world_from_camera = placement_at(&base.world_from_camera, base.time(time_u));
@@ -374,14 +375,14 @@ impl Camera {
             return None;
         }
 
-        // All rays of a film point meet in the plane in focus
+        // All rays of a film point meet in the focus plane
         let distance = if lens.radius > 0.0 { lens.focal_distance } else { 1.0 };
         let focus = on_lens + d * (distance / d.z);
         let screen = focus.truncate() / (distance * *tan_half_fov);
         let [x0, x1, y0, y1] = *screen_window;
         let film_xy = Vec2::new((screen.x - x0) / (x1 - x0), (y1 - screen.y) / (y1 - y0)) * base.resolution;
 
-        // From the solid angle of world space to that of camera space, the plane in focus, and the film
+        // Chain of area ratios: solid angle in world space, in camera space, focus plane, film
         let direction = d.normalize();
         let stretched = world_from_camera.transform_vector3(direction).length();
         let solid_angle = stretched.powi(3) / world_from_camera.matrix3.determinant().abs();
@@ -423,7 +424,7 @@ mod tests {
         near(d(100.0, 0.0), Vec3::new(0.0, t, 1.0).normalize());
         near(d(0.0, 0.0), Vec3::new(-2.0 * t, t, 1.0).normalize());
         near(d(200.0, 100.0), Vec3::new(2.0 * t, -t, 1.0).normalize());
-        // The field of view is that of the shorter axis.
+        // The field of view is measured along the shorter axis.
         let angle = d(100.0, 0.0).angle_between(d(100.0, 100.0)).to_degrees();
         assert!((angle - 60.0).abs() < 1e-3, "{angle}");
         let tall = Camera::perspective(Affine3A::IDENTITY, 60.0, default_screen_window(0.5), [50, 100], 0.0, 1e6);
@@ -448,7 +449,7 @@ mod tests {
                 let seen = camera.project(ray.at(t), u, 0.5).unwrap();
                 assert!((seen.film_xy - film).length() < 1e-2, "{} {film}", seen.film_xy);
                 near(seen.o, ray.o);
-                // The solid angle of a square of the film, by its sides
+                // The solid angle of a square of the film, by its edges
                 let h = 0.25;
                 let side = |d: Vec2| at(film + d * h).d - at(film - d * h).d;
                 let solid_angle = side(Vec2::X).cross(side(Vec2::Y)).length();
@@ -603,7 +604,7 @@ mod tests {
         near(d(EqualArea, 50.0, 50.0), Vec3::Y);
         near(d(EqualArea, 100.0, 50.0), Vec3::X);
         near(d(EqualArea, 50.0, 100.0), Vec3::Z);
-        // Filters reach over the edge.
+        // Filters extend over the edge.
         assert!((d(EqualArea, -0.5, 20.0) - d(EqualArea, 0.5, 80.0)).length() < 1e-5);
     }
 

@@ -1,7 +1,7 @@
 //! Meshes of bilinear patches.
 //!
-//! A ray hits the patch where it meets one of the segments from edge p00–p10 to edge p01–p11: a quadratic in u
-//! [Reshetov 2019], solved in f64, so that only the rounding of the ray itself limits the accuracy.
+//! A ray hits the patch where it intersects one of the segments from edge p00–p10 to edge p01–p11: a quadratic equation
+//! in u [Reshetov 2019]. It is solved in f64, so that only the rounding of the ray itself limits the accuracy.
 
 use super::hit::{LocalHit, SurfaceHit, VertexValues, face_forward, round, spanning};
 use glam::DVec3;
@@ -19,14 +19,14 @@ pub struct BilinearMesh {
     pub normals: Vec<Vec3>,
     /// Texture coordinates per vertex, or empty.
     pub uvs: Vec<Vec2>,
-    /// Number of the face that each patch is, or empty.
+    /// Face number of each patch, or empty.
     pub faces: Vec<u32>,
     /// True if the geometric normal is the reverse of ∂p/∂u × ∂p/∂v.
     pub flip_normal: bool,
 }
 
 impl BilinearMesh {
-    /// The patches placed by a transformation, which may flatten them.
+    /// The transformed patches; the transformation may be singular.
     #[must_use]
     pub fn transformed(&self, m: &Affine3A) -> Self {
         let mut mesh = self.clone();
@@ -42,7 +42,7 @@ impl BilinearMesh {
         self.indices.len()
     }
 
-    /// Bounds of all vertices that patches use; a patch lies in the hull of its corners.
+    /// Bounds of all vertices in use; a patch lies in the convex hull of its corners.
     pub fn bounds(&self) -> Bounds3 {
         Bounds3::from_points(self.indices.iter().flatten().map(|&v| self.positions[v as usize]))
     }
@@ -70,7 +70,7 @@ impl BilinearMesh {
         let [p00, p10, p01, p11] = corners.map(|p| p.as_dvec3() - o);
         let (e00, e11, e10) = (p01 - p00, p11 - p10, p10 - p00);
 
-        // The quadratic a u² + b u + c of the lines that meet the ray.
+        // The quadratic a u² + b u + c, whose roots are the lines that intersect the ray.
         let a = e10.cross(p01 - p11).dot(d);
         let c = p00.cross(d).dot(e00);
         let b = p10.cross(d).dot(e11) - (a + c);
@@ -113,7 +113,7 @@ impl BilinearMesh {
         let p_error = corners.iter().fold(Vec3::ZERO, |m, p| m.max(p.abs())) * gamma(7);
         let (du, dv) = ((p10 - p00).lerp(p11 - p01, v), (p01 - p00).lerp(p11 - p10, u));
 
-        // Geometric normal; at a collapsed edge that of the diagonals.
+        // Geometric normal; at a collapsed edge, the normal of the diagonals.
         let n = du.cross(dv).try_normalize().unwrap_or_else(|| (p10 - p01).cross(p11 - p00).normalize_or_zero());
         let n = if self.flip_normal { -round(n) } else { round(n) };
         let blend = |values: &[Vec3]| {
@@ -130,7 +130,7 @@ impl BilinearMesh {
         SurfaceHit { p, p_error, n, ns, dpdu, dpdv, dpdus: dpdu, dpdvs: dpdv, uv, vertex: self.vertex_values_of(i) }
     }
 
-    /// What patch `i` has besides the texture coordinates.
+    /// Vertex values of patch `i`.
     #[inline]
     pub fn vertex_values_of(&self, i: usize) -> VertexValues {
         VertexValues { face: self.faces.get(i).copied().unwrap_or(0), ..VertexValues::default() }
@@ -146,7 +146,7 @@ impl BilinearMesh {
         s00.lerp(s10, uv[0]).lerp(s01.lerp(s11, uv[0]), uv[1])
     }
 
-    /// Derivatives of p by the texture coordinates at `uv` of patch `i`; by u and v where they are singular.
+    /// Derivatives of p by the texture coordinates at `uv` of patch `i`; by u and v if they are singular.
     fn texture_derivatives(&self, i: usize, uv: [f32; 2], [du, dv]: [DVec3; 2]) -> (Vec3, Vec3) {
         if self.uvs.is_empty() {
             return (round(du), round(dv));
@@ -162,7 +162,7 @@ impl BilinearMesh {
     }
 }
 
-/// The real roots of a x² + b x + c in ascending order; a single root twice; `None` if there is none.
+/// The real roots of a x² + b x + c in ascending order; a double root twice; `None` if there is none.
 pub(super) fn solve_quadratic(a: f64, b: f64, c: f64) -> Option<[f64; 2]> {
     let discriminant = b * b - 4.0 * a * c;
     if discriminant.is_nan() || discriminant < 0.0 {
@@ -172,7 +172,7 @@ pub(super) fn solve_quadratic(a: f64, b: f64, c: f64) -> Option<[f64; 2]> {
     if a == 0.0 && q == 0.0 {
         return None;
     }
-    // Not the textbook's form: −b and the root may cancel.
+    // Not the textbook formula, where −b and the root may cancel.
     let (x0, x1) = match (a == 0.0, q == 0.0) {
         (true, _) => (c / q, c / q),
         (false, true) => (0.0, 0.0),
@@ -192,7 +192,7 @@ mod tests {
         BilinearMesh { positions: corners.to_vec(), indices: vec![[0, 1, 2, 3]], ..BilinearMesh::default() }
     }
 
-    /// Hits of a fine grid of triangles on the patch, in f64.
+    /// Hits of a fine triangulation of the patch, in f64.
     fn reference(mesh: &BilinearMesh, ray: &Ray) -> Option<f64> {
         const N: usize = 48;
         let [p00, p10, p01, p11] = mesh.patch(0).map(Vec3::as_dvec3);
@@ -236,7 +236,7 @@ mod tests {
                 _ => differ += 1,
             }
         }
-        // The tessellation itself differs at silhouettes.
+        // The triangulation differs at silhouettes.
         assert!(both > 60 && differ <= 4, "{both} {differ}");
     }
 
@@ -244,7 +244,7 @@ mod tests {
     fn rays_that_leave_a_planar_patch_do_not_meet_it_again() {
         let mut s = pcg32([9, 0, 0]);
         for k in 0..100_000 {
-            // A parallelogram anywhere, every fourth in a coordinate plane.
+            // A random parallelogram, every fourth in a coordinate plane.
             let (c, mut e, mut f) = (random_point(&mut s) * 100.0, random_point(&mut s), random_point(&mut s));
             if k % 4 == 0 {
                 (e.y, f.y) = (0.0, 0.0);
@@ -252,7 +252,7 @@ mod tests {
             let mesh = patch([c, c + e, c + f, c + e + f]);
             let hit = mesh.surface_hit(0, s.random::<[f32; 2]>());
             let w = random_point(&mut s).normalize_or(Vec3::Y);
-            // The rounded corners are not quite coplanar: leave out rays within the patch's own twist.
+            // The rounded corners are not exactly coplanar: leave out rays within the patch's own twist.
             if hit.n.dot(w).abs() < 1e-3 {
                 continue;
             }

@@ -1,25 +1,25 @@
 //! Cubic Bézier curves with a width: hair, fur and grass.
 //!
-//! A curve is a ribbon about c(u), w(u) wide with w linear in u. The ribbon faces each ray, as in pbrt-v4
+//! A curve is a ribbon about c(u) with a width w(u) that is linear in u. The ribbon faces each ray, as in pbrt-v4
 //! [Pharr et al. 2023, sec. 6.7], or has given normals. Parameters of a hit are (u, v): u along the curve, v from 0 to
 //! 1 across it.
 //!
-//! Projected along the ray, the curve is c₂(u) = c − d (c·d)/d², relative to the ray's origin. The ray meets the ribbon
-//! at the u where its point is nearest to the curve and not farther than w/2: c₂·c' = 0, c₂·c' rising, |c₂| ≤ w/2. The
-//! hit is at the depth c·d/d² of the centre. So the ends of a curve are cut perpendicularly, and adjacent curves with a
-//! common tangent leave no gap.
+//! Projected along the ray, the curve is c₂(u) = c − d (c·d)/d², relative to the ray's origin. The ray hits the ribbon
+//! at the u with minimum distance to the curve, if that is at most w/2: c₂·c' = 0, c₂·c' increasing, |c₂| ≤ w/2. The
+//! hit is at the depth c·d/d² of the centre. The ends of a curve are therefore cut perpendicularly, and adjacent curves
+//! with a common tangent leave no gap.
 //!
-//! Curves are cut into pieces of u so short that c₂·c' has one root at most in each, and that their boxes are tight: a
-//! piece is one primitive of a ray tracer. The root is found in f64 by Newton's method in a bracket.
+//! Curves are split into pieces of u so short that c₂·c' has at most one root in each, and that their boxes are tight.
+//! A piece is one primitive of a ray tracer. The root is computed in f64 by Newton's method in a bracket.
 
 use super::hit::{LocalHit, SurfaceHit, VertexValues, round};
 use glam::DVec3;
 use lumiris_numbers::math::{Bounds3, Frame, Ray, Vec2, Vec3, gamma};
 
-/// Most pieces of one curve.
+/// Maximum number of pieces of one curve.
 const MAX_PIECES: u32 = 128;
 
-/// What of a curve is seen.
+/// The shape of a curve's surface.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum CurveKind {
     /// A ribbon that faces the ray.
@@ -39,7 +39,7 @@ pub struct Curve {
     pub width: [f32; 2],
 }
 
-/// Which part of which curve a primitive is: u from index/count to (index + 1)/count.
+/// The part of a curve that is a primitive: u from index/count to (index + 1)/count.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Piece {
     curve: u32,
@@ -95,7 +95,7 @@ impl Curve {
         [blossom(from, from, from), blossom(from, from, to), blossom(from, to, to), blossom(to, to, to)]
     }
 
-    /// Number of pieces: enough that each is straight within a twentieth of the width, and that boxes are tight.
+    /// Number of pieces: each deviates from a straight line by at most a twentieth of the width, and boxes are tight.
     fn pieces(&self) -> u32 {
         let [p0, p1, p2, p3] = self.points;
         let width = self.width[0].max(self.width[1]).max(f32::MIN_POSITIVE);
@@ -107,7 +107,7 @@ impl Curve {
         straight.max(tight).clamp(1.0, MAX_PIECES as f32) as u32
     }
 
-    /// A tangent that is not zero, unit.
+    /// A unit tangent that is defined everywhere.
     fn tangent(&self, at: &Point) -> DVec3 {
         let [p0, .., p3] = self.points;
         let chord = (p3 - p0).as_dvec3();
@@ -116,7 +116,7 @@ impl Curve {
 }
 
 impl CurveSet {
-    /// Curves of one kind; `normals` has two unit vectors for each curve of ribbons, and is not used for others.
+    /// Curves of one kind; `normals` has two unit vectors for each curve of ribbons, and is unused for others.
     pub fn new(kind: CurveKind, curves: Vec<Curve>, normals: Vec<[Vec3; 2]>) -> Result<Self, String> {
         if kind == CurveKind::Ribbon && normals.len() != curves.len() {
             return Err(format!("{} ribbons have {} pairs of normals", curves.len(), normals.len()));
@@ -147,7 +147,7 @@ impl CurveSet {
         self.pieces.len()
     }
 
-    /// Bytes held.
+    /// Memory (bytes).
     pub fn bytes(&self) -> usize {
         size_of_val(&self.curves[..]) + size_of_val(&self.normals[..]) + size_of_val(&self.pieces[..])
     }
@@ -214,7 +214,7 @@ impl CurveSet {
         Some(LocalHit { t, uv: [u32, (0.5 + x / width).clamp(0.0, 1.0) as f32] })
     }
 
-    /// Unit vector of rising v.
+    /// Unit vector of increasing v.
     fn across(&self, curve: usize, u: f64, tangent: DVec3, d: DVec3) -> DVec3 {
         let side = match self.kind {
             CurveKind::Flat | CurveKind::Cylinder => tangent.cross(d),
@@ -223,11 +223,11 @@ impl CurveSet {
         side.try_normalize().unwrap_or_else(|| Frame::from_z(round(tangent)).x.as_dvec3())
     }
 
-    /// The surface at (u, v) of a piece, as a ray of direction `d` sees it. Normals of flat curves and tubes are
-    /// towards the ray's origin.
+    /// The surface at (u, v) of a piece for a ray of direction `d`. Normals of flat curves and tubes point towards the
+    /// ray's origin.
     ///
-    /// The bound of the error is twice the width, as in pbrt-v4: the ribbon turns with the ray, so a ray that leaves it
-    /// must start beyond half the width to not meet the same ribbon turned.
+    /// The error bound is twice the width, as in pbrt-v4. The ribbon rotates with the ray, so an outgoing ray must
+    /// start beyond half the width to avoid hitting the same ribbon in its new orientation.
     pub fn surface_hit(&self, primitive: usize, [u, v]: [f32; 2], d: Vec3) -> SurfaceHit {
         let id = self.pieces[primitive].curve as usize;
         let curve = &self.curves[id];
@@ -251,7 +251,7 @@ impl CurveSet {
     }
 }
 
-/// The root of a rising function in a bracket with the values `ends`, which gives its value and derivative.
+/// The root of an increasing function in a bracket with the values `ends`; `f` returns its value and derivative.
 fn root(f: impl Fn(f64) -> (f64, f64), [mut lo, mut hi]: [f64; 2], ends: [f64; 2]) -> f64 {
     let mut u = lo - ends[0] * (hi - lo) / (ends[1] - ends[0]);
     for _ in 0..24 {
@@ -314,7 +314,7 @@ mod tests {
                 assert!((hit.t - 2.5).abs() < 1e-6 && (hit.uv[0] - 0.5).abs() < 1e-6);
                 let surface = set.surface_hit(i, hit.uv, -Vec3::Z);
                 assert!((surface.p - Vec3::new(x, y, 0.0)).length() < 1e-6, "{surface:?}");
-                // h rises along z × x of the frame of the hit, which hair relies on
+                // h increases along z × x of the frame of the hit, which hair relies on
                 let along_y = surface.n.cross(surface.dpdu).normalize();
                 assert!(surface.n.z > 0.0 && along_y.dot(surface.dpdv) > 0.0);
                 assert!(((hit.uv[1] - 0.5) * 0.2 - y * Vec3::Z.cross(surface.dpdu).normalize().y).abs() < 1e-6);
@@ -336,14 +336,14 @@ mod tests {
     fn ribbons_are_foreshortened() {
         let set = straight(CurveKind::Ribbon, 0.2);
         let d = Vec3::new(0.0, -1.0, -1.0);
-        // At 45° the ribbon looks 0.2/√2 wide: ±0.0707 across the ray, which is ±0.1 along y
+        // At 45° the projected width of the ribbon is 0.2/√2: ±0.0707 across the ray, which is ±0.1 along y
         for (y, hits) in [(0.099, true), (0.101, false), (-0.099, true), (-0.101, false)] {
             let found = first(&set, &ray(Vec3::new(1.0, y, 0.0) - d * 3.0, d));
             assert_eq!(found.is_some(), hits, "{y}");
         }
     }
 
-    /// The first minimum of the distance of the ray and the curve that is within the width, by many steps.
+    /// The first minimum of the distance between ray and curve that is within the width, by small steps.
     fn reference(curve: &Curve, ray: &Ray) -> Option<f64> {
         let (o, d) = (ray.o.as_dvec3(), ray.d.as_dvec3());
         let at = |k: i32| {
@@ -372,7 +372,7 @@ mod tests {
                 _ => differ += 1,
             }
         }
-        // The steps decide otherwise at the rim
+        // The stepping may decide differently at the rim
         assert!(both > 100 && differ <= 2, "{both} {differ}");
     }
 
@@ -398,7 +398,7 @@ mod tests {
             let curve = random_curve(&mut s);
             let set = CurveSet::new(CurveKind::Flat, vec![curve], Vec::new()).unwrap();
             for k in 0..set.piece_count() {
-                // At the joints, where the ray goes through the curve
+                // At the joints, where the ray crosses the curve
                 let u = f64::from(k as u32) / set.piece_count() as f64;
                 let at = curve.at(u.max(1e-3), DVec3::ZERO);
                 let p = round(at.c);

@@ -1,13 +1,13 @@
-//! Displacement: a mesh is refined until its edges are short, then its vertices move along their normals
-//! [Cook 1984].
+//! Displacement: a mesh is refined until its edges are short, then its vertices are displaced along their normals [Cook
+//! 1984].
 
 use lumiris_numbers::math::{Vec2, Vec3};
 use std::collections::HashMap;
 
-/// More triangles than this are too many.
+/// Maximum number of triangles.
 pub const MAX_TRIANGLES: usize = 1 << 27;
 
-/// A mesh whose vertices have normals and texture coordinates.
+/// A mesh with normals and texture coordinates at its vertices.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct DisplacedMesh {
     /// Positions.
@@ -21,7 +21,9 @@ pub struct DisplacedMesh {
 }
 
 impl DisplacedMesh {
-    /// A mesh of these vertices; without normals it gets smooth ones. `Err` says what is wrong with it.
+    /// A mesh of these vertices; without normals it gets smooth ones.
+    ///
+    /// Returns `Err` with a message if it is invalid.
     pub fn new(
         positions: Vec<Vec3>,
         normals: Vec<Vec3>,
@@ -44,14 +46,16 @@ impl DisplacedMesh {
         Ok(mesh)
     }
 
-    /// Halves the longest edges of triangles until `length` of all edges is at most `longest`. Triangles that share an edge
-    /// halve it at the same vertex, so no gap opens. `Err`: there would be more than `most` triangles.
+    /// Splits the longest edges of triangles in half until `length` of all edges is at most `longest`. Triangles that
+    /// share an edge split it at the same vertex, so that there are no gaps.
+    ///
+    /// Returns `Err` with a message if there would be more than `most` triangles.
     pub fn refine(&mut self, length: impl Fn(Vec3, Vec3) -> f32, longest: f32, most: usize) -> Result<(), String> {
         let sides = |[a, b, c]: [u32; 3]| {
             let of = |i: u32, j: u32| length(self.positions[i as usize], self.positions[j as usize]);
             [of(a, b), of(b, c), of(c, a)]
         };
-        // None is larger than an equilateral one
+        // An equilateral triangle has the maximum area for its longest edge
         let area: f64 = self.indices.iter().map(|&t| area_of(sides(t))).sum();
         let too_many = || format!("edges of at most {longest} make more than {most} triangles");
         if area / (0.25 * 3.0_f64.sqrt() * f64::from(longest) * f64::from(longest)) > most as f64 {
@@ -64,7 +68,7 @@ impl DisplacedMesh {
             let of = |i: u32, j: u32| length(self.positions[i as usize], self.positions[j as usize]);
             let lengths = [of(a, b), of(b, c), of(c, a)];
             let side = (0..3).fold(0, |best, i| if lengths[i] > lengths[best] { i } else { best });
-            // What is not a number ends the refinement, too
+            // NaN also ends the refinement
             if !(lengths[side] > longest && lengths[side].is_finite()) {
                 self.indices.push([a, b, c]);
                 continue;
@@ -85,8 +89,8 @@ impl DisplacedMesh {
         Ok(())
     }
 
-    /// Moves each vertex along its normal by `height` of its position, normal and texture coordinates, and finds the
-    /// normals of the new surface.
+    /// Displaces each vertex along its normal by `height` of its position, normal and texture coordinates, and
+    /// recomputes the normals.
     pub fn displace(&mut self, height: impl Fn(Vec3, Vec3, Vec2) -> f32) {
         for ((p, n), uv) in self.positions.iter_mut().zip(&self.normals).zip(&self.uvs) {
             let moved = *p + *n * height(*p, *n, *uv);
@@ -95,13 +99,13 @@ impl DisplacedMesh {
             }
         }
         let normals = self.smooth_normals();
-        // On the side of those before, which may lie on either side of the corners' order
+        // Keep the side of the previous normals, which may be opposite to the corners' order
         for (n, new) in self.normals.iter_mut().zip(normals) {
             *n = if new == Vec3::ZERO { *n } else { new * 1.0_f32.copysign(new.dot(*n)) };
         }
     }
 
-    /// Of the triangles around each vertex, weighted by area, on the side of (p1 − p0) × (p2 − p0).
+    /// Mean normals of the triangles around each vertex, weighted by area, on the side of (p1 − p0) × (p2 − p0).
     fn smooth_normals(&self) -> Vec<Vec3> {
         let mut sums = vec![Vec3::ZERO; self.positions.len()];
         for t in &self.indices {
@@ -113,7 +117,7 @@ impl DisplacedMesh {
     }
 }
 
-/// The area of a triangle by its sides (Heron); 0 where they make none.
+/// The area of a triangle by its sides (Heron); 0 if they form none.
 fn area_of(sides: [f32; 3]) -> f64 {
     let [a, b, c] = sides.map(f64::from);
     let s = 0.5 * (a + b + c);
@@ -146,7 +150,7 @@ mod tests {
             }
         }
         assert!((area - 4.0).abs() < 1e-4, "{area}");
-        // An edge of one triangle only lies at the border
+        // An edge of only one triangle lies on the border
         for ([i, j], _) in edges.iter().filter(|(_, n)| **n == 1) {
             let [p, q] = [*i, *j].map(|v| mesh.positions[v as usize]);
             let at = |f: fn(Vec3) -> f32, x: f32| f(p) == x && f(q) == x;
@@ -166,7 +170,7 @@ mod tests {
             let expected = Vec3::new(-p.x.cos(), 0.0, 1.0).normalize();
             assert!(n.dot(expected) > 0.998, "{p} {n}");
         }
-        // Normals of the other side move vertices there, and stay there
+        // Normals of the opposite side displace vertices to that side, and remain there
         let mut mesh = sheet();
         mesh.normals.iter_mut().for_each(|n| *n = -*n);
         mesh.displace(|_, _, _| 0.5);

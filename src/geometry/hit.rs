@@ -1,10 +1,10 @@
-//! What an intersection returns, and the differential geometry of a hit.
+//! Results of intersections, and the differential geometry of a hit.
 
 use glam::DVec3;
 use lumiris_numbers::math::transform::transform_normal;
 use lumiris_numbers::math::{Affine3A, Frame, Vec2, Vec3, gamma};
 
-/// Where a ray met one shape.
+/// Intersection of a ray with one shape.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LocalHit {
     /// Ray parameter.
@@ -13,14 +13,14 @@ pub struct LocalHit {
     pub uv: [f32; 2],
 }
 
-/// What a mesh may give besides the texture coordinates: values of its vertices, interpolated, and of the face.
+/// Optional values of a mesh besides the texture coordinates: interpolated vertex values, and the face number.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct VertexValues {
     /// Second texture coordinates; zero if there are none.
     pub uv1: Vec2,
     /// Linear colour and opacity; 1 if there are none.
     pub color: [f32; 4],
-    /// Number of the face that it is on, for textures of faces; 0 if the mesh has none.
+    /// Face number, for textures per face; 0 if the mesh has none.
     pub face: u32,
 }
 
@@ -32,19 +32,19 @@ impl Default for VertexValues {
 
 /// Values of alpha textures.
 pub trait AlphaSource: Send + Sync {
-    /// Value of float texture `texture` at the texture coordinates `uv` of the world-space point `p`, where the vertices
-    /// have the values `vertex`.
+    /// Value of float texture `texture` at the texture coordinates `uv` of the world-space point `p`; `vertex` holds
+    /// the interpolated vertex values.
     fn alpha(&self, texture: u32, uv: Vec2, vertex: &VertexValues, p: Vec3) -> f32;
 }
 
-/// A point on a surface as materials and lights see it. World space, unless the shape that made it says otherwise.
+/// A point on a surface, for materials and lights. In world space unless documented otherwise.
 #[derive(Clone, Copy, Debug)]
 pub struct SurfaceHit {
     /// The point, refined onto the surface.
     pub p: Vec3,
     /// Bound of the rounding error of `p` per axis.
     pub p_error: Vec3,
-    /// Geometric normal, unit, oriented by the shape (the emitting side of an area light), not to the viewer.
+    /// Geometric normal, unit, oriented by the shape (the emitting side of an area light), not flipped to the viewer.
     pub n: Vec3,
     /// Shading normal, unit, in the hemisphere of `n`.
     pub ns: Vec3,
@@ -58,7 +58,7 @@ pub struct SurfaceHit {
     pub dpdvs: Vec3,
     /// Texture coordinates.
     pub uv: Vec2,
-    /// What else the vertices have.
+    /// Other interpolated vertex values.
     pub vertex: VertexValues,
 }
 
@@ -80,8 +80,8 @@ impl SurfaceHit {
         }
     }
 
-    /// The hit of a placed shape. The error bound covers the rounding of the point and of the ray's own way into the
-    /// group's space and back.
+    /// Transforms the hit of a shape to world space. The error bound includes the rounding of the point and of the
+    /// ray's transform to the group's space and back.
     #[must_use]
     pub fn transformed(&self, world_from_group: &Affine3A) -> SurfaceHit {
         let p = round(world_from_group.as_daffine3().transform_point3(self.p.as_dvec3()));
@@ -105,19 +105,19 @@ impl SurfaceHit {
     }
 }
 
-/// `v`, reversed if it is not in the hemisphere of `n`.
+/// `v`, flipped to the hemisphere of `n`.
 #[inline]
 pub(super) fn face_forward(v: Vec3, n: Vec3) -> Vec3 {
     if v.dot(n) < 0.0 { -v } else { v }
 }
 
-/// To f32, to nearest.
+/// Rounds to the nearest f32.
 #[inline]
 pub(super) fn round(p: DVec3) -> Vec3 {
     p.as_vec3()
 }
 
-/// `u` and `v` if they span a plane, else the tangents of any frame about `n`.
+/// `u` and `v` if they are linearly independent, else the tangents of some frame about `n`.
 #[inline]
 pub(super) fn spanning(u: Vec3, v: Vec3, n: Vec3) -> (Vec3, Vec3) {
     let area_squared = u.as_dvec3().cross(v.as_dvec3()).length_squared();

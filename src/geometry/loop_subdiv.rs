@@ -1,19 +1,21 @@
 //! Loop subdivision to limit positions and limit normals: pbrt's `loopsubdiv` [Loop 1987; Hoppe et al. 1994].
 //!
-//! The mesh is stored as links: a face (v, a, b) has, seen from v, the link a → b. The links of a vertex form its ring
-//! of neighbours, counter-clockwise if faces are; a manifold vertex has exactly one chain, closed or open.
+//! The mesh is stored as links: a face (v, a, b) gives v the link a → b. The links of a vertex form its ring of
+//! neighbours, counter-clockwise if faces are. A manifold vertex has exactly one chain, closed or open.
 
 use super::TriangleMesh;
 use lumiris_numbers::math::Vec3;
 use std::f32::consts::{PI, TAU};
 
-/// More triangles than this are refused.
+/// Maximum number of triangles.
 const MAX_TRIANGLES: u64 = 1 << 28;
 
 /// The limit surface of a control mesh after `levels` subdivisions, as triangles with shading normals.
 ///
-/// Normals are on the side of (p1 − p0) × (p2 − p0) of the faces. `Err` says what is wrong with a mesh that is not an
-/// oriented manifold, possibly with boundary, or that would become too large.
+/// Normals are on the side of (p1 − p0) × (p2 − p0) of the faces.
+///
+/// Returns `Err` with a message if the mesh is not an oriented manifold, possibly with boundary, or would become too
+/// large.
 pub fn loop_subdivide(levels: u32, positions: Vec<Vec3>, indices: Vec<[u32; 3]>) -> Result<TriangleMesh, String> {
     let count = 4_u64.checked_pow(levels).and_then(|n| n.checked_mul(indices.len() as u64));
     if count.is_none_or(|n| n > MAX_TRIANGLES) {
@@ -26,7 +28,7 @@ pub fn loop_subdivide(levels: u32, positions: Vec<Vec3>, indices: Vec<[u32; 3]>)
         links = Links::new(&indices, positions.len())?;
     }
 
-    // Push the vertices to the limit surface.
+    // Move the vertices to the limit surface.
     let mut limit = Vec::with_capacity(positions.len());
     let mut normals = Vec::with_capacity(positions.len());
     for (v, &p) in positions.iter().enumerate() {
@@ -39,7 +41,7 @@ pub fn loop_subdivide(levels: u32, positions: Vec<Vec3>, indices: Vec<[u32; 3]>)
     Ok(mesh)
 }
 
-/// One level: four triangles for one.
+/// One level of subdivision: four triangles for one.
 fn subdivide(links: &Links, positions: &[Vec3], faces: &[[u32; 3]]) -> Result<(Vec<Vec3>, Vec<[u32; 3]>), String> {
     // Even vertices keep their indices.
     let mut refined = Vec::with_capacity(positions.len() * 4);
@@ -47,7 +49,7 @@ fn subdivide(links: &Links, positions: &[Vec3], faces: &[[u32; 3]]) -> Result<(V
         refined.push(links.ring(v as u32)?.positions(positions).blend(p, Rule::Refine));
     }
 
-    // A new vertex per edge, numbered in the order of the links; the link with the smaller start owns an inner edge.
+    // One new vertex per edge, numbered in the order of the links; the link with the smaller start owns an inner edge.
     let mut edge_vertex = vec![0_u32; links.links.len()];
     for (k, &[v, a, b]) in links.links.iter().enumerate() {
         let [v_pos, a_pos, b_pos] = [v, a, b].map(|i| positions[i as usize]);
@@ -73,10 +75,10 @@ fn subdivide(links: &Links, positions: &[Vec3], faces: &[[u32; 3]]) -> Result<(V
     Ok((refined, split.collect()))
 }
 
-/// The links [v, a, b] of all corners, sorted; those of a vertex are contiguous.
+/// The links [v, a, b] of all corners, sorted, so that the links of a vertex are contiguous.
 struct Links {
     links: Vec<[u32; 3]>,
-    /// Where the links of each vertex start; one entry more than there are vertices.
+    /// Index of the first link of each vertex, with one additional entry at the end.
     starts: Vec<usize>,
 }
 
@@ -121,7 +123,8 @@ impl Links {
         let Some(&[_, any, _]) = of_vertex.first() else {
             return Ok(Ring { neighbours: Vec::new(), boundary: false });
         };
-        // The boundary edge that only starts a link; an edge v–a ends one if the edge's other side (a, v) exists.
+        // The neighbour at the boundary that only starts a link. An edge v–a ends a link if the reverse edge (a, v)
+        // exists.
         let open_start = of_vertex.iter().map(|link| link[1]).find(|&a| self.find(a, v).is_none());
         let boundary = open_start.is_some();
         let mut neighbours = vec![open_start.unwrap_or(any)];
@@ -132,7 +135,7 @@ impl Links {
         if !boundary {
             neighbours.pop();
         }
-        // A second chain is left over if two fans share the vertex.
+        // A second chain remains if two fans share the vertex.
         let complete = neighbours.len() == of_vertex.len() + usize::from(boundary);
         let closed = boundary
             || self
@@ -156,7 +159,7 @@ struct Ring<T> {
     boundary: bool,
 }
 
-/// Which weights.
+/// The kind of weights.
 #[derive(Clone, Copy)]
 enum Rule {
     /// Even vertices of a level.
@@ -183,7 +186,7 @@ impl Ring<Vec3> {
         if self.boundary {
             let weight = match rule {
                 Rule::Refine => 1.0 / 8.0,
-                // The limit of the cubic B-spline that the boundary is.
+                // The limit of the boundary, a cubic B-spline.
                 Rule::Limit => 1.0 / 6.0,
             };
             return p * (1.0 - 2.0 * weight) + (ring[0] + ring[ring.len() - 1]) * weight;
@@ -293,7 +296,7 @@ mod tests {
         for (p, f) in [tetrahedron(), octahedron(), grid(3)] {
             let coarse = loop_subdivide(1, p.clone(), f.clone()).unwrap();
             let fine = loop_subdivide(4, p.clone(), f).unwrap();
-            // Even vertices keep their indices, so those of the coarse mesh are in both.
+            // Even vertices keep their indices, so the vertices of the coarse mesh are in both.
             for v in 0..coarse.positions().len() {
                 assert!((coarse.positions()[v] - fine.positions()[v]).length() < 1e-5, "vertex {v}");
                 assert!((coarse.normals[v] - fine.normals[v]).length() < 1e-2, "vertex {v}");
@@ -308,7 +311,7 @@ mod tests {
         for (i, t) in mesh.indices.iter().enumerate() {
             let [a, b, c] = mesh.triangle(i);
             let face = (b - a).cross(c - a).normalize();
-            // Valence 4 converges slowly: the faces there are 11° off at this level.
+            // Valence 4 converges slowly: its faces still deviate by 11° at this level.
             assert!(t.iter().all(|&v| mesh.normals[v as usize].dot(face) > 0.98));
         }
     }
@@ -321,7 +324,7 @@ mod tests {
         for n in &mesh.normals {
             assert!((*n - Vec3::Z).length() < 1e-5, "{n}");
         }
-        // The corners round off as the cubic B-spline of the boundary polygon, the sides stay on it.
+        // The corners are rounded as the cubic B-spline of the boundary polygon; the sides remain on it.
         assert!(mesh.positions().iter().any(|p| p.y == 0.0 && (p.x - 2.0).abs() < 1e-6));
         assert!(mesh.positions().iter().all(|p| p.min_element() >= 0.0 && p.max_element() <= 4.0));
     }

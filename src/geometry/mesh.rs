@@ -4,10 +4,10 @@ use super::hit::{SurfaceHit, VertexValues, face_forward, round, spanning};
 use lumiris_numbers::math::transform::{swaps_handedness, transform_normal};
 use lumiris_numbers::math::{Affine3A, Bounds3, Vec2, Vec3, gamma};
 
-/// Indexed triangles. Optional arrays are empty if absent; those of vertices are else as long as the positions.
+/// Indexed triangles. Optional arrays are empty if absent; vertex arrays otherwise have the length of the positions.
 #[derive(Clone, Debug, Default)]
 pub struct TriangleMesh {
-    /// Vertex positions, with one more zero element at the end: Embree reads 16 bytes at each 12-byte vertex.
+    /// Vertex positions, with an additional zero element at the end: Embree reads 16 bytes at each 12-byte vertex.
     padded_positions: Vec<Vec3>,
     /// Vertex indices, three per triangle; all in range.
     pub indices: Vec<[u32; 3]>,
@@ -21,15 +21,15 @@ pub struct TriangleMesh {
     pub colors: Vec<[f32; 4]>,
     /// Shading tangents.
     pub tangents: Vec<Vec3>,
-    /// Per vertex, 1 where the second axis of tangent space is at the left of the tangent, seen against the shading normal,
-    /// −1 where it is at the right; if empty, it is on the side of ∂p/∂v.
+    /// Per vertex, 1 if the second axis of tangent space is to the left of the tangent, looking against the shading
+    /// normal; −1 if it is to the right. If empty, it is on the side of ∂p/∂v.
     pub tangent_signs: Vec<i8>,
-    /// True if the second texture coordinates have the shading tangents of a mesh without its own.
+    /// True if shading tangents of a mesh without tangents follow the second texture coordinates.
     pub tangents_along_second: bool,
-    /// Per triangle, the number of the face that it is (a part of).
+    /// Face number of each triangle.
     pub faces: Vec<u32>,
-    /// True if the geometric normal is the reverse of (p1 − p0) × (p2 − p0): pbrt's
-    /// `ReverseOrientation` xor a mirroring transform.
+    /// True if the geometric normal is the reverse of (p1 − p0) × (p2 − p0): pbrt's `ReverseOrientation` xor a
+    /// reflecting transform.
     pub flip_normal: bool,
 }
 
@@ -44,7 +44,7 @@ impl TriangleMesh {
         Ok(TriangleMesh { padded_positions: positions, indices, ..TriangleMesh::default() })
     }
 
-    /// The mesh placed by a transformation, which may flatten it.
+    /// The transformed mesh; the transformation may be singular.
     #[must_use]
     pub fn transformed(&self, m: &Affine3A) -> Self {
         let mut mesh = self.clone();
@@ -53,7 +53,7 @@ impl TriangleMesh {
         mesh.normals.iter_mut().for_each(|n| *n = transform_normal(m, *n));
         mesh.tangents.iter_mut().for_each(|t| *t = m.transform_vector3(*t));
         if swaps_handedness(m) {
-            // The second axis of tangent space comes to the other side of the first
+            // A reflection moves the second axis of tangent space to the other side of the first
             mesh.tangent_signs.iter_mut().for_each(|sign| *sign = -*sign);
             mesh.flip_normal = !self.flip_normal;
         }
@@ -96,15 +96,15 @@ impl TriangleMesh {
         0.5 * (b - a).cross(c - a).length()
     }
 
-    /// Bounds of all vertices that triangles use.
+    /// Bounds of all vertices in use.
     pub fn bounds(&self) -> Bounds3 {
         Bounds3::from_points(self.indices.iter().flatten().map(|&v| self.padded_positions[v as usize]))
     }
 
     /// The surface of triangle `i` at the barycentric weights `uv` of vertices 1 and 2, in the space of the group.
     ///
-    /// n is the unit vector of (p1 − p0) × (p2 − p0), reversed if `flip_normal`; where the mesh has shading normals, n
-    /// is then turned to their side. Texture coordinates are (0,0), (1,0), (1,1) if the mesh has none.
+    /// n is the unit vector of (p1 − p0) × (p2 − p0), reversed if `flip_normal`. If the mesh has shading normals, n is
+    /// then flipped to their side. Texture coordinates are (0,0), (1,0), (1,1) if the mesh has none.
     pub fn surface_hit(&self, i: usize, uv: [f32; 2]) -> SurfaceHit {
         let corners = self.triangle(i);
         let b = [1.0 - uv[0] - uv[1], uv[0], uv[1]];
@@ -113,7 +113,7 @@ impl TriangleMesh {
         let p = round(p0 + e1 * f64::from(uv[0]) + e2 * f64::from(uv[1]));
         let p_error = gamma(7) * (0..3).fold(Vec3::ZERO, |sum, k| sum + (corners[k] * b[k]).abs());
 
-        // Geometric normal: f64 keeps it for slivers.
+        // Geometric normal, in f64 for slivers.
         let n = round(e1.cross(e2).normalize_or_zero());
         let n = if self.flip_normal { -n } else { n };
         let (n, ns) = self.shading_normal(i, b).map_or((n, n), |ns| (face_forward(n, ns), ns));
@@ -128,7 +128,7 @@ impl TriangleMesh {
         SurfaceHit { p, p_error, n, ns, dpdu, dpdv, dpdus, dpdvs, uv, vertex }
     }
 
-    /// The tangents for shading at the weights `b` of triangle `i`, if they are not those of the texture coordinates.
+    /// The shading tangents at the weights `b` of triangle `i`; `None` if they follow the texture coordinates.
     fn shading_tangents(&self, i: usize, b: [f32; 3], ns: Vec3) -> Option<(Vec3, Vec3)> {
         let vertices = self.indices[i].map(|v| v as usize);
         let second = || {
@@ -229,7 +229,7 @@ mod tests {
         mesh.flip_normal = true;
         assert_eq!(mesh.surface_hit(0, [0.2, 0.2]).n, -Vec3::Z);
 
-        // Shading normals are authoritative: n turns to their side, whatever flip_normal says.
+        // Shading normals are authoritative: n is flipped to their side, for either value of flip_normal.
         let tilted = Vec3::new(0.6, 0.0, 0.8);
         mesh.normals = vec![tilted; 3];
         let hit = mesh.surface_hit(0, [0.2, 0.2]);
@@ -261,7 +261,7 @@ mod tests {
             assert_eq!(mesh.surface_hit(0, [0.2, 0.3]).dpdvs, Vec3::new(-2.0, 0.0, 0.0) * f32::from(sign));
         }
 
-        // Those of the second texture coordinates, where there are no others
+        // Tangents of the second texture coordinates, for a mesh without tangents
         (mesh.tangents, mesh.uvs1) = (Vec::new(), vec![Vec2::ZERO, Vec2::new(0.0, -1.0), Vec2::X]);
         mesh.tangents_along_second = true;
         let hit = mesh.surface_hit(0, [0.2, 0.3]);

@@ -49,8 +49,8 @@ impl Shape {
         }
     }
 
-    /// The first hit of `primitive`, which is no triangle, in (0, t_max) that `accepts` takes: it gets the hit and which
-    /// crossing of the primitive by the ray's line it is, 0 or 1.
+    /// The first hit of `primitive`, which must not be a triangle, in (0, t_max) for which `accepts` is true. Its
+    /// arguments are the hit and its index, 0 or 1, among the intersections of the ray's line with the primitive.
     #[inline]
     pub fn intersect(&self, primitive: u32, ray: &Ray, accepts: impl Fn(&LocalHit, usize) -> bool) -> Option<LocalHit> {
         match self {
@@ -61,8 +61,8 @@ impl Shape {
         }
     }
 
-    /// The surface at the parametric position `uv` of `primitive`, in the space of the group. Curves are as a ray of
-    /// direction `d` sees them.
+    /// The surface at the parametric position `uv` of `primitive`, in the space of the group. Curves depend on the
+    /// direction `d` of the ray.
     pub fn surface_hit(&self, primitive: u32, uv: [f32; 2], d: Vec3) -> SurfaceHit {
         match self {
             Shape::Mesh(mesh) => mesh.surface_hit(primitive as usize, uv),
@@ -72,7 +72,7 @@ impl Shape {
         }
     }
 
-    /// What else there is, at the parametric position `uv` of `primitive`.
+    /// Vertex values at the parametric position `uv` of `primitive`.
     pub fn vertex_values(&self, primitive: u32, uv: [f32; 2]) -> VertexValues {
         match self {
             Shape::Mesh(mesh) => mesh.vertex_values_at(primitive as usize, uv),

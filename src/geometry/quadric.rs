@@ -4,8 +4,8 @@
 //! u = φ / φ_max, and v = (θ − θ(z_min)) / (θ(z_max) − θ(z_min)) on a sphere with cos θ = z / radius,
 //! (radius − r) / (radius − inner_radius) on a disk, (z − z_min) / (z_max − z_min) on a cylinder.
 //!
-//! Roots are found in f64 in local space. The hit point is chosen such that `local_from_group`, the transform that is
-//! applied to rays, takes it onto the local surface: the two transforms are rounded separately, and their difference
+//! Roots are computed in f64 in local space. The hit point is chosen such that `local_from_group`, the transform
+//! applied to rays, maps it onto the local surface. The two transforms are rounded separately, and their difference
 //! would otherwise be an error of the point.
 
 use super::hit::{LocalHit, SurfaceHit, VertexValues, round, spanning};
@@ -14,7 +14,7 @@ use lumiris_numbers::math::transform::{swaps_handedness, transform_normal};
 use lumiris_numbers::math::{Affine3A, Bounds3, Ray, Vec2, Vec3, gamma};
 use std::f64::consts::{PI, TAU};
 
-/// Which quadric, in its local space (pbrt's parameters; angles in radians).
+/// The kind of quadric, in its local space (pbrt's parameters; angles in radians).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum QuadricKind {
     /// Sphere about the origin, cut to z_min..z_max and φ in 0..phi_max.
@@ -52,18 +52,18 @@ pub enum QuadricKind {
     },
 }
 
-/// A quadric placed in the space of its group.
+/// A quadric with its transform to the space of its group.
 #[derive(Clone, Copy, Debug)]
 pub struct Quadric {
     /// Shape in local space.
     pub kind: QuadricKind,
-    /// Placement.
+    /// Transform.
     pub group_from_local: Affine3A,
-    /// Inverse of the placement.
+    /// Inverse transform.
     pub local_from_group: Affine3A,
-    /// True if the geometric normal is the reverse of ∂p/∂u × ∂p/∂v in the group's space: pbrt's
-    /// `ReverseOrientation` xor mirroring. So normals point outward (+z for a disk), mirrored or not, unless
-    /// `ReverseOrientation` is set.
+    /// True if the geometric normal is the reverse of ∂p/∂u × ∂p/∂v in the group's space: pbrt's `ReverseOrientation`
+    /// xor reflection. Normals therefore point outward (+z for a disk), reflected or not, unless `ReverseOrientation`
+    /// is set.
     pub flip_normal: bool,
 }
 
@@ -83,13 +83,13 @@ impl Quadric {
 
     /// The first hit in (0, t_max); uv are the parameters (u, v).
     ///
-    /// A ray that leaves from [`lumiris_numbers::math::ray::offset_origin`] does not meet the point again that it left.
+    /// A ray from [`lumiris_numbers::math::ray::offset_origin`] does not hit its origin again.
     pub fn intersect(&self, ray: &Ray) -> Option<LocalHit> {
         self.intersect_where(ray, |_, _| true)
     }
 
-    /// The first hit in (0, t_max) that `accepts` takes, which gets the hit and its crossing: 0 where the ray's line
-    /// meets the full quadric first, 1 where it meets it again.
+    /// The first hit in (0, t_max) for which `accepts` is true. Its arguments are the hit and its index: 0 for the
+    /// first intersection of the ray's line with the full quadric, 1 for the second.
     #[inline]
     pub fn intersect_where(&self, ray: &Ray, accepts: impl Fn(&LocalHit, usize) -> bool) -> Option<LocalHit> {
         self.first(ray, |p, t, crossing| {
@@ -103,8 +103,8 @@ impl Quadric {
         self.first(ray, |p, t, _| self.kind.azimuth(p).map(|_| t))
     }
 
-    /// What `take` makes of the first point of the full quadric in (0, t_max) that it takes. It gets the point, its t
-    /// and its crossing.
+    /// Calls `take` with the intersections of the full quadric in (0, t_max), in order, and returns its first result.
+    /// The arguments are the point, its t and its index.
     #[inline]
     fn first<T>(&self, ray: &Ray, take: impl Fn(DVec3, f32, usize) -> Option<T>) -> Option<T> {
         let local_from_group = self.local_from_group.as_daffine3();
@@ -140,7 +140,7 @@ impl Quadric {
     }
 }
 
-/// The group-space point that `local_from_group` takes to `p`, by one step of iterative refinement.
+/// The group-space point that `local_from_group` maps to `p`, by one step of iterative refinement.
 fn refined_point(group_from_local: &DAffine3, local_from_group: &DAffine3, p: DVec3) -> Vec3 {
     let first = group_from_local.transform_point3(p);
     let residual = local_from_group.transform_point3(first) - p;
@@ -165,7 +165,7 @@ impl QuadricKind {
         f64::from(radius)
     }
 
-    /// The largest coordinates of its points.
+    /// The maximum coordinates of its points.
     fn extent(&self) -> DVec3 {
         let z = match *self {
             QuadricKind::Sphere { z_min, z_max, .. } | QuadricKind::Cylinder { z_min, z_max, .. } => {
@@ -176,7 +176,7 @@ impl QuadricKind {
         DVec3::new(self.radius(), self.radius(), f64::from(z))
     }
 
-    /// Where the line o + t d meets the full quadric, in ascending order.
+    /// Parameters of the intersections of the line o + t d with the full quadric, in ascending order.
     fn roots(&self, o: DVec3, d: DVec3) -> Option<[f64; 2]> {
         match *self {
             QuadricKind::Sphere { radius, .. } => sphere_roots(o, d, f64::from(radius)),
@@ -194,7 +194,7 @@ impl QuadricKind {
         let v = match *self {
             QuadricKind::Sphere { radius, z_min, z_max, .. } => {
                 let [from, to] = polar_range(radius, z_min, z_max);
-                // Exact near the poles, where arc cosines are not.
+                // Accurate near the poles, where arc cosines are not.
                 ratio(p.x.hypot(p.y).atan2(p.z) - from, to - from)
             }
             QuadricKind::Cylinder { z_min, z_max, .. } => {
@@ -210,7 +210,8 @@ impl QuadricKind {
         Some([ratio(phi, phi_max) as f32, v as f32])
     }
 
-    /// Azimuth of a point of the full quadric, where that tells whether it is cut off, and φ_max; `None` if it is.
+    /// Azimuth of a point of the full quadric, and φ_max. `None` if the point is cut off. The azimuth is only computed
+    /// if it can cut the point off.
     #[inline]
     fn azimuth(&self, p: DVec3) -> Option<(Option<f64>, f64)> {
         let phi_max = match *self {
@@ -301,13 +302,13 @@ fn polar_range(radius: f32, z_min: f32, z_max: f32) -> [f64; 2] {
     [z_min, z_max].map(|z| (f64::from(z) / f64::from(radius)).clamp(-1.0, 1.0).acos())
 }
 
-/// The roots of |o + t d| = radius in ascending order. The discriminant comes from the point nearest the centre and the
-/// constant term from a product, so neither cancels [Haines et al. 2019].
+/// The roots of |o + t d| = radius in ascending order. The discriminant is computed from the point nearest to the
+/// centre, and the constant term from a product, so that neither cancels [Haines et al. 2019].
 fn sphere_roots(o: DVec3, d: DVec3, radius: f64) -> Option<[f64; 2]> {
     let a = d.length_squared();
     let b = o.dot(d);
     let nearest = o - d * (b / a);
-    // Far beyond what rounding changes
+    // Far beyond the effect of rounding
     if nearest.length_squared() > radius * radius * (1.0 + 1e-9) {
         return None;
     }
@@ -358,7 +359,7 @@ mod tests {
         Affine3A::from_scale_rotation_translation(scale, rotation, random_point(s) * 50.0)
     }
 
-    /// The first crossing found by marching along the ray in f64 and bisecting.
+    /// The first intersection by marching along the ray in f64 and bisecting.
     fn reference(quadric: &Quadric, ray: &Ray) -> Option<f64> {
         let m = quadric.local_from_group.as_daffine3();
         let (o, d) = (m.transform_point3(ray.o.as_dvec3()), m.transform_vector3(ray.d.as_dvec3()));
@@ -463,12 +464,12 @@ mod tests {
             let hit = quadric.surface_hit(s.random::<[f32; 2]>());
             let mut w = random_point(&mut s).normalize_or(Vec3::Y);
             if k % 3 == 0 {
-                // Grazing rays are the hard ones.
+                // Grazing rays are the critical case.
                 w = (w - hit.n * (w.dot(hit.n) * (1.0 - 1e-4))).normalize_or(w);
             }
             let ray = Ray { o: offset_origin(hit.p, hit.p_error, hit.n, w), d: w, t_max: f32::INFINITY, time: 0.0 };
             let again = quadric.intersect(&ray);
-            // Going inward, the far side is a true hit: its chord is 2 r cos θ or longer.
+            // For an inward ray, the far side is a valid hit: its chord is 2 r cos θ or longer.
             let inward = w.dot(hit.n) < 0.0 && !matches!(quadric.kind, QuadricKind::Disk { .. });
             match again {
                 None => {}

@@ -1,4 +1,4 @@
-//! What tests of shapes and ray tracers share.
+//! Shared helpers of the tests of shapes and ray tracers.
 
 use lumiris_numbers::math::{Ray, Vec3};
 use lumiris_test_support::random::{Pcg32, RngExt};

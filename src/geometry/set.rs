@@ -13,10 +13,10 @@ pub type GeometryId = u32;
 /// Index into [`GeometrySet::groups`].
 pub type GroupId = u32;
 
-/// The instance index of everything in the root group.
+/// The instance index of the root group.
 pub const NO_INSTANCE: u32 = u32::MAX;
 
-/// Which rays a geometry stops; a bit set.
+/// The kinds of rays that a geometry stops; a bit set.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Visibility(pub u32);
 
@@ -29,36 +29,36 @@ impl Visibility {
     pub const ALL: Visibility = Visibility(3);
 }
 
-/// A shape with what a ray tracer must know of it.
+/// A shape with its properties for ray tracing.
 #[derive(Clone, Debug)]
 pub struct Geometry {
     /// The shape, in the space of its group.
     pub shape: Shape,
-    /// Cut-outs: index of a float texture whose value is the probability that a ray is stopped.
+    /// Alpha texture: index of a float texture whose value is the probability that a ray is stopped.
     pub alpha: Option<u32>,
     /// Rays that it stops.
     pub visibility: Visibility,
 }
 
-/// Geometries that are placed together.
+/// Geometries that are instanced together.
 #[derive(Clone, Debug, Default)]
 pub struct Group {
     /// Members.
     pub geometries: Vec<GeometryId>,
 }
 
-/// A placement of a group.
+/// An instance of a group.
 #[derive(Clone, Debug)]
 pub struct Instance {
-    /// What is placed.
+    /// The group.
     pub group: GroupId,
-    /// Placement at equidistant times 0..=1; one entry if it does not move. Between entries each matrix element
-    /// is interpolated linearly.
+    /// Transforms at equidistant times 0..=1; one entry if the instance does not move. Matrix elements are interpolated
+    /// linearly between entries.
     pub world_from_group: Vec<Affine3A>,
 }
 
 impl Instance {
-    /// Placement at `time` in 0..=1.
+    /// Transform at `time` in 0..=1.
     pub fn world_from_group_at(&self, time: f32) -> Affine3A {
         placement_at(&self.world_from_group, time)
     }
@@ -69,11 +69,11 @@ impl Instance {
 pub struct GeometrySet {
     /// Every geometry of every group.
     pub geometries: Vec<Geometry>,
-    /// Groups that instances place.
+    /// Groups for instancing.
     pub groups: Vec<Group>,
-    /// What stands in world space without an instance.
+    /// Geometries in world space, without an instance.
     pub root: Group,
-    /// Placements.
+    /// Instances.
     pub instances: Vec<Instance>,
 }
 
@@ -99,8 +99,8 @@ impl GeometrySet {
         self.instances.iter().any(|i| i.world_from_group.len() > 1)
     }
 
-    /// The surface in world space at the parametric position `uv` of a hit; `instance` is [`NO_INSTANCE`] in the root.
-    /// For emitters, and wherever there are no curves: those depend on the ray, see [`Self::surface_hit_of_ray`].
+    /// The surface in world space at the parametric position `uv` of a hit; `instance` is [`NO_INSTANCE`] in the root
+    /// group. Not valid for curves, which depend on the ray, see [`Self::surface_hit_of_ray`].
     pub fn surface_hit(
         &self,
         geometry: GeometryId,
@@ -113,7 +113,7 @@ impl GeometrySet {
         self.surface_hit_of_ray(geometry, primitive, instance, uv, &ray)
     }
 
-    /// The surface in world space where `ray` met it, of which direction and time count.
+    /// The surface in world space at a hit of `ray`; only its direction and time are used.
     pub fn surface_hit_of_ray(
         &self,
         geometry: GeometryId,
@@ -134,7 +134,7 @@ impl GeometrySet {
         shape.surface_hit(primitive, uv, d).transformed(&world_from_group)
     }
 
-    /// Number of primitives as stored: (triangles, quadrics, bilinear patches).
+    /// Number of stored primitives: (triangles, quadrics, bilinear patches).
     pub fn primitive_counts(&self) -> (usize, usize, usize) {
         self.geometries.iter().fold((0, 0, 0), |(t, q, b), g| match &g.shape {
             Shape::Mesh(m) => (t + m.triangle_count(), q, b),
@@ -146,7 +146,7 @@ impl GeometrySet {
 }
 
 impl GeometrySet {
-    /// Number of curves as stored, and of the pieces that ray tracers hold.
+    /// Number of stored curves, and of their pieces in the ray tracers.
     pub fn curve_counts(&self) -> (usize, usize) {
         self.geometries.iter().fold((0, 0), |(curves, pieces), g| match &g.shape {
             Shape::Curves(set) => (curves + set.curves().len(), pieces + set.piece_count()),
@@ -182,7 +182,7 @@ mod tests {
             assert!((hit.p.x - x).abs() < 1e-6 && hit.n == Vec3::Z);
             assert!(hit.p_error.x > 0.0);
         }
-        // A mirrored instance turns the normal as it turns the shape.
+        // A reflecting instance reflects the normal, too.
         assert_eq!(at(1, 0.0).n, -Vec3::Z);
     }
 }

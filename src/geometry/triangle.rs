@@ -2,7 +2,7 @@
 //!
 //! The triangle is translated to the ray's origin and sheared so that the ray runs along +z; then three 2D edge
 //! functions decide [Woop et al. 2013]. The edge function of a shared edge is the same rounded expression for both
-//! triangles up to its sign, and rounding is monotonic, so a computed sign is correct or the value is 0; zeros are
+//! triangles, up to its sign. Rounding is monotonic, so a computed sign is correct or the value is 0; zeros are
 //! evaluated again in f64, where the products are exact. Edges and vertices count as inside, so a closed mesh does not
 //! leak.
 
@@ -21,7 +21,7 @@ pub struct RayPrecomputed {
 }
 
 impl RayPrecomputed {
-    /// Prepares a ray; `None` if it has no direction or is not finite (`t_max` may be infinite).
+    /// Prepares a ray; `None` if its direction is zero or it is not finite (`t_max` may be infinite).
     #[inline]
     pub fn new(ray: &Ray) -> Option<Self> {
         let d = ray.d.abs();
@@ -51,10 +51,10 @@ pub struct TriangleHit {
     pub b2: f32,
 }
 
-/// The hit with 0 < t ≤ `t_limit`, if any; both sides count.
+/// The hit with 0 < t ≤ `t_limit`, if any; both sides are hit.
 ///
-/// The sign of t is decided in f64 where f32 cannot, so a ray from [`lumiris_numbers::math::ray::offset_origin`] does
-/// not meet the triangle that it left.
+/// The sign of t is decided in f64 if f32 is not accurate enough, so a ray from
+/// [`lumiris_numbers::math::ray::offset_origin`] does not hit the triangle of its origin.
 #[inline]
 pub fn intersect_triangle(ray: &RayPrecomputed, triangle: [Vec3; 3], t_limit: f32) -> Option<TriangleHit> {
     let [kx, ky, kz] = ray.axes;
@@ -62,7 +62,7 @@ pub fn intersect_triangle(ray: &RayPrecomputed, triangle: [Vec3; 3], t_limit: f3
     let [a, b, c] = corners.map(|p| Vec3::new(p[kx] - ray.shear[0] * p[kz], p[ky] - ray.shear[1] * p[kz], p[kz]));
     let (mut u, mut v, mut w) = (c.x * b.y - c.y * b.x, a.x * c.y - a.y * c.x, b.x * a.y - b.y * a.x);
     if u == 0.0 || v == 0.0 || w == 0.0 {
-        // The exact signs; only zeros can be wrong.
+        // The exact signs; only zeros may be wrong.
         let edge = |p: Vec3, q: Vec3| f64::from(p.x) * f64::from(q.y) - f64::from(p.y) * f64::from(q.x);
         let (ue, ve, we) = (edge(c, b), edge(a, c), edge(b, a));
         let inside = (ue >= 0.0 && ve >= 0.0 && we >= 0.0) || (ue <= 0.0 && ve <= 0.0 && we <= 0.0);
@@ -78,7 +78,7 @@ pub fn intersect_triangle(ray: &RayPrecomputed, triangle: [Vec3; 3], t_limit: f3
         return None;
     }
 
-    // The parameter of the plane, in f64 if f32 cannot decide that it is positive.
+    // The parameter of the plane, in f64 if the f32 sign is uncertain.
     let inv_det = 1.0 / det;
     let mut t = (u * a.z + v * b.z + w * c.z) * ray.shear[2] * inv_det;
     if t <= parameter_error([a, b, c], ray.shear[2], inv_det) {
@@ -148,7 +148,7 @@ mod tests {
     fn rays_through_shared_edges_and_vertices_hit_a_neighbour() {
         let mut s = pcg32([6, 0, 0]);
         for i in 0..100_000 {
-            // A fan of triangles about a vertex; the ray aims at a point of an inner edge as well as f32 can.
+            // A fan of triangles about a vertex; the ray aims at a point of an inner edge with f32 accuracy.
             let hub = random_point(&mut s);
             let rim: Vec<Vec3> = (0..6)
                 .map(|k| {

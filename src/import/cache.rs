@@ -1,11 +1,12 @@
-//! Meshes, images, textures of faces, volumes and measured materials that one scene after the other uses, such as the frames of an animation.
+//! Meshes, images, textures of faces, volumes and measured materials shared by successive scenes, such as the frames of
+//! an animation.
 //!
-//! A file is the same as before if its name, its size and the time of its last change are. What a scene has not used is
-//! dropped when the next one has been loaded ([`FileCache::end_scene`]), so that memory holds what two scenes need at
-//! most. Text of scene files is not kept: it is what differs.
+//! A file is unchanged if its name, size and modification time are unchanged. Content that a scene did not use is
+//! dropped when the next one has been loaded ([`FileCache::end_scene`]), so memory holds the content of two scenes at
+//! most. Text of scene files is not cached, since it changes between scenes.
 //!
-//! Where the textures of a scene are not to take more than so much memory, the largest of them are in tiles of a temporary
-//! file ([`crate::imaging::tiles`]), and all others are in memory: of the limit, half or more is left for the tiles in use.
+//! If the textures of a scene exceed a memory limit, the largest of them are stored in tiles of a temporary file
+//! ([`crate::imaging::tiles`]), and all others in memory. At least half of the limit remains for the tiles in use.
 
 use super::face_maps::{FaceMapRequest, load_face_map};
 use super::images::{ImageChannels, ImageEncoding, ImageRequest, RgbImage, load_map, load_rgb, load_tiled_map};
@@ -25,7 +26,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use std::time::SystemTime;
 
-/// What tells a file from what it was before.
+/// Identifies the state of a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Stamp {
     bytes: u64,
@@ -33,14 +34,14 @@ struct Stamp {
 }
 
 impl Stamp {
-    /// `None` if there is no such file, or no time of its last change.
+    /// `None` if the file or its modification time does not exist.
     fn of(path: &Path) -> Option<Self> {
         let metadata = path.metadata().ok()?;
         Some(Stamp { bytes: metadata.len(), modified: metadata.modified().ok()? })
     }
 }
 
-/// The content of a file, understood in the way that `how` says.
+/// The content of a file, decoded as `how` says.
 #[derive(Debug)]
 struct Entry<H, T> {
     stamp: Stamp,
@@ -60,7 +61,7 @@ impl<H, T> Default for Shelf<H, T> {
 }
 
 impl<H: PartialEq, T> Shelf<H, T> {
-    /// What is there of this file as it is now.
+    /// The cached content of this file in its current state.
     fn find(&self, path: &Path, stamp: Stamp, how: &H) -> Option<Arc<T>> {
         let mut shelf = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         let entry = shelf.get_mut(path)?.iter_mut().find(|entry| entry.stamp == stamp && entry.how == *how)?;
@@ -71,12 +72,12 @@ impl<H: PartialEq, T> Shelf<H, T> {
     fn put(&self, path: &Path, stamp: Stamp, how: H, content: &Arc<T>) {
         let mut shelf = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         let entries = shelf.entry(path.to_owned()).or_default();
-        // Of an older state of the file, or read by two threads at once
+        // Replaces entries of an older state, or of another thread that read it at the same time
         entries.retain(|entry| entry.stamp == stamp && entry.how != how);
         entries.push(Entry { stamp, how, content: Arc::clone(content), is_used: true });
     }
 
-    /// Drops what was not used since this was called last.
+    /// Drops content that was not used since the last call.
     fn drop_unused(&self) {
         let mut shelf = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         shelf.retain(|_, entries| {
@@ -86,19 +87,19 @@ impl<H: PartialEq, T> Shelf<H, T> {
     }
 }
 
-/// How many files were read, and how many were there already.
+/// Numbers of files that were read, or shared with the scene before.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct FileCounts {
     /// Read from disk.
     pub read: u64,
-    /// Shared with the scene before.
+    /// Shared with the previous scene.
     pub shared: u64,
 }
 
 /// Contents of meshes, images, textures of faces, volumes and measured materials by file.
 #[derive(Debug, Default)]
 pub struct FileCache {
-    /// False if nothing is kept.
+    /// False if content is not cached.
     keeps: bool,
     meshes: Shelf<(), PlyMesh>,
     maps: Shelf<(ImageChannels, ImageEncoding, Wrap, Filter), MipMap>,
@@ -108,18 +109,18 @@ pub struct FileCache {
     measured: Shelf<(), MeasuredTables>,
     read: AtomicU64,
     shared: AtomicU64,
-    /// Most bytes of the textures of a scene.
+    /// Maximum memory of the textures of a scene (bytes).
     texture_memory: OnceLock<u64>,
-    /// Textures that are read into tiles: one after the other, since each is in memory as a whole for that time.
+    /// Held while a texture is read into tiles: one at a time, since the whole texture is in memory meanwhile.
     tiling: Mutex<()>,
 }
 
-/// Where the textures of a scene go.
+/// Storage of the textures of a scene.
 #[derive(Debug, Default)]
 pub struct TexturePlan {
-    /// For tiles; `None` if everything fits into memory.
+    /// Storage of tiles; `None` if everything fits into memory.
     store: Option<Arc<TileStore>>,
-    /// True for each image that goes there.
+    /// True for each image that is stored in tiles.
     is_tiled: Vec<bool>,
 }
 
@@ -129,15 +130,17 @@ impl FileCache {
         FileCache { keeps: true, ..FileCache::default() }
     }
 
-    /// Lets the textures of each scene take at most so many bytes of memory. What was said first holds.
+    /// Limits the memory of the textures of each scene (bytes). The first call is effective, later ones are ignored.
     pub fn limit_textures(&self, bytes: u64) {
         self.texture_memory.get_or_init(|| bytes);
     }
 
-    /// Where the images of `requests` go, by the sizes that their headers tell. `Err` where there is no temporary file.
+    /// Plans the storage of the images of `requests`, by the sizes in their headers.
+    ///
+    /// Returns `Err` if the temporary file cannot be created.
     pub fn plan_textures<'a>(&self, requests: impl Iterator<Item = &'a ImageRequest>) -> io::Result<TexturePlan> {
         let Some(&limit) = self.texture_memory.get() else { return Ok(TexturePlan::default()) };
-        // Coarser levels add a third. What cannot be read takes nothing: reading it is the error
+        // Coarser levels add a third. An unreadable image counts as 0; reading it reports the error
         let pyramid = |request: &ImageRequest| texture_bytes(&request.path).map_or(0, |b| b.saturating_add(b / 3));
         let bytes: Vec<u64> = requests.map(pyramid).collect();
         let mut in_memory = bytes.iter().fold(0_u64, |sum, &b| sum.saturating_add(b));
@@ -171,7 +174,7 @@ impl FileCache {
         Ok(Arc::new(tiled))
     }
 
-    /// True if contents are kept: a scene then gets copies of meshes.
+    /// True if content is cached: a scene then gets copies of meshes.
     pub fn keeps(&self) -> bool {
         self.keeps
     }
@@ -209,7 +212,7 @@ impl FileCache {
         self.get(&self.measured, path, (), || load_tables(path))
     }
 
-    /// Ends a scene: drops what it did not use, and says how many files it read and shared.
+    /// Ends a scene: drops content that it did not use, and returns the numbers of files that it read and shared.
     pub fn end_scene(&self) -> FileCounts {
         self.meshes.drop_unused();
         self.maps.drop_unused();
@@ -227,13 +230,13 @@ impl FileCache {
         how: H,
         read: impl FnOnce() -> Result<T, E>,
     ) -> Result<Arc<T>, E> {
-        // As it is before it is read: a change meanwhile makes it another file
+        // The state before reading: a change meanwhile makes it another file
         let stamp = if self.keeps { Stamp::of(path) } else { None };
         if let Some(found) = stamp.and_then(|stamp| shelf.find(path, stamp, &how)) {
             self.shared.fetch_add(1, Ordering::Relaxed);
             return Ok(found);
         }
-        // Not under the lock: reading uses all threads
+        // Not under the lock, as reading uses all threads
         let content = Arc::new(read()?);
         self.read.fetch_add(1, Ordering::Relaxed);
         if let Some(stamp) = stamp {
@@ -261,7 +264,7 @@ mod tests {
         assert!(Arc::ptr_eq(&first, &cache.mesh(&path).unwrap()));
         assert_eq!(cache.end_scene(), FileCounts { read: 0, shared: 1 });
 
-        // Another size, and the same size at another time
+        // A different size, and the same size at another time
         std::fs::write(&path, TRIANGLE.replace("1 0 0", "2.5 0 0")).unwrap();
         assert_eq!(cache.mesh(&path).unwrap().positions[1].x, 2.5);
         std::fs::write(&path, TRIANGLE.replace("1 0 0", "4.5 0 0")).unwrap();

@@ -4,12 +4,12 @@ use crate::imaging::{ColorEncoding, FaceMap};
 use lumiris_formats::ptex::{PtexError, read_ptex};
 use std::path::{Path, PathBuf};
 
-/// The textures of faces that a scene asks for.
+/// A request for textures of faces.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FaceMapRequest {
     /// File.
     pub path: PathBuf,
-    /// Meaning of its numbers.
+    /// Encoding of its values.
     pub encoding: ColorEncoding,
 }
 

@@ -1,4 +1,4 @@
-//! Tells a scene from others: a hash of the contents of all its files, wherever they lie.
+//! The fingerprint of a scene: a hash of the contents of all its files, independent of their location.
 
 use lumiris_formats::source::SourceMap;
 use rayon::prelude::*;
@@ -17,17 +17,17 @@ pub struct SceneFiles {
 }
 
 impl SceneFiles {
-    /// The texts that were read, and what they name.
+    /// The texts that were read, and the files they name.
     pub(super) fn new(sources: &SourceMap, others: Vec<PathBuf>) -> Self {
         let texts = sources.texts().map(|bytes| (bytes.len() as u64, crc32fast::hash(bytes)));
         SceneFiles { texts: combined(texts), others }
     }
 
-    /// The hash of all of them; those that are not text are read for it.
+    /// The hash of all files; reads those that are not text.
     pub fn fingerprint(&self) -> Result<u64, (PathBuf, io::Error)> {
         let mut paths = self.others.clone();
         paths.dedup();
-        // Each file is read once, however many shapes it has
+        // Each file is read once, even if several shapes use it
         let distinct: BTreeSet<&PathBuf> = paths.iter().collect();
         let hashes: HashMap<&PathBuf, (u64, u32)> = distinct
             .into_par_iter()

@@ -4,13 +4,13 @@ use crate::bsdfs::MeasuredTables;
 use lumiris_formats::bsdf_file::{BsdfFileError, read_bsdf};
 use std::path::Path;
 
-/// Why there are no tables.
+/// Errors of measured materials.
 #[derive(Debug, thiserror::Error)]
 pub enum MeasuredError {
     /// The file cannot be read.
     #[error(transparent)]
     File(#[from] BsdfFileError),
-    /// What it holds does not fit together.
+    /// The content is inconsistent.
     #[error("{0}")]
     Tables(String),
 }

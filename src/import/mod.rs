@@ -1,8 +1,6 @@
-//! From scene files to scenes: the meaning of pbrt's directives ([`pbrt`]) and of glTF ([`gltf`]), and the images,
-//! meshes, textures of faces, volumes and measured materials that they name ([`resources`], [`images`], [`face_maps`], [`volumes`],
-//! [`measured`]), which the scenes of an
-//! animation share ([`cache`]). A
-//! [`fingerprint`] tells a scene from others.
+//! From scene files to scenes: the semantics of pbrt's directives ([`pbrt`]) and of glTF ([`gltf`]). They name images,
+//! meshes, textures of faces, volumes and measured materials ([`resources`], [`images`], [`face_maps`], [`volumes`],
+//! [`measured`]), which the scenes of an animation share ([`cache`]). A [`fingerprint`] identifies a scene.
 //!
 //! The files themselves are parsed by the crate `lumiris_formats`. User input never panics: problems are collected,
 //! with their source locations, in [`Diagnostics`].
@@ -29,7 +27,7 @@ use lumiris_formats::source::SourceMap;
 use pbrt::state::Builder;
 use std::path::{Path, PathBuf};
 
-/// What overrides a scene file.
+/// Options that override a scene file.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct LoadOptions {
     /// Size of the image (width, height).
@@ -38,20 +36,20 @@ pub struct LoadOptions {
     pub crop: Option<[f32; 4]>,
     /// Image of the environment of a glTF scene.
     pub environment: Option<PathBuf>,
-    /// Name or index of the scene of a glTF file; without it, the one that the file has as its default, or the first.
+    /// Name or index of the scene of a glTF file; by default the default scene of the file, or the first.
     pub scene: Option<String>,
-    /// Name or index of the camera of a glTF scene; without it, the first.
+    /// Name or index of the camera of a glTF scene; by default the first.
     pub camera: Option<String>,
-    /// True if a glTF scene is framed, whatever its cameras.
+    /// True for the automatic camera in a glTF scene, even if it has cameras.
     pub camera_auto: bool,
-    /// What the candela and lux of a glTF scene's lights are.
+    /// Units of the punctual lights of a glTF scene.
     pub light_units: Option<LightUnits>,
-    /// The time (s) at which animations of a glTF scene are seen; without it things are where they stand.
+    /// The time (s) at which animations of a glTF scene are evaluated; by default they are not.
     pub time: Option<f32>,
 }
 
 impl LoadOptions {
-    /// The first option that is for glTF scenes only, if any is given.
+    /// The first given option that is for glTF scenes only.
     pub fn of_gltf(&self) -> Option<&'static str> {
         let options = [
             ("--environment", self.environment.is_some()),
@@ -72,32 +70,34 @@ pub struct Loaded {
     pub scene: Scene,
     /// The file's settings.
     pub settings: Settings,
-    /// Those of them that the file gives.
+    /// Settings given in the file.
     pub given: Given,
     /// Warnings.
     pub warnings: Report,
-    /// The files that it was read from.
+    /// The files of the scene.
     pub files: SceneFiles,
 }
 
 impl Loaded {
-    /// Builds the ray tracers, and prepares what the settings require; see [`World::new`].
+    /// Builds the ray tracers, and prepares the data for the settings; see [`World::new`].
     pub fn job(self, kind: AccelKind, packet_width: Option<u32>) -> Result<RenderJob, EmbreeError> {
         Ok(RenderJob::new(World::new(self.scene, kind, packet_width)?, self.settings))
     }
 }
 
-/// True if the name is that of a glTF file.
+/// True if the name has the extension of a glTF file.
 pub fn is_gltf(path: &Path) -> bool {
     path.extension().is_some_and(|e| e.eq_ignore_ascii_case("gltf") || e.eq_ignore_ascii_case("glb"))
 }
 
-/// Loads a scene file. `Err` holds all errors and the warnings.
+/// Loads a scene file.
+///
+/// Returns `Err` with all errors and warnings.
 pub fn load(path: &Path, options: &LoadOptions) -> Result<Loaded, Box<Report>> {
     load_with(path, options, &FileCache::default())
 }
 
-/// Loads a scene file; meshes and images that `files` has are not read again.
+/// Loads a scene file, with meshes and images from the cache `files`.
 pub fn load_with(path: &Path, options: &LoadOptions, files: &FileCache) -> Result<Loaded, Box<Report>> {
     if is_gltf(path) {
         return gltf::load(path, options, files);
@@ -108,7 +108,7 @@ pub fn load_with(path: &Path, options: &LoadOptions, files: &FileCache) -> Resul
     })
 }
 
-/// Loads a scene from its text; files that it names are sought in `folder`. Messages call it `name`.
+/// Loads a scene from its text. File names are relative to `folder`. Messages call the scene `name`.
 pub fn load_text(
     text: &str,
     name: &str,
@@ -122,7 +122,7 @@ pub fn load_text(
     })
 }
 
-/// Builds the scene that `parse` reads.
+/// Builds the scene from the result of `parse`.
 fn load_parsed(
     folder: PathBuf,
     options: &LoadOptions,

@@ -1,4 +1,4 @@
-//! Files that a scene asks for, each once, and its images, which are all read in parallel.
+//! Requests for the files of a scene, each once. All images are read in parallel.
 
 use super::cache::{FileCache, TexturePlan};
 use super::images::ImageRequest;
@@ -12,7 +12,7 @@ use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// Requests of files, each once, in the order in which they were made first.
+/// Requests for files, each once, in the order of first use.
 #[derive(Debug)]
 pub struct Requests<R> {
     list: Vec<(R, Span)>,
@@ -26,7 +26,7 @@ impl<R> Default for Requests<R> {
 }
 
 impl<R: PartialEq> Requests<R> {
-    /// The index of a request of the file `path`; equal requests share one. `span` is where it is made.
+    /// The index of a request for the file `path`; equal requests share one. `span` is its source position.
     pub fn index(&mut self, path: &Path, request: R, span: Span) -> u32 {
         let indices = self.by_path.entry(path.to_owned()).or_default();
         if let Some(&index) = indices.iter().find(|&&index| self.list[index as usize].0 == request) {
@@ -38,20 +38,20 @@ impl<R: PartialEq> Requests<R> {
         index
     }
 
-    /// All of them, with where each was made first.
+    /// All requests, with the source positions of first use.
     pub fn list(&self) -> &[(R, Span)] {
         &self.list
     }
 }
 
-/// All images that a scene asks for.
+/// All images of a scene.
 #[derive(Debug, Default)]
 pub struct Resources {
     requests: Requests<ImageRequest>,
 }
 
 impl Resources {
-    /// The id that the image will have; equal requests share one.
+    /// The future id of the image; equal requests share one.
     pub fn image(&mut self, request: ImageRequest, span: Span) -> ImageId {
         let path = request.path.clone();
         self.requests.index(&path, request, span)
@@ -82,7 +82,7 @@ impl Resources {
     }
 }
 
-/// An image that cannot be read: one of the missing files, or an error of its own.
+/// Reports an unreadable image: among the missing files, or as an error of its own.
 pub fn report(error: &ImageError, path: &Path, span: Span, d: &mut Diagnostics) {
     match error {
         ImageError::NotFound { .. } => d.missing_file(path, "no such file", Some(span)),

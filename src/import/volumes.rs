@@ -1,4 +1,4 @@
-//! Grids of NanoVDB files as trees.
+//! Grids of NanoVDB files as sparse trees.
 
 use crate::media::{Cube, SparseGrid};
 use lumiris_formats::nanovdb::{GridClass, NanoError, read_nanovdb};
@@ -6,38 +6,38 @@ use lumiris_numbers::math::{DAffine3, DVec3};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// What a grid is read for.
+/// The use of a grid.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum VolumeUse {
-    /// Densities, none of which is negative.
+    /// Densities, which must not be negative.
     Density,
     /// Temperatures.
     Temperature,
 }
 
-/// A grid that a scene asks for.
+/// A request for a grid.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub struct VolumeRequest {
     /// The file.
     pub path: PathBuf,
     /// Name of the grid.
     pub grid: String,
-    /// What for.
+    /// Its use.
     pub usage: VolumeUse,
 }
 
-/// A grid that was read.
+/// A grid.
 #[derive(Debug)]
 pub struct Volume {
     /// Its values.
     pub grid: Arc<SparseGrid>,
-    /// What they mean.
+    /// Their class.
     pub class: GridClass,
     /// From indices to the space of the file.
     pub space_from_index: DAffine3,
     /// The box of its active voxels in the space of the file; `None` if there are none.
     pub bounds: Option<[[f64; 3]; 2]>,
-    /// How many values were taken for 0, since no such value can be.
+    /// Number of invalid values that were replaced by 0.
     pub replaced: usize,
 }
 

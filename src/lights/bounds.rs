@@ -1,4 +1,4 @@
-//! Bounds of emission: where lights are, where they point, how bright they are [Conty Estévez and Kulla 2018].
+//! Bounds of emission: position, orientation and intensity of sets of lights [Conty Estévez and Kulla 2018].
 //!
 //! A cone of half-angle θo about the axis contains all normals; light is emitted within θe of a normal.
 
@@ -8,7 +8,7 @@ use std::f32::consts::{FRAC_PI_2, PI};
 /// Bounds of the emission of a set of lights.
 #[derive(Clone, Copy, Debug)]
 pub struct LightBounds {
-    /// Where they are.
+    /// Bounding box.
     pub bounds: Bounds3,
     /// Unit axis of the cone of normals.
     pub axis: Vec3,
@@ -18,12 +18,12 @@ pub struct LightBounds {
     pub cos_theta_e: f32,
     /// True if they emit along the reversed normals too.
     pub two_sided: bool,
-    /// Sum of the luminances of their maximum radiant intensities; of lights with an image, of the mean ones.
+    /// Sum of the luminances of the maximum radiant intensities; of the mean intensities for lights with an image.
     pub intensity: f32,
 }
 
 impl LightBounds {
-    /// The bounds of nothing.
+    /// The bounds of no light.
     pub const EMPTY: LightBounds = LightBounds {
         bounds: Bounds3::EMPTY,
         axis: Vec3::Z,
@@ -66,8 +66,8 @@ impl LightBounds {
         2.0 * PI * (1.0 - self.cos_theta_o) + FRAC_PI_2 * edge
     }
 
-    /// The heuristic's cost of a cluster. A little of the squared diagonal is added to the area, so that lights on a
-    /// line are distinguished as well.
+    /// The cost of a cluster in the heuristic. A small fraction of the squared diagonal is added to the area, so that
+    /// lights on a line have different costs as well.
     pub fn cost(&self) -> f32 {
         if self.intensity <= 0.0 {
             return 0.0;
@@ -88,7 +88,7 @@ pub(super) fn union_cones(a: (Vec3, f32), b: (Vec3, f32)) -> (Vec3, f32) {
     if a.1 <= -1.0 || b.1 <= -1.0 {
         return SPHERE;
     }
-    // One may hold the other.
+    // One cone may contain the other.
     let (theta_a, theta_b) = (a.1.clamp(-1.0, 1.0).acos(), b.1.clamp(-1.0, 1.0).acos());
     let theta_d = angle_between(a.0, b.0);
     if theta_d + theta_b <= theta_a {
@@ -98,18 +98,18 @@ pub(super) fn union_cones(a: (Vec3, f32), b: (Vec3, f32)) -> (Vec3, f32) {
         return b;
     }
 
-    // Turn the axis of `a` towards that of `b` until the cone touches the far side of both.
+    // Rotate the axis of `a` towards the axis of `b` until the cone touches the far side of both.
     let theta_o = 0.5 * (theta_a + theta_d + theta_b) + 1e-5;
     if theta_o >= PI {
         return SPHERE;
     }
     let difference = b.0 - a.0 * a.0.dot(b.0);
     if difference.length_squared() <= 1e-8 {
-        // Parallel axes: widen one cone. Opposite ones have no preferred turn.
+        // Parallel axes: widen one cone. Opposite axes have no preferred direction of rotation.
         let widened = theta_d + theta_a.max(theta_b) + 1e-5;
         return if a.0.dot(b.0) > 0.0 && widened < PI { (a.0, widened.cos()) } else { SPHERE };
     }
-    // Twice, as the first difference of nearly parallel axes is not perpendicular but for rounding.
+    // Orthogonalise twice: rounding tilts the first difference of nearly parallel axes.
     let towards_b = difference.normalize();
     let towards_b = (towards_b - a.0 * a.0.dot(towards_b)).normalize();
     let (sin, cos) = (theta_o - theta_a).sin_cos();

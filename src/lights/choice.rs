@@ -1,4 +1,4 @@
-//! What light samplers answer: a chosen light, or a run of positions that choose the same one.
+//! Results of light samplers: a chosen light, or a run of consecutive positions that choose the same light.
 
 use super::LightId;
 
@@ -20,14 +20,14 @@ pub struct LightRun {
     pub light: LightId,
     /// Probability of the choice.
     pub pmf: f32,
-    /// Places in the list, end exclusive.
+    /// Index range in the list, end exclusive.
     pub places: [u32; 2],
     /// The part of [0, 1) that chooses the light.
     pub interval: [f64; 2],
 }
 
 impl LightRun {
-    /// A position of the run, made uniform in [0, 1) again. Both are in units of 2⁻³².
+    /// Remaps a position of the run to be uniform in [0, 1) again. Both are in units of 2⁻³².
     #[inline]
     pub fn within(&self, position: u32) -> u32 {
         let [start, end] = self.interval;

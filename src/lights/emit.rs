@@ -1,8 +1,8 @@
 //! Sampling of emitted rays: the start of photon paths.
 //!
-//! A sample is a ray with the power Φ = Le·|cos θ|/(p_A·p_ω), p_A being the density of its origin (1/m²) and p_ω that
-//! of its direction (1/sr), so E\[Φ\] is the emitted flux (W); for delta lights with a position, the intensity replaces
-//! Le·|cos θ|/p_A.
+//! A sample is a ray with the power Φ = Le·|cos θ|/(p_A·p_ω), where p_A is the density of its origin (1/m²) and p_ω is
+//! the density of its direction (1/sr). E\[Φ\] is therefore the emitted flux (W). For delta lights with a position, the
+//! intensity replaces Le·|cos θ|/p_A.
 //!
 //! | light | origin | direction | Φ |
 //! |---|---|---|---|
@@ -11,7 +11,7 @@
 //! | goniometric, projection | its position | by its image | I/p_ω |
 //! | area | by area, see [`area`](super::area) | cosine about the normal, of one side or of either | π·Le/p_A |
 //! | distant | disk | its own | π·R²·E, constant |
-//! | portal | evenly over it, then back by the scene's size | by what of its image passes | A·Le·cos θ/p_ω |
+//! | portal | uniform over it, moved back by the scene's size | by the part of its image that passes | A·Le·cos θ/p_ω |
 //! | environment | disk | by its image, or uniform | π·R²·Le/p_ω |
 //!
 //! The disk has the radius R of the scene's bounding sphere, is perpendicular to the direction and touches that sphere
@@ -27,7 +27,7 @@ use std::f32::consts::{PI, TAU};
 /// A photon leaving a light.
 #[derive(Clone, Copy, Debug)]
 pub struct EmissionSample {
-    /// Where it starts.
+    /// Origin.
     pub p: Vec3,
     /// Bound of the rounding error of `p` per axis; zero without a surface.
     pub p_error: Vec3,
@@ -35,11 +35,11 @@ pub struct EmissionSample {
     pub n: Vec3,
     /// Unit direction, away from the light.
     pub d: Vec3,
-    /// Its power (W): Le·|cos θ| by the densities of position and direction. Its mean is the emitted flux.
+    /// Its power (W): Le·|cos θ| divided by the densities of position and direction. Its mean is the emitted flux.
     pub power: Rgb,
 }
 
-/// A point of a surface, and what leaves it in a direction.
+/// A point of a surface, and the radiance that leaves it in a direction.
 #[derive(Clone, Copy, Debug)]
 pub struct EmittingPoint {
     /// The point.
@@ -50,25 +50,26 @@ pub struct EmittingPoint {
     pub n: Vec3,
     /// Density of the point (1/m²).
     pub pdf_area: f32,
-    /// Radiance that leaves it; black on a side that does not emit.
+    /// Radiance that leaves the point; black on a side that does not emit.
     pub radiance: Rgb,
 }
 
 impl EmissionSample {
-    /// For lights without a surface.
+    /// A photon of a light without a surface.
     pub(super) fn in_space(p: Vec3, d: Vec3, power: Rgb) -> Option<Self> {
         EmissionSample { p, p_error: Vec3::ZERO, n: Vec3::ZERO, d, power }.if_lit()
     }
 
-    /// `None` if it carries nothing.
+    /// `None` if it carries no power or is not finite.
     fn if_lit(self) -> Option<Self> {
         (!self.power.is_black() && self.power.is_finite() && self.p.is_finite() && self.d.is_finite()).then_some(self)
     }
 }
 
 impl Light {
-    /// Samples light that leaves this source into a scene with a bounding sphere of the given centre and radius (m);
-    /// `None` if it carries nothing. The first number of `u_direction` also chooses the side of a two-sided surface.
+    /// Samples light that leaves this source into a scene with a bounding sphere of the given centre and radius (m).
+    /// Returns `None` if the sample carries no power. The first number of `u_direction` also chooses the side of a
+    /// two-sided surface.
     pub fn sample_le(&self, scene: (Vec3, f32), u_position: [f32; 2], u_direction: [f32; 2]) -> Option<EmissionSample> {
         match self {
             Light::Point { p, intensity } => {
@@ -96,7 +97,8 @@ impl Light {
     }
 }
 
-/// Light from the unit direction `wi` through the disk that the scene projects to; `irradiance` is that of the disk.
+/// Light from the unit direction `wi` through the disk that the scene projects to; `irradiance` is the irradiance of
+/// the disk.
 fn from_infinity(
     (centre, radius): (Vec3, f32),
     u_position: [f32; 2],
@@ -109,7 +111,7 @@ fn from_infinity(
 }
 
 impl AreaLight {
-    /// Samples a point of the surface, by area or nearly so, as it emits in the unit direction `d`.
+    /// Samples a point of the surface, uniform or nearly uniform in area, and its emission in the unit direction `d`.
     pub fn sample_point_towards(&self, u_position: [f32; 2], d: Vec3) -> EmittingPoint {
         let point = self.sample_point(u_position);
         let faces = point.n.dot(d) > 0.0;
@@ -130,7 +132,7 @@ impl AreaLight {
             (true, false) => ((2.0 * u - 1.0).min(ONE_MINUS_EPSILON), -point.n, 2.0),
         };
 
-        // The cosine of the radiance cancels with that of the density, cos θ/π.
+        // The cosine of the radiance cancels with the cosine of the density, cos θ/π.
         let d = Frame::from_z(n).to_world(sample_cosine_hemisphere([u, v])).normalize();
         let power = self.radiance(point.p) * (PI * sides / point.pdf_area);
         EmissionSample { p: point.p, p_error: point.p_error, n, d, power }.if_lit()

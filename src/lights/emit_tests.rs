@@ -1,4 +1,4 @@
-//! Emitted rays against the power of the light, against light sampling, and against their pdfs.
+//! Emitted rays compared with the power of the light, with light sampling, and with their pdfs.
 
 use super::light_tests::{
     CELLS, Surface, patch_surface, placement, quadric, quadric_surface, rectangle_mesh, rectangle_surface, squash,
@@ -119,7 +119,7 @@ fn stream_of(name: &str, salt: u32) -> Pcg32 {
 #[test]
 fn the_mean_power_of_every_light_is_its_flux() {
     for (name, light) in lights() {
-        // The flux of a bent textured surface has no closed form; the test of irradiances holds it.
+        // The flux of a bent textured surface has no closed form; the test of irradiances covers it.
         if name == "textured patch" {
             continue;
         }
@@ -129,7 +129,7 @@ fn the_mean_power_of_every_light_is_its_flux() {
             let s = light.sample_le(SCENE, stream.random::<[f32; 2]>(), stream.random::<[f32; 2]>());
             power.add(s.map_or(0.0, |s| f64::from(s.power.luminance())));
         }
-        // Areas of curved surfaces and integrals of images are sums over cells.
+        // Areas of curved surfaces and integrals of images are sums over cells, hence the tolerance.
         power.assert_mean(f64::from(light.phi(SCENE.1)), 1e-5, 3e-4);
     }
 }
@@ -137,7 +137,7 @@ fn the_mean_power_of_every_light_is_its_flux() {
 /// Half the edge (m) of the square receiver in the plane z = 0.
 const HALF: f32 = 1.0;
 
-/// Flux per area that a photon leaves on the side of the receiver that `n` = ±z is on.
+/// Flux per area that a photon deposits on the side of the receiver given by `n` = ±z.
 fn deposit(s: &EmissionSample, n: Vec3) -> Rgb {
     let t = -s.p.z / s.d.z;
     let p = s.p + s.d * t;
@@ -176,7 +176,7 @@ fn photons_deposit_the_irradiance_that_direct_light_has() {
     }
 }
 
-/// χ² of places in a square of parameters against the uniform density.
+/// χ² test of points in a square of parameters against the uniform density.
 fn assert_uniform(places: impl Iterator<Item = [f32; 2]>) {
     let mut observed = vec![0.0; CELLS * CELLS];
     let mut count = 0.0;
@@ -197,7 +197,7 @@ fn emitted(light: &Light, salt: u32) -> Vec<EmissionSample> {
         .collect()
 }
 
-/// Positions by area over the surface, directions by the cosine about the normal.
+/// χ² tests: positions uniform in area over the surface, directions by the cosine about the normal.
 fn check_surface(surface: &Surface, salt: u32, uniform_in_parameters: bool) {
     const SUB: usize = 16;
     let samples = emitted(&Light::Area(surface.light.clone()), salt);
@@ -259,7 +259,7 @@ fn light_from_infinity_comes_through_a_disk_that_covers_the_scene() {
         assert!(s.d == -wi && s.n == Vec3::ZERO && (p.z - 1.0).abs() < 1e-5);
         [p.truncate().length_squared(), azimuth(p) / TAU]
     }));
-    // Whatever the direction, the disk faces the scene and touches its sphere. Portals have no disk
+    // For every direction, the disk faces the scene and touches its bounding sphere. Portals have no disk
     let has_disk = |light: &Light| light.is_infinite() && !matches!(light, Light::Portal(_));
     for (name, light) in lights().into_iter().filter(|(_, light)| has_disk(light)) {
         for s in emitted(&light, 9).iter().take(2000) {
@@ -342,7 +342,7 @@ fn what_emits_nothing_sends_no_photons() {
             assert!(light.sample_le(SCENE, u, u).is_none(), "{light:?}");
         }
     }
-    // No number of the unit square breaks a light that shines.
+    // No random numbers in the unit square give an invalid sample.
     for (name, light) in lights() {
         for u in [[0.0, 0.0], [0.5, 0.5], [0.0, 0.999_999_94], [0.999_999_94; 2]] {
             let s = light.sample_le(SCENE, u, u);

@@ -1,10 +1,12 @@
 //! Environment maps: radiance from all directions by an image, importance sampled.
 //!
-//! The image covers the unit square, which [`EnvironmentMapping`] maps to directions. The density is constant per texel, or per
-//! block of nearly equal texels ([`TexelDistribution`]), and proportional to the mean of the interpolated luminance over the texel (times the solid angle of its row for
-//! latitude-longitude images): for bilinear lookups that is the image smoothed by [1/8, 6/8, 1/8] in both axes, which
-//! is positive wherever a lookup is. Per steradian it is pdf(u, v)/4π for equal-area images, and pdf(u, v)/(2π² sin θ)
-//! for latitude-longitude images.
+//! The image covers the unit square, which [`EnvironmentMapping`] maps to directions. The density is constant per
+//! texel, or per block of nearly equal texels ([`TexelDistribution`]). It is proportional to the mean of the
+//! interpolated luminance over the texel, times the solid angle of its row for latitude-longitude images.
+//!
+//! For bilinear lookups this mean is the image smoothed by [1/8, 6/8, 1/8] in both axes, which is positive wherever a
+//! lookup is. The density per steradian is pdf(u, v)/4π for equal-area images, and pdf(u, v)/(2π² sin θ) for
+//! latitude-longitude images.
 
 use super::LightSample;
 use lumiris_lanes::environment::{Environment, equal_area_squares};
@@ -17,7 +19,7 @@ use lumiris_numbers::math::{Affine3A, Mat3, Rgb, TexelDistribution, Vec2, Vec3};
 use rayon::prelude::*;
 use std::f64::consts::PI;
 
-/// Parts of texels that are looked up for an integral, at least.
+/// Minimum number of texel parts that an integral looks up.
 const PARTS: usize = 1 << 18;
 /// Directions that are looked up together.
 const CHUNK: usize = 64;
@@ -34,7 +36,7 @@ pub enum EnvironmentMapping {
 /// How texels are looked up.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum EnvironmentFilter {
-    /// The texel that holds the point, as pbrt-v4 does.
+    /// The texel that contains the point, as in pbrt-v4.
     Nearest,
     /// Blend of the four nearest texels, continuous on the sphere.
     Bilinear,
@@ -69,7 +71,7 @@ pub(super) fn cleaned(c: Rgb) -> Rgb {
     c.map(|x| if x.is_finite() { x.max(0.0) } else { 0.0 })
 }
 
-/// The rotation of a transform, with a mirror if it has one: the orthogonal map next to it whose x axis is the same.
+/// The rotation of a transform, with a reflection if it has one: the nearby orthogonal map with the same x axis.
 pub fn orthogonal(world_from_light: &Affine3A) -> Mat3 {
     let m = &world_from_light.matrix3;
     let x = Vec3::from(m.x_axis).normalize_or(Vec3::X);
@@ -86,7 +88,7 @@ fn color([r, g, b, _]: [f32; 4]) -> Rgb {
     Rgb::new(r, g, b)
 }
 
-/// The cleaned texels with a border of one that continues the image around the sphere.
+/// The cleaned texels with a border of one texel that continues the image around the sphere.
 fn with_border(texels: &[Rgb], [width, height]: [usize; 2], mapping: EnvironmentMapping) -> Vec<[f32; 4]> {
     let (w, h) = (width as isize, height as isize);
     let mut bordered = Vec::with_capacity((width + 2) * (height + 2));
@@ -94,7 +96,7 @@ fn with_border(texels: &[Rgb], [width, height]: [usize; 2], mapping: Environment
         for x in -1..=w {
             let (x, y) = match mapping {
                 EnvironmentMapping::EqualArea => wrap_equal_area_texel(x, y, w),
-                // Over a pole lies the opposite meridian.
+                // Beyond a pole, the opposite meridian follows.
                 EnvironmentMapping::LatLong => {
                     let over_pole = y < 0 || y >= h;
                     let x = if over_pole { x + w / 2 } else { x };
@@ -115,8 +117,9 @@ pub(super) fn infinite_sample(wi: Vec3, li: Rgb, pdf: f32) -> LightSample {
 }
 
 impl EnvironmentMap {
-    /// A map of linear RGB texels, rows from y = 0; `Err` with a message if the sizes do not fit the mapping.
-    /// Components that are negative or not finite become 0.
+    /// A map of linear RGB texels, rows from y = 0. Components that are negative or not finite become 0.
+    ///
+    /// Returns `Err` with a message if the sizes do not fit the mapping.
     pub fn new(
         texels: Vec<Rgb>,
         [width, height]: [usize; 2],
@@ -167,7 +170,7 @@ impl EnvironmentMap {
         (pdf > 0.0 && pdf.is_finite()).then(|| EnvironmentSample { w: w.normalize(), le: self.lookup(p), pdf })
     }
 
-    /// The data for sampling in lanes.
+    /// The data for vectorised sampling.
     pub(super) fn lanes(&self, world_from_light: Mat3, scale: f32) -> Environment<'_> {
         Environment {
             distribution: &self.distribution,
@@ -192,8 +195,8 @@ impl EnvironmentMap {
         (self.lookup(p), self.pdf_at(w, p))
     }
 
-    /// [`le_and_pdf`](Self::le_and_pdf) of `n` directions. Texels far apart are cache misses, which overlap where nothing
-    /// else is between them.
+    /// [`le_and_pdf`](Self::le_and_pdf) of `n` directions. The lookups are in a loop of their own, so that the cache
+    /// misses of distant texels overlap.
     pub fn le_and_pdf_many(&self, n: usize, w: impl Fn(usize) -> Vec3, mut out: impl FnMut(usize, Rgb, f32)) {
         let (mut directions, mut places) = ([[0.0; CHUNK]; 3], [[0.0; CHUNK]; 2]);
         let mut found = [(Rgb::BLACK, 0.0); CHUNK];
@@ -222,7 +225,7 @@ impl EnvironmentMap {
         }
     }
 
-    /// Density at the direction `w`, whose place in the square is `p`.
+    /// Density in the direction `w`, which the mapping takes to the point `p` of the square.
     #[inline]
     fn pdf_at(&self, w: Vec3, p: Vec2) -> f32 {
         let density = match self.mapping {
@@ -241,7 +244,7 @@ impl EnvironmentMap {
         }
     }
 
-    /// Index of a texel whose coordinates may be outside by one.
+    /// Index of a texel whose coordinates may be out of range by one.
     #[inline]
     fn texel_index(&self, x: isize, y: isize) -> usize {
         (y + 1) as usize * (self.width + 2) + (x + 1) as usize
@@ -283,12 +286,12 @@ impl EnvironmentMap {
             };
             (0..width).map(at).sum()
         };
-        // Rows have their places, so that the sum does not depend on threads
+        // Each row has its own sum, so that the total does not depend on the threads
         let rows: Vec<f64> = (0..height).into_par_iter().map(row).collect();
         rows.iter().sum::<f64>() / (width * height) as f64
     }
 
-    /// Angle that a texel is wide and high, roughly (radians).
+    /// Approximate angular width and height of a texel (radians).
     pub(super) fn texel_angle(&self) -> f32 {
         match self.mapping {
             EnvironmentMapping::EqualArea => (4.0 * PI).sqrt() as f32 / self.width as f32,
@@ -296,7 +299,7 @@ impl EnvironmentMap {
         }
     }
 
-    /// The direction of a place in the square, and the density per steradian of a uniform one.
+    /// The direction of a point of the square, and its density per steradian if the point is uniform.
     #[inline]
     fn to_sphere(&self, p: Vec2) -> (Vec3, f32) {
         match self.mapping {
@@ -428,7 +431,7 @@ mod tests {
         let expected: Vec<f64> = (0..ROWS * COLUMNS)
             .map(|cell| {
                 let (row, column) = (cell / COLUMNS, cell % COLUMNS);
-                // By the angle from the pole, where a density over rows of an image grows like 1/sin θ
+                // Integrate over the angle from the pole: near it, a density over rows of an image grows like 1/sin θ
                 let [low, high] = [row + 1, row].map(|r| (2.0 * r as f32 / ROWS as f32 - 1.0).acos());
                 let mut sum = 0.0;
                 for i in 0..sub * sub {
@@ -442,7 +445,7 @@ mod tests {
             .collect();
         let total: f64 = expected.iter().sum::<f64>() / f64::from(count);
         assert!((total - 1.0).abs() < 5e-3, "the density integrates to {total}");
-        // A cell whose corner alone is lit may be missed by all points.
+        // The integration points may miss a cell of which only a corner is lit.
         let expected: Vec<f64> = expected.into_iter().map(|e| e.max(0.05)).collect();
         assert_chi_squared(&observed, &expected, 1e-5);
     }
@@ -461,8 +464,8 @@ mod tests {
                         f64::from(map.le(sample_uniform_sphere(stream.random::<[f32; 2]>())).luminance()) * 4.0 * PI,
                     );
                 }
-                // Smoothing does not commute with the solid angle of rows, so bilinear latitude-longitude maps are
-                // only near.
+                // Smoothing does not commute with the solid angle of rows, so bilinear latitude-longitude maps are only
+                // approximate.
                 let exact = mapping == EnvironmentMapping::EqualArea || filter == EnvironmentFilter::Nearest;
                 let tolerance = if exact { 1e-4 } else { 0.1 };
                 sampled.assert_mean(f64::from(map.luminance_integral()), 1e-5, tolerance);

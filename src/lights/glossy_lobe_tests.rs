@@ -6,8 +6,8 @@ use lumiris_numbers::math::warp::{sample_cosine_hemisphere, sample_uniform_spher
 use lumiris_numbers::math::{Rgb, Vec3};
 use lumiris_test_support::random::{RngExt, pcg32};
 
-/// The second moment of a one-light estimate over the square of the mean, of 60 point lights around a metal sample, with
-/// and without the lobe: means over many views.
+/// The relative second moment E[X²]/E[X]² of a one-light estimate of 60 point lights around a metal surface, with and
+/// without the lobe, averaged over many views.
 fn second_moments(alpha: f32) -> [f64; 2] {
     let mut s = pcg32([alpha.to_bits(), 3, 1]);
     let distribution = TrowbridgeReitz::new(alpha, alpha);

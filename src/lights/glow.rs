@@ -1,13 +1,15 @@
-//! What a medium sends out, as lights: parts of its box, in each of which a point is drawn.
+//! Emission of media as lights: a light is a part of a medium's box, in which points are sampled.
 //!
-//! A path looks for the glow of a medium at places along its way at a rate λ: so it finds points at the density p(ω)·λ per
-//! solid angle and length. A point that is drawn with the density p per volume has p·r² of these at the distance r. Of both,
-//! λ is taken out: as a light, the medium has the radiance σ_a L_e/λ, and its samples have the density p·r²/λ per steradian,
-//! which weighs against p(ω) as that of any other light does. The weights of the two techniques add up
-//! to 1 at every point of the volume, which multiple importance sampling needs [Veach and Guibas 1995], and those of paths
-//! bound what is near. Line integrals instead of points are another way [Simon et al. 2017].
+//! A path collects the emission of a medium at points along its rays, at a rate λ. These points have the density p(ω)·λ
+//! per solid angle and length. A light sample with the density p per volume has the density p·r² in the same measure at
+//! the distance r.
 //!
-//! What is not drawn at all, since a part seemed dark, has the density 0, and is left to paths.
+//! λ is divided out of both. As a light, the medium has the radiance σ_a L_e/λ, and its samples have the density p·r²/λ
+//! per steradian. That density is compared with p(ω), as for any other light. The weights of the two techniques add up
+//! to 1 at every point of the volume, as multiple importance sampling requires [Veach and Guibas 1995], and the path
+//! samples bound the contribution of near points. [Simon et al. 2017] use line integrals instead of points.
+//!
+//! Cells that appear dark to the probes have the density 0 and are left to paths.
 
 use super::{LightBounds, LightCtx, LightSample};
 use crate::media::{Heterogeneous, MediumId};
@@ -18,12 +20,12 @@ use std::sync::Arc;
 
 /// Cells along an axis of a part.
 const CELLS: usize = 4;
-/// Most parts along an axis of a medium.
+/// Maximum number of parts along an axis of a medium.
 const MAX_PARTS: usize = 8;
-/// Points along an axis of a cell at which the medium is looked up.
+/// Lookups of the medium along an axis of a cell.
 const PROBES: usize = 2;
 
-/// A part of a medium that glows.
+/// An emitting part of a medium.
 #[derive(Clone, Debug)]
 pub struct Glow {
     medium: Arc<Heterogeneous>,
@@ -32,24 +34,24 @@ pub struct Glow {
     /// Lower corner and size in the unit cube of the medium.
     corner: Vec3,
     size: Vec3,
-    /// Running sums of the probabilities of its cells, x first.
+    /// Running sums of the probabilities of the cells, x fastest.
     sums: Vec<f32>,
     /// Volume of a cell (m³).
     cell_volume: f32,
     bounds: LightBounds,
 }
 
-/// The parts that the box of a medium is divided into, by their numbers along the axes.
+/// The division of a medium's box into parts: numbers of parts along the axes.
 #[derive(Clone, Copy, Debug)]
 pub struct Parts([usize; 3]);
 
 impl Parts {
-    /// Those of a medium.
+    /// The division of a medium.
     pub fn of(medium: &Heterogeneous) -> Self {
         Parts(medium.resolution().map(|n| n.div_ceil(CELLS).clamp(1, MAX_PARTS)))
     }
 
-    /// What glows of them, x first.
+    /// The emitting parts, x fastest; `None` for dark ones.
     pub fn glows(self, medium: &Arc<Heterogeneous>, id: MediumId) -> Vec<Option<Glow>> {
         let [nx, ny, nz] = self.0;
         let of = |i: usize| {
@@ -60,7 +62,7 @@ impl Parts {
         (0..nx * ny * nz).into_par_iter().map(of).collect()
     }
 
-    /// The number of the part at a point of the unit cube.
+    /// Index of the part that contains a point of the unit cube.
     #[inline]
     pub fn at(self, p: Vec3) -> usize {
         let [nx, ny, _] = self.0;
@@ -69,7 +71,7 @@ impl Parts {
     }
 }
 
-/// The one of `n` equal intervals of [0, 1] that holds `x`.
+/// Index of the interval that contains `x`, out of `n` equal intervals of [0, 1].
 #[inline]
 fn place(x: f32, n: usize) -> usize {
     ((x * n as f32).max(0.0) as usize).min(n - 1)
@@ -78,6 +80,7 @@ fn place(x: f32, n: usize) -> usize {
 impl Glow {
     /// A part; `None` if it is dark.
     fn new(medium: &Arc<Heterogeneous>, id: MediumId, corner: Vec3, size: Vec3) -> Option<Self> {
+        // Mean luminance of the probes in each cell
         let step = size / (CELLS * PROBES) as f32;
         let mut glowing = Bounds3::EMPTY;
         let mut weights = [0.0_f32; CELLS.pow(3)];
@@ -94,6 +97,8 @@ impl Glow {
                 glowing = glowing.union(medium.world_bounds(Bounds3 { min: low, max: high }));
             }
         }
+
+        // Normalise to running sums
         let total: f32 = weights.iter().sum();
         if !(total > 0.0 && total.is_finite()) {
             return None;
@@ -129,14 +134,17 @@ impl Glow {
         cumulative::weight(&self.sums, x + CELLS * (y + CELLS * z)) / self.cell_volume
     }
 
-    /// Samples a point. There is no third number for it: it follows from the other two by a hash.
+    /// Samples a point. The third random number is a hash of the other two.
     pub fn sample_li(&self, ctx: &LightCtx, u: [f32; 2]) -> Option<LightSample> {
+        // Choose a cell
         let last = self.sums[self.sums.len() - 1];
         let x = u[0] * last;
         let cell = cumulative::find(&self.sums, x).min(self.sums.len() - 1);
         let pmf = cumulative::weight(&self.sums, cell);
         let u0 = ((x - cumulative::sum_before(&self.sums, cell)) / pmf).clamp(0.0, ONE_MINUS_EPSILON);
         let u2 = unit_f32(pcg4d([hash_floats(&u), u[0].to_bits(), u[1].to_bits(), cell as u32])[0]);
+
+        // Choose a point of the cell
         let low = [cell % CELLS, cell / CELLS % CELLS, cell / CELLS.pow(2)].map(|x| x as f32);
         let p = self.corner + (Vec3::from(low) + Vec3::new(u0, u[1], u2)) * self.size / CELLS as f32;
         let rate = self.medium.glimpse_rate(p);
@@ -156,8 +164,8 @@ impl Glow {
         (sample.pdf > 0.0 && sample.pdf.is_finite() && sample.li.is_finite()).then_some(sample)
     }
 
-    /// Density of [`sample_li`](Self::sample_li) in the direction of a point, given in the unit cube and in world space (per steradian),
-    /// at which paths look at the rate `rate` (1/m).
+    /// Density per steradian of [`sample_li`](Self::sample_li) in the direction of a point, which is given in the unit
+    /// cube and in world space. `rate` (1/m) is the rate at which paths collect emission there.
     #[inline]
     pub fn pdf(&self, ctx: &LightCtx, (unit, p): (Vec3, Vec3), rate: f32) -> f32 {
         self.density(unit) * (p - ctx.p).length_squared() / rate
@@ -172,7 +180,7 @@ mod tests {
     use lumiris_test_support::Moments;
     use lumiris_test_support::random::{RngExt, pcg32};
 
-    /// A medium that glows in some places, stretched and turned.
+    /// A medium that emits in some cells, stretched and rotated.
     fn medium() -> Arc<Heterogeneous> {
         let density: Vec<f32> = (0..9 * 7 * 5).map(|i| if i % 3 == 0 { 0.0 } else { (i * 7 % 11) as f32 }).collect();
         let grid = UniformGrid {
@@ -193,7 +201,7 @@ mod tests {
         let parts = Parts::of(&medium);
         let glows = parts.glows(&medium, 3);
         assert!(glows.iter().flatten().count() > 4);
-        // ∫ σ_a L_e/r² dV, by the rule of midpoints in the unit cube
+        // ∫ σ_a L_e/r² dV, by the midpoint rule in the unit cube
         let steps = 90;
         let term = |i: i32| {
             let place = [i % steps, i / steps % steps, i / (steps * steps)];

@@ -1,9 +1,9 @@
 //! Groups of lights, each a component of the mixture density of light sampling.
 //!
-//! All infinite lights form one group, since they overlap. The others form one group each while there are few, and
-//! subtrees of a light tree where there are many. A light is chosen with the probability that [`LightSampler`] gives
-//! it; the groups merely divide that choice in two, first a group and then a light of it, so that the number of samples
-//! per group can be fixed.
+//! All infinite lights form one group, since they overlap. Each other light forms a group if there are few lights; with
+//! many lights, subtrees of a light tree form groups. A light is chosen with the probability given by [`LightSampler`].
+//! Groups only split the choice into two steps, a group and a light of that group, so that the number of samples per
+//! group can be fixed.
 
 use super::tree_choice::one_of;
 use super::{CutNode, Light, LightCtx, LightId, LightSampler, LightTree, SampledLight, Turns};
@@ -17,9 +17,9 @@ const NO_GROUP: u8 = u8::MAX;
 /// Lights in groups.
 #[derive(Clone, Debug, Default)]
 pub struct LightGroups {
-    /// Of each light.
+    /// The group of each light.
     group_of: Vec<u8>,
-    /// True if group 0 is that of the infinite lights.
+    /// True if group 0 holds the infinite lights.
     has_infinite: bool,
     choice: Choice,
 }
@@ -28,7 +28,7 @@ pub struct LightGroups {
 enum Choice {
     /// Groups of fixed probabilities.
     Fixed(Vec<FixedGroup>),
-    /// Subtrees of the sampler's tree, by their topmost nodes, ascending, and the nodes above.
+    /// Subtrees of the sampler's tree: their root nodes, ascending, and the nodes above them.
     Tree { cut: Vec<u32>, above: Vec<CutNode> },
 }
 
@@ -65,7 +65,7 @@ impl LightGroups {
         let has_infinite = !infinite.is_empty();
         let cut = tree.cut(max - usize::from(has_infinite && max > 1));
 
-        // Lights of each group; if there is to be one group only, everything is in it
+        // Lights of each group; a single group holds everything
         let mut groups: Vec<Vec<LightId>> = Vec::new();
         groups.extend(has_infinite.then_some(infinite));
         for &place in &cut {
@@ -110,13 +110,12 @@ impl LightGroups {
         (group != NO_GROUP).then_some(usize::from(group))
     }
 
-    /// Probability that the sampler of the set chooses a light of each group, seen from a point. They sum to one,
-    /// unless nothing can be chosen.
+    /// Probabilities of the groups at a point. They sum to one unless no light can be chosen.
     pub fn pmfs(&self, sampler: &LightSampler, ctx: &LightCtx) -> [f32; MAX_GROUPS] {
         self.pmfs_again(sampler, ctx, Turns::NONE)
     }
 
-    /// [`Self::pmfs`], where the point's `turns` hold what is known of it.
+    /// [`Self::pmfs`] with precomputed probabilities `turns` of the point.
     #[inline]
     pub fn pmfs_again(&self, sampler: &LightSampler, ctx: &LightCtx, turns: Turns<'_>) -> [f32; MAX_GROUPS] {
         let mut pmfs = [0.0; MAX_GROUPS];
@@ -141,8 +140,8 @@ impl LightGroups {
         pmfs
     }
 
-    /// Chooses a light of a group, whose probability is `group_pmf`, by `u` in [0, 1). The probability of the answer
-    /// includes that of the group.
+    /// Chooses a light of a group by `u` in [0, 1). The returned probability includes `group_pmf`, the probability of
+    /// the group.
     pub fn sample(
         &self,
         sampler: &LightSampler,
@@ -208,7 +207,7 @@ mod tests {
         }
         let set = b.build(&Bounds3 { min: Vec3::ZERO, max: Vec3::splat(3.0) });
         let mut set = LightSampling::new(Arc::new(set), kind, 1);
-        // Every third light is seen, and every one of many
+        // A third of the lights is visible, or all of them if there are many
         let step = if points > 90 { 1 } else { 3 };
         let at = Vec3::new(0.4, 0.3, 0.0);
         let photons = (0..points + infinite).step_by(step).flat_map(|l| (0..=l % 5).map(move |_| (at, Vec3::Z, l)));

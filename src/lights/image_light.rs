@@ -10,9 +10,10 @@ use lumiris_numbers::math::sphere_map::{equal_area_sphere_to_square, equal_area_
 use lumiris_numbers::math::{Bounds3, Mat3, PiecewiseConstant2D, Rgb, Vec2, Vec3};
 use std::f32::consts::PI;
 
-/// Cosine to the axis below which a projector is dark: what is nearly behind it has no place in the plane.
+/// Cosine to the axis below which a projector is dark: directions nearly perpendicular to the axis or behind it do not
+/// meet the plane.
 const MIN_COS: f32 = 1e-3;
-/// By how much the cosine of a projector's cone is less than that of its corners, so that rounding leaves nothing out.
+/// Reduction of the cosine of a projector's bounding cone below the cosine of its corners, against rounding.
 const MARGIN: f32 = 1e-4;
 
 /// How an image covers directions.
@@ -45,8 +46,10 @@ pub struct ImageLight {
 }
 
 impl ImageLight {
-    /// A light at `p` with `texels` of radiant intensity (W/sr), rows as the mapping has them; `Err` with a message if there are
-    /// none. Components that are negative or not finite become 0.
+    /// A light at `p` with `texels` of radiant intensity (W/sr), in the row order of the mapping. Components that are
+    /// negative or not finite become 0.
+    ///
+    /// Returns `Err` with a message if there are no texels.
     pub fn new(
         p: Vec3,
         world_from_light: Mat3,
@@ -65,7 +68,7 @@ impl ImageLight {
         Ok(ImageLight { p, world_from_light, mapping, texels, size, distribution, phi })
     }
 
-    /// What kind of light it is, for people.
+    /// Name of the kind of light, for messages.
     pub fn kind_name(&self) -> &'static str {
         match self.mapping {
             ImageMapping::Sphere => "goniometric",
@@ -73,7 +76,7 @@ impl ImageLight {
         }
     }
 
-    /// The same with all intensities multiplied. Photons are still drawn by the luminance that the image had.
+    /// Multiplies all intensities. Photons are still sampled by the luminance of the original image.
     #[must_use]
     pub fn scaled(mut self, factor: Rgb) -> Self {
         self.texels.iter_mut().for_each(|c| *c *= factor);
@@ -198,7 +201,7 @@ mod tests {
         assert_eq!([at(-0.4, 0.2), at(0.0, 0.2), at(0.4, 0.2)], [4.0, 5.0, 6.0]);
         assert_eq!([at(0.61, 0.0), at(0.0, 0.41), at(-0.61, 0.0)], [0.0; 3]);
         assert_eq!(light.intensity(-Vec3::Z), Rgb::BLACK);
-        // Behind a turn and at a distance of 2
+        // Rotated to face the point, at a distance of 2
         let turned = projector(Vec3::new(0.0, 0.0, 5.0), Mat3::from_rotation_x(PI));
         let s = turned.sample_li(&LightCtx::at(Vec3::new(0.0, 0.0, 3.0))).unwrap();
         assert!((s.li.r - turned.intensity(-Vec3::Z).r / 4.0).abs() < 1e-6 && s.is_delta && s.wi == Vec3::Z);

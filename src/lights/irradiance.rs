@@ -7,10 +7,11 @@
 //! | one-sided sphere, seen from outside and wholly above the horizon | L̄ π (r/d)² cos θ_c |
 //! | constant environment | π L |
 //!
-//! γᵢ is the angle subtended by an edge, Γᵢ the unit normal of the plane through the edge and the point; r and d are
-//! the radius and the distance of the centre, θ_c its angle. For all other lights, and for flat ones seen edge-on, E is
-//! not known and they count as black, in E as in L̄. So do surfaces with alpha masks, whose extent is not that of their
-//! shape.
+//! γᵢ is the angle subtended by an edge; Γᵢ is the unit normal of the plane through the edge and the point. r is the
+//! radius of the sphere, d the distance of its centre, θ_c the angle of its centre.
+//!
+//! E is not available for other lights, for flat lights at grazing angles, or for surfaces with alpha masks, whose
+//! extent differs from the shape. These count as black, in E and in L̄.
 
 use super::area::{AreaLight, AreaShape};
 use super::{Light, LightId, LightSet};
@@ -19,23 +20,23 @@ use glam::DVec3;
 use lumiris_numbers::math::{Rgb, Vec3, sqr};
 use std::f32::consts::PI;
 
-/// Distance from the plane of a flat light, relative to its extent, below which it counts as edge-on: rounding decides
-/// there on which side the point is.
+/// Distance from the plane of a flat light, relative to its extent, below which the light counts as edge-on: rounding
+/// decides there on which side the point is.
 const EDGE_ON: f32 = 1e-4;
 
-/// The lights of a set whose irradiance is known.
+/// The lights of a set that have an irradiance in closed form.
 #[derive(Clone, Debug, Default)]
 pub struct Irradiances {
     /// Area lights, ascending.
     area: Vec<LightId>,
-    /// L̄ of each light; black if E is not known.
+    /// L̄ of each light; black if E is not available.
     mean_l: Vec<Rgb>,
     /// Radiance of all constant environments.
     environment: Rgb,
 }
 
 impl Irradiances {
-    /// Those of a set; `has_alpha`: geometries with alpha masks.
+    /// The irradiances of a light set; `has_alpha` tells which geometries have alpha masks.
     pub fn new(set: &LightSet, has_alpha: impl Fn(GeometryId) -> bool) -> Self {
         let mut mean_l: Vec<Rgb> = set.lights.iter().map(mean_l).collect();
         for (_, light) in set.emitters().filter(|(geometry, _)| has_alpha(*geometry)) {
@@ -56,22 +57,22 @@ impl Irradiances {
         self.environment * PI + self.area.iter().map(area).sum()
     }
 
-    /// The radiance in E that an area light sends to `p` along `−wi`, from a point of it whose normal is `n_light`,
-    /// where `wi` is above the horizon of `n`.
+    /// The radiance that E includes for an area light, from a point with the normal `n_light` to `p` along `−wi`. `wi`
+    /// is above the horizon of `n`.
     pub fn l(&self, set: &LightSet, light: LightId, (p, n): (Vec3, Vec3), wi: Vec3, n_light: Vec3) -> Rgb {
         let Light::Area(area) = &set.lights[light as usize] else { return Rgb::BLACK };
         let mean_l = self.mean_l[light as usize];
         if !mean_l.is_black() && faces(area, p, n, wi, n_light) { mean_l } else { Rgb::BLACK }
     }
 
-    /// The radiance in E of every direction above the horizon, from infinity.
+    /// The radiance that E includes for infinite lights, the same in every direction above the horizon.
     #[inline]
     pub fn environment(&self) -> Rgb {
         self.environment
     }
 }
 
-/// L̄ of a light; black if its E is never known, or it emits nothing that a light sampler would choose it for.
+/// L̄ of a light; black if E is never available, or if the light has no power.
 fn mean_l(light: &Light) -> Rgb {
     let l = match light {
         Light::Area(area) => match &area.shape {
@@ -93,7 +94,7 @@ fn mean_l(light: &Light) -> Rgb {
     if l.is_finite() && l.luminance() > 0.0 { l } else { Rgb::BLACK }
 }
 
-/// The corners of a flat light; of a triangle, the last one twice.
+/// The corners of a flat light. A triangle repeats its last corner.
 fn corners(area: &AreaLight) -> Option<[Vec3; 4]> {
     match &area.shape {
         AreaShape::Triangle(t) => Some([t.p[0], t.p[1], t.p[2], t.p[2]]),
@@ -105,21 +106,21 @@ fn corners(area: &AreaLight) -> Option<[Vec3; 4]> {
     }
 }
 
-/// Centre and radius of a sphere that is seen from outside and wholly above the horizon.
+/// Centre and radius of a sphere that is wholly above the horizon and does not contain `p`.
 fn sphere_above(area: &AreaLight, p: Vec3, n: Vec3) -> Option<(Vec3, f32)> {
     let AreaShape::Quadric(quadric) = &area.shape else { return None };
     let (center, radius) = quadric.outward_sphere()?;
     (n.dot(center - p) > radius && !area.is_dark_from(p)).then_some((center, radius))
 }
 
-/// True if a flat light, of the given normal, shines on `p` and is not seen edge-on.
+/// True if a flat light with the given normal illuminates `p` and is not edge-on.
 fn shines_on(area: &AreaLight, corners: &[Vec3; 4], n_light: Vec3, p: Vec3) -> bool {
     let extent = (corners[2] - corners[0]).length().max((corners[1] - corners[0]).length());
     let height = n_light.dot(p - corners[0]);
     (if area.emission.two_sided { height.abs() } else { height }) > EDGE_ON * extent
 }
 
-/// True if the light counts at `p` in the direction `wi`.
+/// True if E at `p` includes the light in the direction `wi`.
 fn faces(area: &AreaLight, p: Vec3, n: Vec3, wi: Vec3, n_light: Vec3) -> bool {
     match &area.shape {
         AreaShape::Triangle(t) => corners(area).is_some_and(|c| shines_on(area, &c, t.n, p)),
@@ -242,8 +243,8 @@ mod tests {
         })
     }
 
-    /// E and the integral of L̄ cos θ by samples of the light, at random points and normals. The latter must be the
-    /// former wherever the light takes part.
+    /// Compares E with light-sampling estimates of the integral of L̄ cos θ, at random points and normals. Returns how
+    /// often E was positive.
     fn assert_integrates(set: &Arc<LightSet>, stream: &mut Pcg32) -> u32 {
         let known = Irradiances::new(set, |_| false);
         let sampling = LightSampling::new(Arc::clone(set), LightSamplerKind::Tree, 1);
@@ -251,13 +252,13 @@ mod tests {
         for _ in 0..POINTS {
             let [p, n] = [2.0, 1.0].map(|r| sample_uniform_sphere(stream.random::<[f32; 2]>()) * r);
             let p = p * stream.random::<f32>() + Vec3::splat(0.2);
-            // Samples uniform in area hardly find what is brightest from next to it
+            // Area sampling rarely samples the brightest part of a light that is next to the point
             if is_near(set, p) {
                 continue;
             }
             let ctx = LightCtx::on(p, n);
             let e = f64::from(known.irradiance(set, p, n).g);
-            // A corner just above the horizon is found by few samples
+            // A corner just above the horizon is rarely sampled
             let count = if e > 0.0 && e < 1e-3 { 400_000 } else { 4000 };
             let mut moments = Moments::default();
             for _ in 0..count {
@@ -271,7 +272,7 @@ mod tests {
                     f64::from(l.g * n.dot(s.wi).max(0.0) / s.pdf)
                 }));
             }
-            // Or by none: what is below their resolution counts as 0
+            // E below the resolution of the estimate counts as 0
             moments.assert_mean(if e < 1e-6 { 0.0 } else { e }, 1e-5, 1e-4);
             lit += u32::from(e > 0.0);
         }

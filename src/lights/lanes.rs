@@ -1,5 +1,5 @@
-//! Many samples of one light, as a structure of arrays: kernels for infinite lights. [`super::many`] has those of area
-//! lights, whose points differ.
+//! Vectorised sampling of one infinite light, as a structure of arrays. [`super::many`] has the kernels for area
+//! lights, where the points differ.
 
 use super::Light;
 
@@ -62,7 +62,7 @@ mod tests {
         EnvironmentMap::new(texels, size, mapping, filter).unwrap()
     }
 
-    /// So large that texels are told apart only where they differ: smooth, and in one corner not.
+    /// A map large enough for blocks of texels: smooth, except in one corner.
     fn large_map(mapping: EnvironmentMapping) -> EnvironmentMap {
         const EDGE: usize = 512;
         let mut stream = pcg32([11, 12, 14]);

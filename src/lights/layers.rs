@@ -1,22 +1,22 @@
-//! Light groups: lights whose light has a layer of its own in the image.
+//! Light groups: sets of lights with their own layer in the image.
 
 use super::LightId;
 use std::collections::HashMap;
 use std::sync::Arc;
 
-/// The group of lights that name none, where others do.
+/// Name of the layer for lights without a group, if other lights have groups.
 pub const OTHERS: &str = "other";
 
-/// Layers of an image by lights, each of which belongs to one; none if no light names a group.
+/// The image layer of each light; empty if no light has a group.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct LightLayers {
     names: Vec<String>,
-    /// By light; empty without layers.
+    /// The layer of each light; empty without layers.
     of_light: Vec<u32>,
 }
 
 impl LightLayers {
-    /// From the groups that the lights name, by light.
+    /// Assigns layers; `groups` holds the group of each light.
     pub fn new(groups: &[Option<Arc<str>>]) -> Self {
         let mut layers = LightLayers::default();
         if groups.iter().all(Option::is_none) {
@@ -34,19 +34,19 @@ impl LightLayers {
         layers
     }
 
-    /// Their names, in the order of their first lights.
+    /// Names of the layers, in the order of their first lights.
     pub fn names(&self) -> &[String] {
         &self.names
     }
 
-    /// The layer of a light, where there are any.
+    /// The layer of a light. Layers must exist.
     #[inline]
     pub fn of(&self, light: LightId) -> usize {
         self.of_light[light as usize] as usize
     }
 }
 
-/// Why a text cannot be the name of a group; `None` if it can. It becomes a part of the names of channels.
+/// The reason why a text is not a valid group name, or `None` if it is valid. The name becomes a part of channel names.
 pub fn fault_of_name(name: &str) -> Option<String> {
     let is_allowed = |c: char| c.is_alphanumeric() || matches!(c, '_' | '-');
     match name.chars().find(|&c| !is_allowed(c)) {

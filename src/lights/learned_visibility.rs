@@ -1,24 +1,25 @@
-//! What photons tell of the visibility of lights: an estimate V̂ of it, and the choice of a light that the visibility
-//! cache has not found.
+//! Visibility of lights estimated from photons: an estimate V̂, and the choice of a light that has no photons in the
+//! visibility cache.
 //!
-//! If a light is visible around a point, μ = E·A·N/Φ of its photons are expected there: E is the irradiance without
-//! shadows [lm/m² by luminance, up to a factor that all have in common], A the area in which photons are found, N the
-//! number of photon paths that start at the light, and Φ its power. The number that arrives is Poisson distributed with
-//! the mean V·μ. With a gamma distribution of mean v₀ and shape a as the prior of V, the posterior mean is
+//! If a light is visible around a point, μ = E·A·N/Φ of its photons are expected there. E is the unshadowed irradiance
+//! (lm/m² by luminance, up to a factor common to all lights), A the area that a cache lookup covers, N the number of
+//! photon paths from the light, and Φ its power. The number of photons is Poisson distributed with the mean V·μ. With a
+//! gamma distribution of mean v₀ and shape a as the prior of V, the posterior mean is
 //!
 //! > V̂ = (c + a)/(μ + a/v₀)
 //!
-//! for c photons. So V̂ is near 0 for a light of which many photons were expected and none came, and v₀ for one that is
-//! too far away, or has too few photon paths, for its photons to tell anything.
+//! for c photons. V̂ is near 0 for a light with many expected photons and none present. V̂ is near v₀ for a light that
+//! is too far away, or has too few photon paths, to expect any.
 //!
-//! The density of light samples that has the least variance is proportional to E·√V̂, as the second moment of a sample
-//! is E²·V̂/p. On a glossy surface E is weighted by what is reflected to the viewer, but V̂ goes by E itself.
-//! [`LearnedVisibility::sample_unseen`] chooses lights without photons in this way: of a node of the light tree, Φ/(A·N)
-//! is the sum over its lights.
+//! The density of light samples with the least variance is proportional to E·√V̂, as the second moment of a sample is
+//! E²·V̂/p. On a glossy surface E is weighted by the reflection to the viewer, but V̂ uses the unweighted E.
+//! [`LearnedVisibility::sample_unseen`] chooses lights without photons in this way. For a node of the light tree,
+//! Φ/(A·N) is the sum over its lights.
 //!
-//! A node may hold many lights that are visible and of which few photons are expected each. What all those of a node that
-//! were not seen can be expected to send is as much as came from those seen exactly once [Good 1953], so c is their number
-//! for a node: where a far room is seen through a door, a few single photons of some of its lights tell of the others.
+//! A node may hold many visible lights with few expected photons each. By [Good 1953], the expected contribution of its
+//! lights without photons equals the contribution of its lights with exactly one photon. Their number is therefore the
+//! count c of a node. For example, if a distant room is visible through a door, single photons from a few of its lights
+//! indicate that the others are visible too.
 
 use super::tree_choice::TreeChoice;
 use super::tree_node::Node;
@@ -33,39 +34,39 @@ const PRIOR_MEAN: f32 = 0.5;
 const PRIOR_SHAPE: f32 = 1.0;
 /// Minimum of V̂, which bounds the weight of a sample.
 pub const MIN_VISIBILITY: f32 = 1e-4;
-/// Minimum number of photon paths of a light, for those that got none.
+/// Minimum number of photon paths per light, for lights that have none.
 const MIN_PATHS: f32 = 0.5;
 
-/// The visibility of lights as photons tell it.
+/// The visibility of lights estimated from photons.
 #[derive(Clone, Debug)]
 pub struct LearnedVisibility {
     choice: TreeChoice,
     /// For each infinite light, the luminance of the irradiance on a surface facing it; 0 for others.
     irradiances: Vec<f32>,
-    /// Φ/(A·N) of each light: the irradiance for which one photon is expected.
+    /// Φ/(A·N) of each light: the irradiance at which one photon is expected.
     of_one_photon: Vec<f32>,
-    /// Sums of these over the lights below each node of the tree.
+    /// Sums of `of_one_photon` over the lights below each node of the tree.
     of_nodes: Vec<f32>,
 }
 
-/// A light that the visibility cache has not found at a point.
+/// A light without photons in the visibility cache at a point.
 #[derive(Clone, Copy, Debug)]
 pub struct UnseenLight {
     /// The light.
     pub choice: SampledLight,
-    /// E, weighted by what is reflected, up to a factor that all lights have in common.
+    /// E, weighted by the reflection, up to a factor common to all lights.
     pub importance: f32,
     /// V̂ of a light without photons.
     pub visibility: f32,
 }
 
-/// True if lights count by what the surface reflects of them.
+/// True if the importance of lights includes a glossy lobe.
 #[inline]
 fn is_glossy(ctx: &LightCtx) -> bool {
     ctx.lobe.scale > 0.0
 }
 
-/// V̂ for a light of irradiance `importance` with `count` photons, one of which stands for `of_one_photon`.
+/// V̂ for a light of irradiance `importance` with `count` photons; `of_one_photon` is the irradiance per photon.
 #[inline]
 fn estimate(importance: f32, of_one_photon: f32, count: f32) -> f32 {
     let v = (count + PRIOR_SHAPE) * of_one_photon / (importance + PRIOR_SHAPE / PRIOR_MEAN * of_one_photon);
@@ -86,7 +87,7 @@ pub(super) fn facing_irradiance(light: &Light, scene_radius: f32) -> f32 {
 }
 
 impl LearnedVisibility {
-    /// What `cache` tells of `lights`, the tree over which is that of `choice`.
+    /// The visibility of `lights` according to `cache`; `choice` holds the tree over the lights.
     pub(super) fn new(choice: TreeChoice, lights: &[Light], scene_radius: f32, cache: &VisibilityCache) -> Self {
         let of_one_photon: Vec<f32> = (0..)
             .zip(lights)
@@ -98,7 +99,7 @@ impl LearnedVisibility {
         LearnedVisibility { choice, irradiances, of_one_photon, of_nodes }
     }
 
-    /// E of a light, or a bound of it, up to a factor that all lights have in common; 0 if it cannot contribute.
+    /// E of a light or an upper bound of it, up to a factor common to all lights; 0 if it cannot contribute.
     #[inline]
     pub fn importance(&self, ctx: &LightCtx, light: LightId) -> f32 {
         if self.choice.tree.contains(light) {
@@ -108,7 +109,7 @@ impl LearnedVisibility {
         }
     }
 
-    /// E of a light, weighted by what is reflected, and V̂ by its number of photons.
+    /// E of a light, weighted by the reflection, and V̂ for its number of photons.
     #[inline]
     pub fn expect(&self, ctx: &LightCtx, light: LightId, count: u32) -> (f32, f32) {
         let e = self.importance(ctx, light);
@@ -117,19 +118,19 @@ impl LearnedVisibility {
         (reflected, self.visibility(light, e, count))
     }
 
-    /// V̂ of a light by its E and its number of photons, from [`MIN_VISIBILITY`] to 1.
+    /// V̂ of a light for its E and its number of photons, from [`MIN_VISIBILITY`] to 1.
     #[inline]
     pub fn visibility(&self, light: LightId, importance: f32, count: u32) -> f32 {
         estimate(importance, self.of_one_photon[light as usize], count as f32)
     }
 
-    /// The irradiance of `count` photons of a light.
+    /// The irradiance that `count` photons of a light stand for.
     #[inline]
     pub fn irradiance_of(&self, light: LightId, count: u32) -> f32 {
         count as f32 * self.of_one_photon[light as usize]
     }
 
-    /// Adds the places in the tree, ascending, of the lights that were `seen` by one photon.
+    /// Appends the tree indices, ascending, of the lights in `seen` with exactly one photon.
     pub fn find_singles(&self, seen: &ContributingLights<'_>, singles: &mut Vec<u32>) {
         let first = singles.len();
         let once = seen.lights.iter().filter(|(_, count)| *count == 1);
@@ -137,9 +138,10 @@ impl LearnedVisibility {
         singles[first..].sort_unstable();
     }
 
-    /// Chooses a light by `u` in [0, 1), nearly in proportion to E·√V̂ for lights without photons; every light that can
-    /// contribute and is not in `seen` has a positive probability. Lights in `seen` may be chosen too, but for single ones
-    /// beside others that can contribute. `None` if there is no light. `singles` are those of `seen`.
+    /// Chooses a light by `u` in [0, 1), nearly in proportion to E·√V̂ for lights without photons. Every light that can
+    /// contribute and is not in `seen` has a positive probability. Lights in `seen` may be chosen too; single-photon
+    /// lights are chosen only if no other light below their node can contribute. `singles` are the tree indices of
+    /// single-photon lights in `seen`. Returns `None` if there is no light.
     #[inline]
     pub fn sample_unseen(
         &self,
@@ -159,13 +161,13 @@ impl LearnedVisibility {
             return Some(self.unseen(ctx, SampledLight { light, pmf: p_infinite / count as f32, u }));
         }
 
-        // Those in the tree
+        // Lights in the tree
         let u = ((u - p_infinite) / (1.0 - p_infinite)).min(ONE_MINUS_EPSILON);
         let (light, pmf, u) = tree.sample_by(u, singles, self.by_visibility(ctx))?;
         Some(self.unseen(ctx, SampledLight { light, pmf: pmf * (1.0 - p_infinite), u }))
     }
 
-    /// A light that is not in `seen`, with the probability that [`Self::sample_unseen`] chooses it.
+    /// Evaluates a light that is not in `seen`, with the probability that [`Self::sample_unseen`] chooses it.
     #[inline]
     pub fn unseen_light(
         &self,
@@ -223,7 +225,7 @@ mod tests {
         lights
     }
 
-    /// A cache with `count` photons of each light of `seen` at the point, and as many photon paths of all as `paths`.
+    /// A cache with `count` photons of each light of `seen` at the point, and `paths` photon paths of every light.
     fn cache(seen: &[LightId], count: usize, paths: f32) -> VisibilityCache {
         let photons = seen.iter().flat_map(|&light| vec![(AT, Vec3::Z, light); count]);
         VisibilityCache::new(photons, 0.2).with_paths((0..14).map(|light| (light, paths)))
@@ -236,7 +238,7 @@ mod tests {
 
     #[test]
     fn visibility_is_the_ratio_of_photons_to_those_expected_and_the_prior_without_any() {
-        // A lamp above a floor: the irradiance I/h² is that of N·A/(4π h²) photons.
+        // A lamp above a floor: the irradiance I/h² corresponds to N·A/(4π h²) photons.
         let lights = [Light::Point { p: AT + Vec3::Z * 3.0, intensity: Rgb::splat(7.0) }];
         let ctx = LightCtx::on(AT, Vec3::Z);
         let of = |paths: f32| {
@@ -269,7 +271,7 @@ mod tests {
             let mut singles = Vec::new();
             learned.find_singles(&contributing, &mut singles);
 
-            // The mean of 1/pmf over the draws of a light is 1
+            // The mean of 1/pmf over the samples of a light is 1
             let draws = 200_000;
             let mut s = pcg32([3, 1, 4]);
             let (mut means, mut squares) = ([0.0_f64; 14], [0.0_f64; 14]);

@@ -4,10 +4,10 @@
 //! |---|---|
 //! | uniform | the same for all lights |
 //! | power | 95 % proportional to power, 5 % uniform, so that no light starves |
-//! | tree | by the [`LightTree`](super::LightTree), beside which every infinite light has its probability, or all have a given one |
-//! | photons | nearly always one of the lights that the visibility cache finds, if any; see [`super::visibility_cache_sampler`] |
+//! | tree | by the [`LightTree`](super::LightTree); each infinite light has a probability beside it, or a fixed total |
+//! | photons | mostly one of the lights in the visibility cache, if any; see [`super::visibility_cache_sampler`] |
 //!
-//! Lights without power are never chosen, but for media that glow: these have a place in the tree alone, if they are asked for.
+//! Lights without power are never chosen. Emitting media have no power, but can be included in the tree on request.
 
 use super::choice::UNIT;
 use super::{Light, LightCtx, LightId, LightRun, SampledLight, TreeChoice, Turns};
@@ -39,10 +39,10 @@ pub enum LightSamplerKind {
 pub struct LightChoice {
     /// The light sampler.
     pub kind: LightSamplerKind,
-    /// Probability of all infinite lights together beside the light tree (0 to 1, exclusive). `None`: each has that of
-    /// the whole tree.
+    /// Total probability of the infinite lights beside the light tree (0 to 1, exclusive). `None`: each infinite light
+    /// has the same probability as the whole tree.
     pub infinite_fraction: Option<f32>,
-    /// The tree has parts of media that glow as well.
+    /// True if the tree includes emitting parts of media.
     pub glows: bool,
 }
 
@@ -52,11 +52,11 @@ impl From<LightSamplerKind> for LightChoice {
     }
 }
 
-/// A fixed distribution over lights: for single choices, and in order.
+/// A fixed distribution over lights, for single choices and for sorted positions.
 #[derive(Clone, Debug)]
 pub struct FixedChoice {
     table: AliasTable,
-    /// Cumulative probabilities; none if nothing can be chosen.
+    /// Cumulative probabilities; empty if nothing can be chosen.
     cumulative: Vec<f64>,
 }
 
@@ -73,7 +73,7 @@ impl FixedChoice {
         FixedChoice { table, cumulative }
     }
 
-    /// The only one that is chosen, if there is one.
+    /// The only light with a positive probability, if there is exactly one.
     pub(super) fn only(&self) -> Option<LightId> {
         let mut chosen = (0..self.table.len()).filter(|&i| self.table.pmf(i) > 0.0);
         match (chosen.next(), chosen.next()) {
@@ -100,7 +100,7 @@ impl FixedChoice {
 /// Chooses lights of a fixed set.
 #[derive(Clone, Debug)]
 pub enum LightSampler {
-    /// All lights with power alike.
+    /// All lights with power equally.
     Uniform(FixedChoice),
     /// By power.
     Power(FixedChoice),
@@ -111,8 +111,8 @@ pub enum LightSampler {
 }
 
 impl LightSampler {
-    /// A sampler of `lights`, indexed as they are; `scene_radius` weighs infinite lights against others. That by
-    /// photons has no visibility cache yet.
+    /// A sampler of `lights`, with their indices as ids. `scene_radius` determines the power of infinite lights. The
+    /// photon sampler has no visibility cache yet.
     pub fn new(choice: LightChoice, lights: &[Light], scene_radius: f32) -> Self {
         let tree = |powers: &[f32]| TreeChoice::new((lights, powers), choice.infinite_fraction, choice.glows);
         let powers: Vec<f32> = lights.iter().map(|light| light.phi(scene_radius)).collect();
@@ -129,7 +129,7 @@ impl LightSampler {
         }
     }
 
-    /// Sets the visibility cache of the sampler that uses it.
+    /// Sets the visibility cache, if the sampler uses one.
     pub(super) fn set_visibility_cache(&mut self, visibility_cache: Option<Arc<VisibilityCache>>) {
         match self {
             LightSampler::Photons(choice) => choice.visibility_cache = visibility_cache,
@@ -137,7 +137,7 @@ impl LightSampler {
         }
     }
 
-    /// The tree, if it takes part.
+    /// The light tree, if the sampler uses one.
     pub fn tree(&self) -> Option<&TreeChoice> {
         match self {
             LightSampler::Tree(choice) => Some(choice),
@@ -165,7 +165,7 @@ impl LightSampler {
         }
     }
 
-    /// [`Self::sample`], where the point's `turns` hold what is known of it.
+    /// [`Self::sample`] with precomputed probabilities `turns` of the point.
     #[inline]
     pub fn sample_again(&self, ctx: &impl Deref<Target = LightCtx>, u: f32, turns: Turns<'_>) -> Option<SampledLight> {
         match self {
@@ -175,8 +175,8 @@ impl LightSampler {
     }
 
     /// Chooses a light for each position of an ascending list in units of 2⁻³², by inversion: neighbours in the list
-    /// choose the same light or neighbours. Each light is chosen with the probability [`pmf`](Self::pmf), which two
-    /// runs may share. A list without a light to choose has no runs.
+    /// choose the same light or neighbours. Each light has the probability [`pmf`](Self::pmf), which can be split over
+    /// two runs. If no light can be chosen, there are no runs.
     pub fn runs(&self, ctx: &LightCtx, positions: &[u32], out: &mut Vec<LightRun>) {
         out.clear();
         match self {

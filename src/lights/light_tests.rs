@@ -1,4 +1,4 @@
-//! Every area light's sampling routine against its pdf, and against irradiances in closed form.
+//! The sampling routine of every area light compared with its pdf, and with irradiances in closed form.
 
 use super::area::AreaShape;
 use super::{AreaLight, Emission, Light, LightCtx, LightHit, area_lights_of};
@@ -63,7 +63,7 @@ pub(super) fn quadric(kind: QuadricKind, placement: Affine3A) -> Quadric {
     Quadric { kind, group_from_local: placement, local_from_group: placement.inverse(), flip_normal: false }
 }
 
-/// Coordinates (z or squared radius, φ), both over their ranges.
+/// Coordinates (z or squared radius, φ), both scaled to their ranges.
 pub(super) fn quadric_surface(kind: QuadricKind, placement: Affine3A) -> Surface {
     let light = light_of(&Shape::Quadric(quadric(kind, placement)));
     let inverse = placement.inverse();
@@ -137,7 +137,7 @@ impl Surface {
         cells
     }
 
-    /// χ² of sampled points against the density, and its integral against 1.
+    /// χ² test of sampled points against the density, and the integral of the density against 1.
     fn check(&self, name: &str, from: Vec3) {
         let expected = self.cell_probabilities(from, 24);
         let total: f64 = expected.iter().sum();
@@ -212,9 +212,9 @@ fn the_solid_angle_of_rectangles_is_exact() {
     else {
         panic!()
     };
-    // A face of the cube about the origin covers a sixth of the sphere.
+    // A face of the cube about the origin subtends a sixth of the sphere.
     assert!((f64::from(r.solid_angle(Vec3::ZERO).unwrap()) - 4.0 * PI / 6.0).abs() < 1e-6);
-    // Near its middle it covers almost half of it; far away, less than is sampled by solid angle.
+    // Near its middle it subtends almost a hemisphere; far away, less than the threshold of solid-angle sampling.
     let near = f64::from(r.solid_angle(Vec3::new(0.0, 0.0, 0.999)).unwrap());
     assert!((near - (2.0 * PI - 4.0 * 2.0_f64.sqrt() * 1e-3)).abs() < 1e-5, "{near}");
     assert!(r.solid_angle(Vec3::new(0.0, 0.0, -1000.0)).is_none());
@@ -422,7 +422,7 @@ fn emission_images_may_have_texture_coordinates_of_their_own() {
     let mut stream = pcg32([5, 6, 8]);
     for _ in 0..1000 {
         let s = light.sample_li(&LightCtx::at(Vec3::new(0.3, 0.4, 2.0)), stream.random::<[f32; 2]>()).unwrap();
-        // Both at the point, whatever the texture coordinates of other textures are there
+        // The light ignores the texture coordinates of the hit
         let hit = LightHit { t: s.t, p: s.p, n: s.n, uv: Vec2::splat(0.1) };
         assert_eq!(light.l(&hit, -s.wi), s.li);
         let at = expected.lookup(image_from_uv.transform_point2(s.p.truncate()));
@@ -454,7 +454,7 @@ fn vertex_colours_are_a_factor_of_radiance_power_and_importance() {
     assert!((light.bounds().intensity - 0.5 * mean.luminance()).abs() < 1e-5);
     assert_eq!(of(&mesh, &plain)[0].mean_radiance(), Rgb::splat(2.0));
 
-    // Triangles of one colour are a rectangle of that colour; others are none
+    // Triangles of one colour form a rectangle of that colour; others do not
     let Shape::Mesh(mut quad) = rectangle_mesh(Vec3::ZERO, Vec3::X, Vec3::Y) else { panic!("a mesh") };
     quad.colors = vec![[0.5, 0.25, 0.0, 1.0]; 4];
     let lights = of(&quad, &emission);
@@ -473,7 +473,7 @@ fn delta_and_infinite_lights_are_consistent() {
     assert!(s.is_delta && s.pdf == 1.0 && s.wi == Vec3::Y && s.t == f32::INFINITY && s.li == Rgb::splat(2.0));
     assert_eq!(distant.pdf_li(&LightCtx::at(Vec3::ONE), Vec3::Y, &LightHit::INFINITE), 0.0);
 
-    // A mirrored and turned map is looked up where it was sampled.
+    // A reflected and rotated map: the lookup agrees with the sample.
     let texels = (0..16).map(|i| Rgb::splat(i as f32)).collect();
     let map = super::EnvironmentMap::new(
         texels,

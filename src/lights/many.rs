@@ -1,7 +1,8 @@
 //! One light sample for each of many points, in columns.
 //!
-//! Points that chose the same light are sampled together: rectangles, triangles and infinite lights by kernels, whatever
-//! has none one by one. How many points there are changes no bit: a light that has a kernel is always sampled by it.
+//! Points that chose the same light are sampled together: rectangles, triangles and infinite lights by kernels, other
+//! lights one by one. A light that has a kernel always uses it, so the result is bit-identical for any number of
+//! points.
 
 use super::groups::MAX_GROUPS;
 use super::{AreaLight, AreaShape, GlossyLobe, Light, LightCtx, LightId, LightLanes};
@@ -14,27 +15,27 @@ use lumiris_numbers::math::{Rgb, Vec3};
 use std::cell::LazyCell;
 use std::ops::Range;
 
-/// Number of lights up to which points are sorted by counting.
+/// Maximum number of lights for which points are sorted by counting.
 const MAX_COUNTED: usize = 256;
 
 /// The choice of no light.
 pub const NO_LIGHT: LightId = LightId::MAX;
 
-/// Points that are lit, in columns; see [`LightCtx`].
+/// Illuminated points, in columns; see [`LightCtx`].
 #[derive(Clone, Copy, Debug)]
 pub struct LitPoints<'a> {
     /// Positions.
     pub p: &'a Columns3,
-    /// Geometric normals on the side that is lit; zero if both are.
+    /// Geometric normals on the illuminated side; zero if both sides are illuminated.
     pub n: &'a Columns3,
     /// Shading normals.
     pub ns: &'a Columns3,
-    /// Lobes that lights are chosen by; none if no choice depends on them.
+    /// Glossy lobes for the choice of lights; empty if no choice depends on them.
     pub lobes: &'a [GlossyLobe],
 }
 
 impl LitPoints<'_> {
-    /// One of them.
+    /// Point `i`.
     #[inline]
     pub fn get(&self, i: usize) -> LightCtx {
         let lobe = self.lobes.get(i).copied().unwrap_or(GlossyLobe::NONE);
@@ -49,7 +50,7 @@ pub struct LightSamples {
     pub wi: Columns3,
     /// Radiances.
     pub li: Columns3,
-    /// Densities with the choice (1/sr); 0 where there is no sample.
+    /// Densities including the probability of the light (1/sr); 0 if there is no sample.
     pub pdf: Column,
     /// Points on lights.
     pub p: Columns3,
@@ -59,7 +60,7 @@ pub struct LightSamples {
     pub n: Columns3,
     /// 1 for lights at infinity, else 0.
     pub is_far: Column,
-    /// True if no other technique can find the direction.
+    /// True if no other technique can sample the direction.
     pub is_delta: Vec<bool>,
 }
 
@@ -115,7 +116,7 @@ struct LobeColumns {
 }
 
 impl LobeColumns {
-    /// `len` columns of these lobes; `None` if there are none.
+    /// Columns of length `len` with these lobes; `None` if there are none.
     fn set(&mut self, lobes: &[GlossyLobe], len: usize) -> Option<GlossyLobes<'_>> {
         let LobeColumns { wo, rest } = self;
         wo.reserve(len);
@@ -136,7 +137,7 @@ impl LobeColumns {
 pub struct Scratch {
     /// The light that each point chose, and the probability.
     chosen: Vec<(LightId, f32)>,
-    /// What choices at the points have in common.
+    /// Precomputed probabilities of the choices at the points.
     tops: Tops,
     lobes: LobeColumns,
     /// Points sorted by light.
@@ -148,7 +149,7 @@ pub struct Scratch {
 }
 
 impl Scratch {
-    /// Prepares for samples of `lights` at the `n` points `at`, one after another at each.
+    /// Prepares for samples of `lights` at the `n` points `at`; each point may be sampled several times.
     pub fn begin(&mut self, lights: &LightSampling, n: usize, at: LitPoints<'_>) {
         self.tops.clear();
         if let LightSampler::Tree(choice) = &lights.sampler
@@ -160,13 +161,14 @@ impl Scratch {
         }
     }
 
-    /// [`LightGroups::pmfs`](super::LightGroups::pmfs) of `lights` at point `i`, which is `at`; there is more than one light.
+    /// [`LightGroups::pmfs`](super::LightGroups::pmfs) of `lights` at point `i`, given as `at`. There must be more than
+    /// one light.
     #[inline]
     pub fn group_pmfs(&self, lights: &LightSampling, i: usize, at: &LightCtx) -> [f32; MAX_GROUPS] {
         lights.groups.pmfs_again(&lights.sampler, at, self.tops.of(i))
     }
 
-    /// The light that point `i` chose in the last [`LightSampling::sample_many`], where there is more than one.
+    /// The light that point `i` chose in the last [`LightSampling::sample_many`], if there is more than one light.
     pub fn chosen(&self, i: usize) -> LightId {
         self.chosen[i].0
     }
@@ -174,8 +176,9 @@ impl Scratch {
 
 impl LightSampling {
     /// Samples a direction to a light for each of the `n` points `at`: the light by `u[0]`, the direction by `u[1]` and
-    /// `u[2]`. The results are those of [`sample`](Self::sample) up to rounding; of infinite lights, radiance and
-    /// density are those of all together. `out` has whole vectors. `scratch` has begun with these points.
+    /// `u[2]`. The results equal [`sample`](Self::sample) up to rounding, except that the radiance and density of
+    /// infinite lights are sums over all of them. `out` must have whole vectors. `scratch` must have begun with these
+    /// points.
     pub fn sample_many(
         &self,
         n: usize,
@@ -202,8 +205,9 @@ impl LightSampling {
         self.unite_infinite(0..n, |i| at.get(i), out);
     }
 
-    /// Samples a direction to the light that each of the points `p` has chosen with the given probability, by the
-    /// numbers `u`; otherwise as [`sample_many`](Self::sample_many), but infinite lights stay by themselves.
+    /// Samples a direction for each of the points `p` to its chosen light, by the random numbers `u`. `chosen` holds
+    /// the light and its probability. Otherwise as [`sample_many`](Self::sample_many), but infinite lights are not
+    /// combined.
     pub fn sample_chosen(
         &self,
         chosen: &[(LightId, f32)],
@@ -212,6 +216,7 @@ impl LightSampling {
         scratch: &mut Scratch,
         out: &mut LightSamples,
     ) {
+        // One light for all points needs no sorting
         let len = padded(chosen.len());
         let mut lights = chosen.iter().map(|c| c.0).filter(|&light| light != NO_LIGHT);
         if let Some(light) = lights.next()
@@ -220,6 +225,8 @@ impl LightSampling {
             self.sample_one_light(light, chosen.len(), p, [&u[0][..len], &u[1][..len]], out);
             return with_choices(chosen, out);
         }
+
+        // Gather the points of each light, sample them together, and scatter the results
         sort_by_light(chosen, self.lights.len(), scratch);
         scratch.p.reserve(len);
         scratch.samples.reserve(len);
@@ -245,8 +252,8 @@ impl LightSampling {
         with_choices(chosen, out);
     }
 
-    /// Gives samples of infinite lights the radiance and the density of all of them together, since they overlap: a
-    /// direction belongs to each. `at(i)` is the point of sample `i`.
+    /// Replaces radiance and density of samples of infinite lights by the sums over all infinite lights, since every
+    /// direction belongs to each of them. `at(i)` is the point of sample `i`.
     pub fn unite_infinite(&self, places: Range<usize>, at: impl Fn(usize) -> LightCtx, out: &mut LightSamples) {
         if self.infinite.len() > 1 {
             for i in places {
@@ -261,7 +268,7 @@ impl LightSampling {
         }
     }
 
-    /// Samples the same light for `n` points, of which the columns `u` have whole vectors.
+    /// Samples the same light for `n` points; the columns `u` have whole vectors.
     fn sample_one_light(&self, light: LightId, n: usize, p: &Columns3, u: [&[f32]; 2], out: &mut LightSamples) {
         let len = u[0].len();
         match &self.lights[light as usize] {
@@ -303,7 +310,7 @@ fn with_choices(chosen: &[(LightId, f32)], out: &mut LightSamples) {
     }
 }
 
-/// Sorts the places of points by the light that they chose, without those that chose none.
+/// Sorts the indices of points by their chosen light, without the points that chose none.
 fn sort_by_light(chosen: &[(LightId, f32)], lights: usize, scratch: &mut Scratch) {
     let Scratch { order, begins, .. } = scratch;
     let places = || chosen.iter().enumerate().filter(|(_, c)| c.0 != NO_LIGHT);
@@ -313,6 +320,8 @@ fn sort_by_light(chosen: &[(LightId, f32)], lights: usize, scratch: &mut Scratch
         order.sort_unstable_by_key(|&i| (chosen[i as usize].0, i));
         return;
     }
+
+    // Counting sort
     begins.clear();
     begins.resize(lights + 1, 0);
     for (_, &(light, _)) in places() {
@@ -330,7 +339,7 @@ fn sort_by_light(chosen: &[(LightId, f32)], lights: usize, scratch: &mut Scratch
 }
 
 impl AreaLight {
-    /// Samples a point for each of the `n` points `p`; false if the shape has no kernel.
+    /// Samples a point for each of the `n` points `p`; returns false if the shape has no kernel.
     fn sample_many(&self, n: usize, p: &Columns3, u: [&[f32]; 2], out: &mut LightSamples) -> bool {
         let len = u[0].len();
         let from = p.get(len);
@@ -349,6 +358,8 @@ impl AreaLight {
             }
             AreaShape::Quadric(_) | AreaShape::Patch(_) => return false,
         };
+
+        // Emission and normal, the same for all points
         let l: Rgb = self.emission.l;
         for i in 0..n {
             if self.is_dark_from(p.vec3(i)) {
@@ -364,7 +375,7 @@ impl AreaLight {
 }
 
 impl LightSampler {
-    /// The light that is always chosen, if there is one.
+    /// The light that is always chosen, if there is only one.
     pub fn only_light(&self) -> Option<LightId> {
         match self {
             LightSampler::Uniform(choice) | LightSampler::Power(choice) => choice.only(),
@@ -445,7 +456,7 @@ mod tests {
         let (mut scratch, mut out) = (Scratch::default(), LightSamples::default());
         out.reserve(len);
         scratch.begin(&lights, N, at);
-        // Choices after the first one know what that has determined
+        // Later choices reuse the probabilities of the first one
         for _ in 0..3 {
             u.iter_mut().for_each(|u| u[..N].fill_with(|| stream.random::<f32>()));
             lights.sample_many(N, at, &u, &mut scratch, &mut out);
@@ -453,7 +464,7 @@ mod tests {
         }
     }
 
-    /// Expects of `out` what the lights give one by one.
+    /// Compares `out` with single samples.
     fn assert_same(lights: &LightSampling, at: LitPoints<'_>, u: &[Column; 3], out: &LightSamples) {
         let mut drawn = 0;
         for i in 0..N {
@@ -496,7 +507,7 @@ mod tests {
                 (0..skies).for_each(|_| sky(&mut b));
                 assert_like_singles(b, kind, stream);
             }
-            // More lights than are counted
+            // More lights than counting sort handles
             let mut b = all(stream);
             for i in 0..MAX_COUNTED as u32 {
                 let p = Vec3::new(i as f32 * 0.1, 1.0, 2.0);

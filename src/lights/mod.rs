@@ -72,16 +72,16 @@ use std::sync::Arc;
 /// Index into [`LightSet::lights`].
 pub type LightId = u32;
 
-/// The point that is lit.
+/// The illuminated point.
 #[derive(Clone, Copy, Debug)]
 pub struct LightCtx {
     /// Position.
     pub p: Vec3,
-    /// Geometric normal, unit, on the side that is lit; zero if there is none, or if both sides are lit.
+    /// Geometric normal, unit, on the illuminated side; zero if there is none, or if both sides are illuminated.
     pub n: Vec3,
     /// Shading normal, unit; zero if there is none.
     pub ns: Vec3,
-    /// What is reflected more than by a diffuse surface, which the choice of a light takes into account.
+    /// Glossy lobe, which the choice of a light takes into account.
     pub lobe: GlossyLobe,
 }
 
@@ -98,7 +98,7 @@ impl LightCtx {
         LightCtx { p, n, ns: n, lobe: GlossyLobe::NONE }
     }
 
-    /// What bounds of lights need of it.
+    /// Input of the light bounds for this point.
     #[inline]
     pub fn receiver(&self) -> Receiver<f32> {
         let lobe = Some(self.lobe).filter(|lobe| lobe.scale > 0.0);
@@ -131,11 +131,11 @@ pub struct LightSample {
     pub n: Vec3,
     /// Bound of the rounding error of `p` per axis; zero for infinite lights.
     pub p_error: Vec3,
-    /// True if no other technique can find this direction.
+    /// True if no other technique can sample this direction.
     pub is_delta: bool,
 }
 
-/// Where a ray in direction wi has hit a light.
+/// The intersection of a ray in direction wi with a light.
 #[derive(Clone, Copy, Debug)]
 pub struct LightHit {
     /// Distance.
@@ -171,7 +171,7 @@ pub enum Light {
         axis: Vec3,
         /// Cosine of the half-angle beyond which it does not emit.
         cos_total: f32,
-        /// Cosine of the half-angle up to which it is brightest.
+        /// Cosine of the half-angle up to which it has the full intensity.
         cos_falloff_start: f32,
         /// Radiant intensity on the axis.
         intensity: Rgb,
@@ -203,12 +203,12 @@ pub enum Light {
     },
     /// Radiance by an image, through a rectangle.
     Portal(Arc<PortalLight>),
-    /// A part of a medium that glows; see [`glow`].
+    /// An emitting part of a medium; see [`glow`].
     Glow(Box<Glow>),
 }
 
 impl Light {
-    /// What kind of light it is, for people.
+    /// Name of the kind of light, for messages.
     pub fn kind_name(&self) -> &'static str {
         match self {
             Light::Point { .. } => "point",
@@ -228,12 +228,12 @@ impl Light {
         }
     }
 
-    /// An environment light. Of `world_from_light` only the rotation (with a possible mirror) is used.
+    /// An environment light. Only the rotation of `world_from_light`, with a possible reflection, is used.
     pub fn infinite_image(map: Arc<EnvironmentMap>, world_from_light: &Affine3A, scale: f32) -> Self {
         Light::InfiniteImage { map, world_from_light: environment::orthogonal(world_from_light), scale }
     }
 
-    /// Samples a direction towards the light; `None` if no direction is lit by it.
+    /// Samples a direction towards the light; `None` if the light does not illuminate the point.
     #[inline]
     pub fn sample_li(&self, ctx: &LightCtx, u: [f32; 2]) -> Option<LightSample> {
         match self {
@@ -261,8 +261,8 @@ impl Light {
         }
     }
 
-    /// Density per steradian of [`sample_li`](Self::sample_li) in the direction `wi`, which hits this light at `hit`.
-    /// 0 for delta lights, and for media, whose points are not on rays' ends ([`Glow::pdf`]).
+    /// Density per steradian of [`sample_li`](Self::sample_li) in the direction `wi`, which hits this light at `hit`. 0
+    /// for delta lights, and for media, since rays do not end at their points (see [`Glow::pdf`]).
     #[inline]
     pub fn pdf_li(&self, ctx: &LightCtx, wi: Vec3, hit: &LightHit) -> f32 {
         match self {
@@ -275,8 +275,8 @@ impl Light {
         }
     }
 
-    /// True if nothing that it emits can be seen from `p`: it is an area light in whose plane or behind which `p` is. No
-    /// technique finds such a light.
+    /// True if none of its emission is visible from `p`: `p` is in the plane of an area light, or behind it. No
+    /// technique samples such a light.
     #[inline]
     pub fn is_dark_from(&self, p: Vec3) -> bool {
         matches!(self, Light::Area(area) if area.is_dark_from(p))
@@ -288,8 +288,8 @@ impl Light {
         if let Light::Area(area) = self { area.l(hit, w) } else { Rgb::BLACK }
     }
 
-    /// Radiance that an infinite light sends along a ray which leaves the scene from `p` in unit direction `w`; black for
-    /// all others.
+    /// Radiance of an infinite light along a ray that leaves the scene from `p` in unit direction `w`; black for all
+    /// other lights.
     #[inline]
     pub fn le(&self, p: Vec3, w: Vec3) -> Rgb {
         match self {
@@ -343,8 +343,8 @@ impl Light {
         }
     }
 
-    /// Luminance of the emitted power. Of an infinite light, the power that reaches a disk of the scene's radius from
-    /// all directions, or that passes through its portal. 0 for media, which send out no photons.
+    /// Luminance of the emitted power. For an infinite light: the power that reaches a disk of the scene's radius from
+    /// all directions, or that passes through its portal. 0 for media, which emit no photons.
     pub fn phi(&self, scene_radius: f32) -> f32 {
         let disk = PI * scene_radius * scene_radius;
         let phi = match self {
@@ -372,7 +372,7 @@ impl Light {
         )
     }
 
-    /// True for delta lights, which no ray can hit: only light sampling finds them.
+    /// True for delta lights, which no ray can hit: only light sampling includes them.
     #[inline]
     pub fn is_delta(&self) -> bool {
         matches!(self, Light::Point { .. } | Light::Spot { .. } | Light::Image(_) | Light::Distant { .. })

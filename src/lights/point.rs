@@ -5,7 +5,7 @@
 use super::{LightCtx, LightSample};
 use lumiris_numbers::math::{Rgb, Vec3};
 
-/// The sample of a light at `p` whose intensity towards the unit direction `w` is `intensity(w)`.
+/// The sample of a light at `p`; `intensity(w)` is its intensity in the unit direction `w`.
 pub(super) fn sample_li_from(p: Vec3, ctx: &LightCtx, intensity: impl Fn(Vec3) -> Rgb) -> Option<LightSample> {
     let d = p - ctx.p;
     let t2 = d.length_squared();

@@ -1,17 +1,17 @@
-//! An environment map that is seen through a rectangle: portal-masked sampling [Bitterli et al. 2015], with the portals of
+//! An environment map visible through a rectangle: portal-masked sampling [Bitterli et al. 2015], with the portals of
 //! pbrt-v4.
 //!
-//! In the frame of the portal (x and y along its edges, z towards the sky) a direction (x, y, 1)/√(1 + x² + y²) has the
-//! coordinates (s, t), each by x = 4a(1 + a²)/(1 − a²)² with a = 2s − 1. Straight edges are lines of constant s or t, so a
-//! point sees a rectangle of (s, t) through the portal, the window.
+//! The frame of the portal has x and y along its edges, and z towards the sky. A direction (x, y, 1)/√(1 + x² + y²) has
+//! the coordinates (s, t), each by x = 4a(1 + a²)/(1 − a²)² with a = 2s − 1. Straight edges are lines of constant s or
+//! t, so the part visible from a point is a rectangle of (s, t), the window.
 //!
-//! Samples have the density of a table of (s, t) within the window: running sums over its cells give the integral over any
-//! rectangle, and are inverted. A cell has the root mean square of the luminance in it, the best of all densities that are
-//! constant there, times the mean of J = dω/d(s, t). Near the horizon x grows as (1 − |a|)⁻²: the least power by which J, and with it
-//! the weight of a sample, is bounded where both x and y are large.
+//! Samples have the density of a table of (s, t) within the window. Running sums over the cells give the integral over
+//! any rectangle, and are inverted. The value of a cell is the root mean square of its luminance, times the mean of J =
+//! dω/d(s, t); this is the optimal density that is constant per cell. Near the horizon x grows as (1 − |a|)⁻², the
+//! least power for which J, and with it the weight of a sample, is bounded if both x and y are large.
 //!
-//! The radiance of a direction is the map's own. The table is no more than a density, and positive everywhere: what is estimated
-//! does not depend on its cells.
+//! The radiance of a direction is a lookup of the map. The table is only a density and positive everywhere, so the
+//! expectation does not depend on it.
 
 use super::emit::EmissionSample;
 use super::environment::infinite_sample;
@@ -20,26 +20,26 @@ use lumiris_numbers::math::{Bounds3, Mat3, PiecewiseConstant2D, Rgb, Vec3};
 use rayon::prelude::*;
 use std::sync::Arc;
 
-/// Cells along each side, at least and at most.
+/// Minimum and maximum number of cells along each side.
 const CELLS: [usize; 2] = [512, 4096];
-/// Lookups of the map along a side of a cell, at least and at most; otherwise as many for each texel.
+/// Minimum and maximum number of map lookups along a side of a cell; in between, proportional to the number of texels.
 const LOOKUPS: [f32; 2] = [2.0, 64.0];
 const LOOKUPS_PER_TEXEL: f32 = 1.5;
-/// Part of the mean square of a cell that each of its neighbours along an axis gets: lookups may miss the corner of a sun.
+/// Fraction of a cell's mean square added to each neighbour along an axis, as lookups may miss the corner of a sun.
 const SMOOTHING: f64 = 1.0 / 16.0;
-/// Part of the mean over all cells that each cell has at least.
+/// Minimum value of a cell, as a fraction of the mean over all cells.
 const FLOOR: f64 = 0.01;
-/// Sum of the table, in units of its rounding: sums of whole numbers below 2⁵³ are exact, so no cell is lost in them.
+/// Sum of the table in units of its rounding. Sums of whole numbers below 2⁵³ are exact, so no cell is lost.
 const TOTAL: f64 = (1_u64 << 50) as f64;
-/// By how much edges may miss being perpendicular and of the same length, relatively.
+/// Maximum deviation of the edges from right angles and equal lengths, relative.
 const TOLERANCE: f32 = 1e-3;
 
-/// What passes through the portal.
+/// An environment map that illuminates the scene through a portal.
 #[derive(Clone, Debug)]
 pub struct PortalLight {
     portal: Portal,
     map: Arc<EnvironmentMap>,
-    /// Orthogonal.
+    /// Orthogonal map of directions.
     light_from_world: Mat3,
     /// Factor of the radiances of the map.
     scale: f32,
@@ -47,9 +47,9 @@ pub struct PortalLight {
     cells: usize,
     /// Integrals of the table from (0, 0) to the corners of the cells, row by row: whole numbers.
     sums: Vec<f64>,
-    /// Density of emitted directions by (s, t).
+    /// Density of emitted directions over (s, t).
     emitted: PiecewiseConstant2D,
-    /// Luminance of the power that passes.
+    /// Luminance of the power through the portal.
     phi: f32,
 }
 
@@ -63,12 +63,13 @@ pub struct Portal {
     extent: [f32; 2],
 }
 
-/// The directions that a point sees: its corners in (s, t).
+/// The directions to the sky that are visible from a point, as corners in (s, t).
 type Window = [[f64; 2]; 2];
 
 impl Portal {
-    /// The rectangle of four `corners` (m), one after the other; `Err` with a message if they are none. Seen from the
-    /// side that is lit, they go counterclockwise.
+    /// The rectangle with four `corners` (m), in order. Seen from the illuminated side they are counterclockwise.
+    ///
+    /// Returns `Err` with a message if they do not form a rectangle.
     pub fn new(corners: [Vec3; 4]) -> Result<Self, String> {
         let [p0, p1, p2, p3] = corners;
         let (x, y) = (p3 - p0, p1 - p0);
@@ -85,14 +86,14 @@ impl Portal {
         Ok(Portal { corner: p0, world_from_portal: Mat3::from_cols(x, z.cross(x), z), extent })
     }
 
-    /// True if light that comes through can reach any part of the box.
+    /// True if light through the portal can reach any part of the box.
     pub fn lights(&self, bounds: &Bounds3) -> bool {
         let n = self.world_from_portal.z_axis;
         let inmost = Vec3::select(n.cmpgt(Vec3::ZERO), bounds.min, bounds.max);
         n.dot(inmost - self.corner) < -TOLERANCE * self.extent[0].min(self.extent[1])
     }
 
-    /// True if a ray from `p` in direction `w` goes out through it.
+    /// True if a ray from `p` in direction `w` leaves through the portal.
     #[inline]
     fn is_passed(&self, p: Vec3, w: Vec3) -> bool {
         let to_portal = self.world_from_portal.transpose();
@@ -102,7 +103,7 @@ impl Portal {
         v.z > 0.0 && o.z < 0.0 && x >= 0.0 && x <= self.extent[0] && y >= 0.0 && y <= self.extent[1]
     }
 
-    /// What is seen from `p`; `None` from the side of the sky.
+    /// The window of the point `p`; `None` on the sky side.
     #[inline]
     fn window(&self, p: Vec3) -> Option<Window> {
         let a = (self.world_from_portal.transpose() * (self.corner - p)).as_dvec3();
@@ -138,7 +139,7 @@ fn direction([s, t]: [f64; 2]) -> (Vec3, f64) {
 }
 
 impl PortalLight {
-    /// Light of `map`, whose directions the orthogonal `world_from_light` turns, through `portal`.
+    /// Light of `map` through `portal`; the orthogonal `world_from_light` rotates its directions.
     pub fn new(map: Arc<EnvironmentMap>, world_from_light: Mat3, scale: f32, portal: Portal) -> Self {
         let [width, height] = map.resolution();
         let n = (2 * width.max(height)).clamp(CELLS[0], CELLS[1]);
@@ -183,7 +184,7 @@ impl PortalLight {
         (self.radiance(w), pdf.unwrap_or(0.0))
     }
 
-    /// Density per steradian at a place in a window of this integral, if it is positive and finite.
+    /// Density per steradian at a point of a window with this integral; `None` unless it is positive and finite.
     #[inline]
     fn pdf(&self, st: [f64; 2], integral: f64) -> Option<f32> {
         let pdf = (self.density(st) / integral / direction(st).1) as f32;
@@ -200,8 +201,8 @@ impl PortalLight {
         Some(infinite_sample(wi, self.radiance(wi), self.pdf(st, integral)?))
     }
 
-    /// See [`super::Light::sample_le`]: in proportion to what passes, evenly over the portal. It starts outside of the scene, so
-    /// that what stands before the portal has its shadow.
+    /// See [`super::Light::sample_le`]: directions in proportion to the radiance through the portal, origins uniform
+    /// over it. The origin is moved out of the scene, so that objects in front of the portal cast shadows.
     pub(super) fn sample_le(
         &self,
         (centre, radius): (Vec3, f32),
@@ -218,7 +219,7 @@ impl PortalLight {
         EmissionSample::in_space(p + wi * ((p - centre).length() + radius), -wi, power)
     }
 
-    /// The table at a place, per unit of area.
+    /// The density of the table at a point, per unit of area in (s, t).
     #[inline]
     fn density(&self, st: [f64; 2]) -> f64 {
         let n = self.cells;
@@ -235,7 +236,7 @@ impl PortalLight {
         lower + (upper - lower) * within
     }
 
-    /// The row or column of a coordinate, and the place within it.
+    /// The row or column of a coordinate, and the relative position within it.
     #[inline]
     fn place(&self, x: f64) -> (usize, f64) {
         let x = x * self.cells as f64;
@@ -256,8 +257,8 @@ impl PortalLight {
         (self.sum([s1, t1]) - self.sum([s0, t1])) - (self.sum([s1, t0]) - self.sum([s0, t0]))
     }
 
-    /// The place in a window by two numbers, in proportion to the table: s by the integral over all of its t, and t within
-    /// the column of that.
+    /// A point of the window by two random numbers, in proportion to the table: s by the integral over its t, then t
+    /// within the column of s.
     #[inline]
     fn sample_window(&self, &[[s0, t0], [s1, t1]]: &Window, integral: f64, xi: [f64; 2]) -> Option<[f64; 2]> {
         if !(integral > 0.0) {
@@ -282,7 +283,8 @@ impl PortalLight {
     }
 }
 
-/// Where the running integral `f` over `n` cells, linear in each, has the value `target`: in one of the cells `within`.
+/// The coordinate at which the running integral `f` over `n` cells, linear in each, has the value `target`. The result
+/// is in one of the cells `within`.
 #[inline]
 fn invert(f: &impl Fn(usize) -> f64, target: f64, within: [usize; 2], n: usize) -> f64 {
     let [mut low, mut high] = within;
@@ -295,7 +297,7 @@ fn invert(f: &impl Fn(usize) -> f64, target: f64, within: [usize; 2], n: usize) 
     (low as f64 + part) / n as f64
 }
 
-/// What the map has in a cell.
+/// Statistics of the map in a cell.
 #[derive(Clone, Copy, Debug, Default)]
 struct Cell {
     /// Root mean square of the luminance over its solid angle.
@@ -305,7 +307,7 @@ struct Cell {
     projected: f32,
 }
 
-/// The cells row by row, by lookups in their insides: on the edges of the table, J is not defined.
+/// The cells row by row, by lookups in their interior: J is not defined on the edges of the table.
 fn cells(map: &EnvironmentMap, light_from_portal: Mat3, n: usize) -> Vec<Cell> {
     let cell = |x: usize, y: usize| {
         let at = |dx: f64, dy: f64| direction([(x as f64 + dx) / n as f64, (y as f64 + dy) / n as f64]);
@@ -331,7 +333,7 @@ fn cells(map: &EnvironmentMap, light_from_portal: Mat3, n: usize) -> Vec<Cell> {
     (0..n).into_par_iter().flat_map_iter(|y| (0..n).map(move |x| cell(x, y))).collect()
 }
 
-/// Luminances of the cells smoothed with those of their neighbours; none is 0 unless all are.
+/// Luminances of the cells smoothed with their neighbours; all are positive unless all are 0.
 fn smoothed_luminances(cells: &[Cell], n: usize) -> Vec<f32> {
     let smoothed = |row: [f32; 3]| {
         let [before, own, after] = row.map(|x| f64::from(x) * f64::from(x));
@@ -343,6 +345,7 @@ fn smoothed_luminances(cells: &[Cell], n: usize) -> Vec<f32> {
     let mut luminances: Vec<f32> =
         (0..n * n).map(|i| smoothed(near(i / n).map(|y| along_rows[y * n + i % n]))).collect();
 
+    // Add the floor
     let (mut flux, mut solid_angle) = (0.0, 0.0);
     for (luminance, cell) in luminances.iter().zip(cells) {
         flux += f64::from(*luminance) * f64::from(cell.jacobian);
@@ -353,8 +356,8 @@ fn smoothed_luminances(cells: &[Cell], n: usize) -> Vec<f32> {
     luminances
 }
 
-/// Integrals from the first corner to all corners of `n` × `n` values, which become whole numbers of at least 1 with a sum
-/// near [`TOTAL`]; all 0 if they are.
+/// Integrals from the first corner to all corners of `n` × `n` values. The values are rounded to whole numbers of at
+/// least 1 with a sum near [`TOTAL`]. If all values are 0, so are the integrals.
 fn running_sums<I: Iterator<Item = f32>>(values: impl Fn() -> I, n: usize) -> Vec<f64> {
     let stride = n + 1;
     let mut sums = vec![0.0; stride * stride];
@@ -411,7 +414,7 @@ mod tests {
         [light(|i| if i == 70 { 50.0 } else { 0.01 }, 16), light(|_| stream.random::<f32>().powi(6) * 9.0, 16)]
     }
 
-    /// Points on the lit side: far, near, and very near to the portal.
+    /// Points on the illuminated side: far, near, and very near to the portal.
     fn points(stream: &mut Pcg32) -> Vec<Vec3> {
         let Portal { corner, world_from_portal, .. } = portal();
         let place =
@@ -432,12 +435,12 @@ mod tests {
             let w = (at(x, y) - p).normalize();
             assert_eq!(!light.le(p, w).is_black(), is_lit, "{x} {y}");
             assert_eq!(light.le_and_pdf(p, w).1 > 0.0, is_lit, "{x} {y}");
-            // Neither from behind, nor away from it
+            // No light from behind, nor in directions that miss the portal
             let behind = at(0.7, 0.2) + n;
             assert!(light.le(p, -w).is_black() && light.le(behind, (at(x, y) - behind).normalize()).is_black());
             assert!(light.sample_li(&LightCtx::at(behind), [0.5; 2]).is_none());
         }
-        // The whole sky from next to it is a half-space, whose flux through 1.5 m² is π·1.5
+        // From next to the portal the visible sky is a hemisphere, whose flux through 1.5 m² is π·1.5
         let expected = 1.5 * std::f32::consts::PI * Rgb::new(0.5, 0.25, 1.0).luminance();
         assert!((light.phi() - expected).abs() < 2e-4 * expected, "{} {expected}", light.phi());
     }
@@ -527,7 +530,7 @@ mod tests {
             let (map, turn, z) = (sky(), Mat3::from_rotation_x(0.4), portal().world_from_portal.z_axis);
             let mut flux = Welford::default();
             for i in 0..1_000_000_u32 {
-                // By the cosine: a lattice, whose errors are far below those of random points
+                // Cosine-distributed lattice, whose errors are far below the errors of random points
                 let u = [(f64::from(i) + 0.5) / 1e6, f64::from(i) * 0.618_033_988_749_895 % 1.0].map(|u| u as f32);
                 let w = Frame::from_z(z).to_world(sample_cosine_hemisphere(u));
                 flux.add(PI * f64::from(map.le(turn.transpose() * w).luminance()));
@@ -559,7 +562,7 @@ mod tests {
         }
     }
 
-    /// A sun of one texel beyond an edge of the window, across it and within, in a sky 10⁴ times darker.
+    /// A sun of one texel outside the window, across its edge, and inside, in a sky 10⁴ times darker.
     #[test]
     fn a_sun_at_the_edge_of_the_window_makes_no_outliers() {
         const SIZE: usize = 64;

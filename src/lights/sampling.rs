@@ -16,13 +16,13 @@ pub struct LightSampling {
     set: Arc<LightSet>,
     /// Chooses one of them.
     pub sampler: LightSampler,
-    /// Chooses among those that no ray can hit, in the same way; `None` if there are none.
+    /// Chooses among the delta lights in the same way; `None` if there are none.
     pub delta: Option<LightSampler>,
     /// The lights as components of a mixture.
     pub groups: LightGroups,
     choice: LightChoice,
     visibility_cache: Option<Arc<VisibilityCache>>,
-    /// What the visibility cache tells.
+    /// Visibility estimated from the photons of the cache.
     learned: Option<LearnedVisibility>,
 }
 
@@ -35,7 +35,7 @@ impl Deref for LightSampling {
 }
 
 impl LightSampling {
-    /// Chooses in the way `choice`, with at most `max` groups.
+    /// A sampling of the lights by `choice`, with at most `max` groups.
     pub fn new(set: Arc<LightSet>, choice: impl Into<LightChoice>, max: usize) -> Self {
         let choice = choice.into();
         let sampler = LightSampler::new(choice, &set.lights, set.scene_radius);
@@ -58,8 +58,8 @@ impl LightSampling {
         self.groups = LightGroups::new(&self.set.lights, &self.sampler, max);
     }
 
-    /// Sets the visibility cache, which is used wherever settings ask for it. Estimates remain unbiased whatever it
-    /// contains. Lights without power and unknown ids are ignored.
+    /// Sets the visibility cache. Estimates remain unbiased for any content. Lights without power and unknown ids are
+    /// ignored.
     pub fn set_visibility_cache(&mut self, visibility_cache: Option<VisibilityCache>) {
         let is_lit = |light: LightId| self.set.lit.binary_search(&light).is_ok();
         self.visibility_cache = visibility_cache.map(|visibility_cache| Arc::new(visibility_cache.of_lights(is_lit)));
@@ -67,7 +67,7 @@ impl LightSampling {
         self.learn();
     }
 
-    /// Determines what the visibility cache tells of the lights, of which those that send out no photons are none.
+    /// Estimates the visibility of lights from the cache. Lights that emit no photons are excluded.
     fn learn(&mut self) {
         let LightSet { lights, scene_radius, .. } = &*self.set;
         let cache = self.visibility_cache.as_ref().filter(|cache| !cache.is_empty());
@@ -81,19 +81,19 @@ impl LightSampling {
         });
     }
 
-    /// The choice by the light tree, whatever the light sampler is.
+    /// The choice by the light tree, for any light sampler.
     pub fn tree_choice(&self) -> TreeChoice {
         let choice = self.sampler.tree().cloned();
         choice.unwrap_or_else(|| TreeChoice::of_lights(&self.set.lights, self.set.scene_radius, None))
     }
 
-    /// What photons tell of the visibility of lights; `None` without photons.
+    /// The visibility estimated from photons; `None` without photons.
     #[inline]
     pub fn learned_visibility(&self) -> Option<&LearnedVisibility> {
         self.learned.as_ref()
     }
 
-    /// V̂ of a light by its photons, of which `contributing` has the counts at the point; 1 where there are none at all.
+    /// V̂ of a light, where `contributing` holds the photon counts at the point; 1 without photons.
     #[inline]
     pub fn visibility(&self, ctx: &LightCtx, contributing: &ContributingLights<'_>, light: LightId) -> f32 {
         match &self.learned {
@@ -109,7 +109,7 @@ impl LightSampling {
         self.visibility_cache.as_deref()
     }
 
-    /// The contributing lights of a point; none without a visibility cache.
+    /// The contributing lights at a point; empty without a visibility cache.
     #[inline]
     pub fn contributing_lights(&self, ctx: &LightCtx) -> ContributingLights<'_> {
         self.visibility_cache.as_ref().map_or_else(ContributingLights::default, |visibility_cache| {
@@ -124,12 +124,13 @@ impl LightSampling {
         self.set.sample_choice(ctx, self.sampler.sample(ctx, u_choice)?, u)
     }
 
-    /// True if light samples find media that glow.
+    /// True if light sampling includes emitting media.
     pub fn find_glows(&self) -> bool {
         self.choice.glows && self.set.has_glows()
     }
 
-    /// Density of sampling the point of a glimpse of a medium, whose place in world space is `p`, from `ctx` (per steradian).
+    /// Density per steradian, at `ctx`, of sampling a point of emission in a medium by light sampling; `p` is the point
+    /// in world space.
     pub fn pdf_glow(&self, ctx: &LightCtx, medium: MediumId, (glimpse, p): (&Glimpse, Vec3)) -> f32 {
         let Some((light, glow)) = self.set.glow_at(medium, glimpse.unit) else { return 0.0 };
         let pmf = self.sampler.pmf(ctx, light);
@@ -149,8 +150,8 @@ impl LightSampling {
         self.set.sample_choice(ctx, self.groups.sample(&self.sampler, ctx, group, u_choice)?, u)
     }
 
-    /// Density per steradian of [`sample`](Self::sample) to choose `light` and the direction `wi`, which hits it at
-    /// `hit` ([`LightHit::INFINITE`] for infinite lights).
+    /// Density per steradian with which [`sample`](Self::sample) chooses `light` and the direction `wi`, which hits it
+    /// at `hit` ([`LightHit::INFINITE`] for infinite lights).
     #[inline]
     pub fn pdf(&self, ctx: &LightCtx, light: LightId, wi: Vec3, hit: &LightHit) -> f32 {
         let pdf = self.set.lights[light as usize].pdf_li(ctx, wi, hit);
@@ -164,7 +165,7 @@ impl LightSampling {
         self.infinite_in_direction_by(ctx, wi, |ctx, light| self.sampler.pmf(ctx, light))
     }
 
-    /// [`infinite_in_direction`](Self::infinite_in_direction), where a light is chosen with probability `pmf`.
+    /// [`infinite_in_direction`](Self::infinite_in_direction) with the probabilities `pmf` of the lights.
     #[inline]
     pub fn infinite_in_direction_by(
         &self,
@@ -190,7 +191,8 @@ impl LightSampling {
         self.infinite_in_directions_by(n, ctx, wi, |_, ctx, light| self.sampler.pmf(ctx, light), out);
     }
 
-    /// [`infinite_in_directions`](Self::infinite_in_directions), where a light is chosen with probability `pmf` at a point.
+    /// [`infinite_in_directions`](Self::infinite_in_directions) with the probabilities `pmf` of the lights at each
+    /// point.
     pub fn infinite_in_directions_by(
         &self,
         n: usize,
@@ -241,7 +243,7 @@ mod tests {
         LightChoice { kind: LightSamplerKind::Photons, infinite_fraction: Some(0.9), glows: false },
     ];
 
-    /// The set, with photons of some lights around (0.4, 0.3, 0): more of those with a greater id.
+    /// A set with photons of some lights around (0.4, 0.3, 0); lights with greater ids have more photons.
     fn with_cache(builder: LightSetBuilder, kind: LightChoice, seen: &[LightId]) -> LightSampling {
         let mut set = sampling(builder, kind, &bounds());
         let at = Vec3::new(0.4, 0.3, 0.0);
@@ -326,7 +328,7 @@ mod tests {
             let p = Vec3::new(i as f32 * 0.15 - 6.0, 1.5, 2.0 + (i % 3) as f32);
             builder.add(Light::Point { p, intensity: Rgb::splat(0.1 + i as f32) });
         }
-        // Few lights are compared at the point, many by the number of their photons
+        // Few lights are compared at the point, many by their photon counts
         let (few, many): (Vec<LightId>, Vec<LightId>) = ((0..80).step_by(7).collect(), (2..80).collect());
         for (kind, seen) in CHOICES.into_iter().flat_map(|k| [(k, &few), (k, &many)]) {
             let set = with_cache(builder.clone(), kind, seen);
@@ -349,7 +351,7 @@ mod tests {
                     assert!((f64::from(number) - expected).abs() <= 1.5, "{kind:?} {run:?} {expected}");
                     *parts.entry(run.light).or_insert(0.0) += part;
 
-                    // What remains of the positions fills [0, 1) evenly
+                    // The remapped positions cover [0, 1) uniformly
                     let of = |place: u32| f64::from(run.within(positions[place as usize])) / 4_294_967_296.0;
                     let step = 1.0 / expected;
                     for place in run.places[0]..run.places[1] {
@@ -360,7 +362,7 @@ mod tests {
                 assert_eq!(place, count, "{kind:?}: every position chooses a light");
                 for (&light, &part) in &parts {
                     let pmf = f64::from(set.sampler.pmf(&ctx, light));
-                    // A light of the base may be so improbable that it has no position
+                    // A light of the base may be too improbable to have a position
                     assert!((pmf - part).abs() <= 1.5e-5 + 1e-4 * pmf, "{kind:?} {light}: {pmf} {part}");
                 }
                 let total: f64 = parts.values().sum();
@@ -385,7 +387,7 @@ mod tests {
             }
         }
         for kind in CHOICES {
-            // Photons of the wrong lights change nothing
+            // Photons of the wrong lights cause no bias
             let set = with_cache(builder(), kind, &[2, 4]);
             let mut moments = Moments::default();
             for _ in 0..200_000 {

@@ -24,28 +24,28 @@ struct EmittingGeometry {
 pub struct LightSetBuilder {
     lights: Vec<Light>,
     emitting: Vec<EmittingGeometry>,
-    /// The group of the lights that are added next, and those of all so far.
+    /// The group of lights added from now on, and the groups of all lights so far.
     group: Option<Arc<str>>,
     groups: Vec<Option<Arc<str>>>,
-    /// By medium, of those that glow.
+    /// Emitting media, by medium.
     glowing: Vec<Option<GlowingMedium>>,
 }
 
-/// Places along a camera ray through a medium of average width at which it is seen whether it glows, at least.
+/// Minimum expected number of emission lookups along a camera ray through a medium of average width.
 const GLIMPSES: f32 = 8.0;
 
-/// The parts of a medium that glow.
+/// The emitting parts of a medium.
 #[derive(Clone, Debug)]
 struct GlowingMedium {
     parts: Parts,
-    /// Of each part, if it glows.
+    /// The light of each part; `None` if it is dark.
     lights: Vec<Option<LightId>>,
-    /// Rate at which camera rays look for it (1/m).
+    /// Rate of emission lookups along camera rays (1/m).
     rate: f32,
 }
 
 impl LightSetBuilder {
-    /// Lets the lights that are added from now on belong to a group, which has a layer of its own in the image.
+    /// Assigns the lights added from now on to a group, which has its own layer in the image.
     pub fn in_group(&mut self, group: Option<Arc<str>>) -> &mut Self {
         self.group = group;
         self
@@ -58,7 +58,7 @@ impl LightSetBuilder {
         (self.lights.len() - 1) as LightId
     }
 
-    /// Adds the area lights of a geometry of the root group, whose `shape` is in world space.
+    /// Adds the area lights of a geometry of the root group; `shape` is in world space.
     pub fn add_area(&mut self, geometry: GeometryId, shape: &Shape, emission: &Emission) {
         let area = area_lights_of(shape, emission);
         let first_light = self.lights.len() as LightId;
@@ -67,7 +67,7 @@ impl LightSetBuilder {
         self.emitting.push(EmittingGeometry { geometry, first_light, light_of_primitive: area.light_of_primitive });
     }
 
-    /// Adds what glows of the media.
+    /// Adds the emitting parts of the media.
     pub fn add_media(&mut self, media: &MediumSet) {
         for (id, medium) in (0..).zip(&media.media) {
             self.glowing.push(None);
@@ -115,7 +115,7 @@ impl LightSetBuilder {
 pub struct LightSet {
     /// The lights; a [`LightId`] is an index.
     pub lights: Vec<Light>,
-    /// Infinite lights, seen by rays that leave the scene, ascending.
+    /// Infinite lights, which rays that leave the scene hit, ascending.
     pub infinite: Vec<LightId>,
     /// Lights with power, ascending.
     pub lit: Vec<LightId>,
@@ -123,7 +123,7 @@ pub struct LightSet {
     pub layers: LightLayers,
     /// Sorted by geometry.
     emitting: Vec<EmittingGeometry>,
-    /// By medium, of those that glow.
+    /// Emitting media, by medium.
     glowing: Vec<Option<GlowingMedium>>,
     /// Centre of the scene's bounding sphere; the origin for an empty scene.
     pub scene_centre: Vec3,
@@ -132,8 +132,7 @@ pub struct LightSet {
 }
 
 impl LightSet {
-    /// False if no emitter can occlude another light, or itself, from any point: as for lamps in one ceiling. True in
-    /// case of doubt.
+    /// False only if no emitter can occlude another light or itself from any point, as for lamps in one ceiling.
     pub fn may_hide_each_other(&self) -> bool {
         if self.emitting.is_empty() {
             return false;
@@ -166,7 +165,7 @@ impl LightSet {
         Some(LightSampler::new(choice, &delta, self.scene_radius))
     }
 
-    /// The area lights, with the geometries that they are.
+    /// The area lights with their geometries.
     pub fn emitters(&self) -> impl Iterator<Item = (GeometryId, LightId)> {
         let lights = |e: &'_ EmittingGeometry| {
             let (geometry, first_light) = (e.geometry, e.first_light);
@@ -188,7 +187,7 @@ impl LightSet {
         e.light_of_primitive.get(primitive as usize).map(|&i| e.first_light + i)
     }
 
-    /// The number of the geometry that each light is part of, among those that emit; `None` for lights that have none.
+    /// For each light, the index of its geometry among the emitting geometries; `None` for lights without geometry.
     pub fn sources(&self) -> Vec<Option<u32>> {
         let mut sources = vec![None; self.lights.len()];
         for (source, e) in (0..).zip(&self.emitting) {
@@ -197,12 +196,12 @@ impl LightSet {
         sources
     }
 
-    /// True if any medium glows that is a light.
+    /// True if any emitting medium is a light.
     pub fn has_glows(&self) -> bool {
         self.glowing.iter().flatten().any(|glowing| glowing.lights.iter().any(Option::is_some))
     }
 
-    /// The light that is the part of a medium at a point of its unit cube, if that glows.
+    /// The light of the part of a medium that contains a point of its unit cube; `None` if the part is dark.
     #[inline]
     pub fn glow_at(&self, medium: MediumId, unit: Vec3) -> Option<(LightId, &Glow)> {
         let glowing = self.glowing.get(medium as usize)?.as_ref()?;
@@ -211,20 +210,21 @@ impl LightSet {
         Some((light, glow))
     }
 
-    /// Rate at which camera rays look for what glows of a medium (1/m), by the size of what does; 0 if nothing does.
+    /// Rate of emission lookups along camera rays (1/m), by the size of the emitting region; 0 if the medium does not
+    /// emit.
     #[inline]
     pub fn glimpse_rate(&self, medium: MediumId) -> f32 {
         self.glowing.get(medium as usize).and_then(Option::as_ref).map_or(0.0, |glowing| glowing.rate)
     }
 
-    /// The medium in which a light is, if it is one that glows.
+    /// The medium of a light; `None` for other lights.
     #[inline]
     pub fn medium_of(&self, light: LightId) -> Option<MediumId> {
         if let Some(Light::Glow(glow)) = self.lights.get(light as usize) { Some(glow.id) } else { None }
     }
 
-    /// Samples a direction to a light that was chosen by `choice`. `pdf` of the sample includes the probability of the
-    /// choice: it is per steradian, or a probability for delta lights.
+    /// Samples a direction to the light of `choice`. `pdf` of the sample includes the probability of the choice: it is
+    /// per steradian, or a probability for delta lights.
     #[inline]
     pub fn sample_choice(&self, ctx: &LightCtx, choice: SampledLight, u: [f32; 2]) -> Option<(LightId, LightSample)> {
         let sample = self.lights[choice.light as usize].sample_li(ctx, u)?;

@@ -1,7 +1,7 @@
 //! The spot light's falloff between its inner and outer cone, as in pbrt-v4.
 
 /// Factor of the intensity at polar cosine `cos_theta` from the axis: 0 outside the outer cone (`cos_total`), 1 inside
-/// the inner one (`cos_falloff_start`), between them x²(3 − 2x) of the cosine's relative place x.
+/// the inner cone (`cos_falloff_start`), x²(3 − 2x) between them, where x is the relative position of the cosine.
 #[inline]
 pub fn spot_falloff(cos_theta: f32, cos_total: f32, cos_falloff_start: f32) -> f32 {
     if cos_total >= cos_falloff_start {
@@ -16,9 +16,9 @@ pub fn spot_solid_angle(cos_total: f32, cos_falloff_start: f32) -> f32 {
     std::f32::consts::TAU * ((1.0 - cos_falloff_start) + (cos_falloff_start - cos_total).max(0.0) * 0.5)
 }
 
-/// A polar cosine with the density [`spot_falloff`]/[`spot_solid_angle`] per steradian: uniform in the inner cone;
-/// between the cones P(x) = 2x³ − x⁴ of the relative place x is inverted by Newton's method, which on a convex function
-/// falls to the root once it is above it.
+/// A polar cosine with the density [`spot_falloff`]/[`spot_solid_angle`] per steradian: uniform in the inner cone.
+/// Between the cones, P(x) = 2x³ − x⁴ of the relative position x is inverted by Newton's method. On a convex function
+/// it decreases monotonically to the root once it is above it.
 pub fn sample_spot_cos(u: f32, cos_total: f32, cos_falloff_start: f32) -> f32 {
     let inner = 1.0 - cos_falloff_start;
     let band = (cos_falloff_start - cos_total).max(0.0);
@@ -34,7 +34,7 @@ pub fn sample_spot_cos(u: f32, cos_total: f32, cos_falloff_start: f32) -> f32 {
     cos_total + band * x as f32
 }
 
-/// Steps of Newton's method that f32 needs, from below the root by a fifth at most.
+/// Newton steps for f32 accuracy; the start is below the root by a fifth at most.
 const SPOT_STEPS: u32 = 6;
 
 #[cfg(test)]
@@ -61,7 +61,7 @@ mod tests {
             for i in 0..=64 {
                 let u = (i as f32 / 64.0).min(lumiris_numbers::math::ONE_MINUS_EPSILON);
                 let cos = f64::from(sample_spot_cos(u, total, start));
-                // The fraction of the flux from the axis, or between the cones, to this cosine
+                // The fraction of the flux between the axis, or the inner cone, and this cosine
                 let (inner, band) = (1.0 - f64::from(start), f64::from(start - total));
                 let x = (cos - f64::from(total)) / band;
                 let is_inner = f64::from(u) * solid_angle < std::f64::consts::TAU * inner;

@@ -1,26 +1,26 @@
-//! The probabilities at the top of a light tree, of many points at once.
+//! Probabilities of the top nodes of a light tree, for many points at once.
 
 use super::{TreeChoice, Turns};
 use lumiris_lanes::columns::{Column, reserve};
 use lumiris_lanes::level;
 use lumiris_lanes::light_choice::{Receivers, first_probabilities, importances};
 
-/// What is known of many points.
+/// Precomputed probabilities of many points.
 #[derive(Debug, Default)]
 pub struct Tops {
     /// The columns of [`Turns`].
     columns: Column,
-    /// Length of each; 0 if nothing is known.
+    /// Length of each column; 0 if nothing is computed.
     len: usize,
 }
 
 impl Tops {
-    /// Forgets what is known.
+    /// Discards all probabilities.
     pub fn clear(&mut self) {
         self.len = 0;
     }
 
-    /// Determines the probabilities of the points `at`.
+    /// Computes the probabilities of the points `at`.
     pub fn determine(&mut self, choice: &TreeChoice, at: &Receivers<'_>) {
         let len = at.p[0].len();
         self.len = len;
@@ -39,7 +39,7 @@ impl Tops {
         }
     }
 
-    /// What is known of point `i`.
+    /// The probabilities of point `i`.
     #[inline]
     pub fn of(&self, i: usize) -> Turns<'_> {
         if self.len == 0 { Turns::NONE } else { Turns::new(&self.columns[..Turns::COUNT * self.len], self.len, i) }

@@ -9,7 +9,7 @@ use lumiris_numbers::math::ONE_MINUS_EPSILON;
 use lumiris_numbers::math::light_bound::{LightBound, first_probability};
 use std::ops::Deref;
 
-/// Subtrees on the stack while positions descend together: one per level.
+/// Maximum size of the stack of subtrees in [`LightTree::runs`]: one per level.
 const MAX_DEPTH: usize = 66;
 /// Trail of lights that are not in the tree.
 const NO_TRAIL: u64 = u64::MAX;
@@ -18,11 +18,11 @@ const NO_TRAIL: u64 = u64::MAX;
 #[derive(Clone, Debug, Default)]
 pub struct LightTree {
     nodes: Vec<Node>,
-    /// Per light, the path from the root to its leaf, first turn in the lowest bit; 1 is right.
+    /// Per light, the path from the root to its leaf, first branch in the lowest bit; 1 is right.
     trails: Vec<u64>,
     /// Per light, its leaf.
     leaves: Vec<u32>,
-    /// The inner nodes that have numbers below [`Turns::COUNT`], by place and number.
+    /// Index and number of the inner nodes with numbers below [`Turns::COUNT`].
     tops: Vec<(u32, usize)>,
 }
 
@@ -36,7 +36,7 @@ pub struct CutNode {
     right: usize,
 }
 
-/// The number of a child of the node of this `number`, where the root has 1: 2n and 2n + 1 below [`Turns::COUNT`].
+/// The number of a child of the node `number`: 2n or 2n + 1, if below [`Turns::COUNT`]. The root has the number 1.
 #[inline]
 fn child(number: usize, is_right: bool) -> usize {
     if number < Turns::COUNT { 2 * number + usize::from(is_right) } else { number }
@@ -71,7 +71,7 @@ impl LightTree {
         tree
     }
 
-    /// Fills in the nodes at the top.
+    /// Sets `tops`.
     fn find_tops(&mut self) {
         let mut stack = vec![(0, 1)];
         while let Some((place, number)) = stack.pop() {
@@ -83,7 +83,7 @@ impl LightTree {
         }
     }
 
-    /// Fills in where lights are in the tree.
+    /// Sets `leaves` and `trails`.
     fn find_leaves(&mut self) {
         let mut stack = vec![(0, 0, 0)];
         while let Some((place, depth, trail)) = stack.pop() {
@@ -120,7 +120,7 @@ impl LightTree {
         self.nodes.first().map(|root| &root.bound)
     }
 
-    /// The numbers of the inner nodes at the top, below [`Turns::COUNT`], with the bounds of their left and right children.
+    /// The numbers of the top inner nodes, below [`Turns::COUNT`], with the bounds of their left and right children.
     pub fn tops(&self) -> impl Iterator<Item = (usize, [&LightBound; 2])> {
         self.tops.iter().map(|&(place, number)| (number, self.children(place as usize).map(|node| &node.bound)))
     }
@@ -130,28 +130,29 @@ impl LightTree {
         [&self.nodes[place + 1], &self.nodes[self.nodes[place].index as usize]]
     }
 
-    /// Upper bound, up to a common factor, of what all lights together contribute at a point; 0 if none can.
+    /// Upper bound, up to a common factor, of the contribution of all lights together at a point; 0 if none can
+    /// contribute.
     #[inline]
     pub fn importance(&self, ctx: &LightCtx) -> f32 {
         self.nodes.first().map_or(0.0, |root| root.importance(ctx))
     }
 
-    /// Upper bound, up to the same factor, of what one light contributes at a point; 0 if it is not in the tree.
+    /// Upper bound, up to the same factor, of the contribution of one light at a point; 0 if it is not in the tree.
     #[inline]
     pub fn light_importance(&self, ctx: &LightCtx, light: LightId) -> f32 {
         self.leaf(light).map_or(0.0, |leaf| self.nodes[leaf as usize].importance(ctx))
     }
 
-    /// Probability to turn left at an inner node. If neither child can contribute, the intensities decide; so the
-    /// probabilities of all leaves add up to 1 everywhere.
+    /// Probability of the left child of an inner node. If neither child can contribute, the intensities decide. The
+    /// probabilities of all leaves therefore always add up to 1.
     #[inline]
     fn left_probability(&self, ctx: &LightCtx, place: usize) -> f32 {
         let [left, right] = self.children(place);
         first_probability([left.importance(ctx), right.importance(ctx)], [&left.bound, &right.bound])
     }
 
-    /// Chooses a light of the subtree below a node by `u` in [0, 1): its id, its probability in that subtree, and `u`
-    /// remapped to be uniform again.
+    /// Chooses a light of the subtree below a node by `u` in [0, 1). Returns its id, its probability in the subtree,
+    /// and `u` remapped to be uniform again.
     #[inline]
     pub fn sample_below(&self, ctx: &LightCtx, place: u32, u: f32) -> Option<(LightId, f32, f32)> {
         self.descend(place, u, |place, _| self.left_probability(ctx, place))
@@ -167,7 +168,7 @@ impl LightTree {
         self.descend(0, u, |place, number| turns.probability(number, || self.left_probability(ctx, place)))
     }
 
-    /// Goes down from a node, which has the number 1: `left(node, number)` is the probability to turn left there.
+    /// Descends from a node, which has the number 1; `left(node, number)` is the probability of the left child.
     #[inline]
     fn descend(&self, place: u32, u: f32, mut left: impl FnMut(usize, usize) -> f32) -> Option<(LightId, f32, f32)> {
         let (mut place, mut number, mut pmf, mut u) = (place as usize, 1, 1.0, u);
@@ -191,9 +192,9 @@ impl LightTree {
         (pmf > 0.0).then_some((node.index, pmf, u))
     }
 
-    /// Chooses a light for each of the ascending `positions[places[0]..places[1]]` in units of 2⁻³², which the tree has
-    /// from `start` on with a share `fraction` of the probability. They descend the tree together, so that each node is
-    /// evaluated once for all of them.
+    /// Chooses a light for each of the ascending `positions[places[0]..places[1]]` in units of 2⁻³². The tree covers
+    /// the interval of length `fraction` from `start` on. The positions descend the tree together, so that each node is
+    /// evaluated once.
     pub fn runs(
         &self,
         ctx: &LightCtx,
@@ -218,6 +219,8 @@ impl LightTree {
                 }
                 continue;
             }
+
+            // Split the positions at the boundary between the children
             let p = self.left_probability(ctx, place as usize);
             let middle = interval[0] + (interval[1] - interval[0]) * f64::from(p);
             let is_left = |&x: &u32| f64::from(x) * (1.0 / 4_294_967_296.0) < middle;
@@ -234,9 +237,8 @@ impl LightTree {
         }
     }
 
-    /// At most `max` disjoint subtrees that hold all lights together, by their topmost nodes: of those so far, the one
-    /// whose lights are farthest apart, weighted by their intensity, is split next. None without lights, or if `max`
-    /// is 0.
+    /// At most `max` disjoint subtrees that together hold all lights, by their root nodes. Repeatedly splits the
+    /// subtree with the largest extent, weighted by its intensity. Empty without lights, or if `max` is 0.
     pub fn cut(&self, max: usize) -> Vec<u32> {
         let mut cut: Vec<u32> = if self.is_empty() || max == 0 { Vec::new() } else { vec![0] };
         while cut.len() < max {
@@ -274,8 +276,8 @@ impl LightTree {
         above
     }
 
-    /// Adds the inner nodes from `place` on down, which has the given number; the first of the subtrees below it is `first`.
-    /// Returns the subtree after the last one.
+    /// Appends the inner nodes from `place` on down; `number` is the number of that node and `first` the index of the
+    /// first subtree below it. Returns the index after its last subtree.
     fn add_above(
         &self,
         (place, number): (u32, usize),
@@ -292,8 +294,8 @@ impl LightTree {
         self.add_above((self.nodes[place as usize].index, child(number, true)), (cut, right), above)
     }
 
-    /// Probabilities by which [`sample`](Self::sample) gets into each subtree of a cut that is not empty, in its order, by
-    /// the nodes [`above`](Self::above) it; the point's `turns` hold what is known of it.
+    /// Probabilities with which [`sample`](Self::sample) enters each subtree of a non-empty cut, in its order. `above`
+    /// are the nodes [`above`](Self::above) the cut; `turns` are precomputed probabilities of the point.
     #[inline]
     pub fn cut_pmfs(&self, ctx: &LightCtx, above: &[CutNode], turns: Turns<'_>, pmfs: &mut [f32]) {
         pmfs[0] = 1.0;
@@ -344,7 +346,7 @@ impl LightTree {
         }
     }
 
-    /// The place of the leaf of a light; `None` if it is not in the tree.
+    /// Index of the leaf of a light; `None` if it is not in the tree.
     #[inline]
     pub fn leaf(&self, light: LightId) -> Option<u32> {
         self.contains(light).then(|| self.leaves[light as usize])
@@ -553,7 +555,7 @@ mod tests {
         let tree = tree_of(&dark);
         assert!(tree.is_empty() && tree.sample(&&ctx, 0.5, Turns::NONE).is_none() && tree.pmf(&ctx, 0) == 0.0);
 
-        // One light; the same light many times; lights on a line; the point on a light.
+        // One light, the same light many times, lights on a line, and the point on a light.
         let one = Light::Point { p: Vec3::ONE, intensity: Rgb::WHITE };
         assert_eq!(tree_of(&[black, one.clone()]).sample(&&ctx, 0.9, Turns::NONE).map(|s| (s.0, s.1)), Some((1, 1.0)));
         let same = vec![one; 1000];

@@ -4,14 +4,14 @@ use super::tree_node::Node;
 use super::{LightBounds, LightId};
 use lumiris_numbers::math::{Bounds3, Vec3};
 
-/// Beyond this depth lights are split in halves, so that the trail of any leaf fits 64 bits.
+/// Maximum depth of heuristic splits. Below it, lights are split in halves, so that the trail of any leaf fits 64 bits.
 const MAX_HEURISTIC_DEPTH: u32 = 30;
 /// Number of split candidates per axis, plus one.
 const BUCKETS: usize = 12;
-/// Lights above which the parts of a subtree, and the axes of a split, are worked on at once.
+/// Number of lights above which subtrees, and the axes of a split, are processed in parallel.
 const MANY: usize = 4096;
 
-/// A light to be placed.
+/// A light to be inserted.
 pub(super) struct Item {
     pub(super) id: LightId,
     pub(super) bounds: LightBounds,
@@ -23,7 +23,7 @@ fn bucket(center: f32, min: f32, extent: f32) -> usize {
     (((center - min) / extent * BUCKETS as f32) as usize).min(BUCKETS - 1)
 }
 
-/// Builds the subtree over `items` into `nodes`, 2n − 1 of them for n items, the first of which has the index `first`.
+/// Builds the subtree over n `items` into the 2n − 1 `nodes`; `first` is the index of the first node.
 pub(super) fn build(nodes: &mut [Node], first: u32, items: &mut [Item], depth: u32) -> LightBounds {
     if let [item] = items {
         nodes[0] = Node::new(&item.bounds, true, item.id);
@@ -42,7 +42,7 @@ pub(super) fn build(nodes: &mut [Node], first: u32, items: &mut [Item], depth: u
     bounds
 }
 
-/// Reorders at least two items and returns where to split them; neither part is empty.
+/// Reorders at least two items and returns the split index; neither part is empty.
 fn split(items: &mut [Item]) -> usize {
     let centers = Bounds3::from_points(items.iter().map(|i| i.center));
     let all = items.iter().fold(Bounds3::EMPTY, |b, i| b.union(i.bounds.bounds));
@@ -52,7 +52,7 @@ fn split(items: &mut [Item]) -> usize {
         if extent <= 0.0 || !extent.is_finite() {
             return None;
         }
-        // Long thin parts are worse: regularise by the aspect.
+        // Long thin parts are worse: regularise by the aspect ratio.
         let stretch = longest / diagonal[axis];
         best_cut(items, axis, min, extent).map(|(cost, cut)| (cost * stretch, axis, cut))
     };
@@ -77,14 +77,14 @@ fn split(items: &mut [Item]) -> usize {
     middle
 }
 
-/// The minimum cost of a split along an axis, and the first bucket right of it.
+/// The minimum cost of a split along an axis, and the first bucket right of the split.
 fn best_cut(items: &[Item], axis: usize, min: f32, extent: f32) -> Option<(f32, usize)> {
     let mut buckets = [LightBounds::EMPTY; BUCKETS];
     for item in items {
         let b = &mut buckets[bucket(item.center[axis], min, extent)];
         *b = b.union(&item.bounds);
     }
-    // Costs of what is right of each cut, from the end; then left ones from the start.
+    // Costs right of each split, from the end; then left costs from the start.
     let mut right_costs = [0.0; BUCKETS];
     let mut right = LightBounds::EMPTY;
     for i in (1..BUCKETS).rev() {

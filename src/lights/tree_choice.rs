@@ -1,4 +1,4 @@
-//! The choice of a light by a [`LightTree`], with the infinite lights, which have no place in it, beside it.
+//! The choice of a light by a [`LightTree`] and, beside it, the infinite lights, which have no bounds.
 
 use super::choice::UNIT;
 use super::{Light, LightCtx, LightId, LightRun, LightTree, SampledLight, Turns};
@@ -9,11 +9,11 @@ use std::sync::Arc;
 /// A light tree, with the infinite lights beside it.
 #[derive(Clone, Debug)]
 pub struct TreeChoice {
-    /// Lights with a place.
+    /// The lights with bounds.
     pub tree: Arc<LightTree>,
     /// Infinite lights, ascending.
     pub infinite: Vec<LightId>,
-    /// Probability of each of them over that of the whole tree.
+    /// Ratio of the probability of each infinite light to the probability of the whole tree.
     odds: f32,
 }
 
@@ -33,8 +33,9 @@ impl TreeChoice {
         Self::new((lights, &powers), infinite_fraction, false)
     }
 
-    /// A choice among `lights` of the given `powers`, with or without the parts of media that glow, where all infinite lights
-    /// together have the probability `infinite_fraction` (0 to 1, exclusive); `None`: each has that of the whole tree.
+    /// A choice among `lights` with the given `powers`. `glows`: emitting parts of media are included.
+    /// `infinite_fraction` is the total probability of the infinite lights (0 to 1, exclusive); `None`: each has the
+    /// same probability as the whole tree.
     pub(super) fn new((lights, powers): (&[Light], &[f32]), infinite_fraction: Option<f32>, glows: bool) -> Self {
         let is_asked_for = |light: &&Light| glows || !matches!(light, Light::Glow(_));
         let bounds: Vec<_> = lights.iter().map(|light| Some(light).filter(is_asked_for)?.bounds()).collect();
@@ -44,13 +45,13 @@ impl TreeChoice {
         TreeChoice { tree: Arc::new(LightTree::new(&bounds)), infinite, odds }
     }
 
-    /// Probability of the infinite lights together. 1 where nothing in the tree can contribute.
+    /// Total probability of the infinite lights; 1 if no light in the tree can contribute.
     #[inline]
     pub(super) fn infinite_probability(&self, ctx: &LightCtx) -> f32 {
         self.probability_of_some(ctx, self.infinite.len())
     }
 
-    /// Probability of `count` of the infinite lights, where the others cannot be chosen.
+    /// Total probability of `count` infinite lights, if the other infinite lights cannot be chosen.
     #[inline]
     pub(super) fn probability_of_some(&self, ctx: &LightCtx, count: usize) -> f32 {
         if count == 0 {
@@ -59,7 +60,7 @@ impl TreeChoice {
         if self.tree.importance(ctx) > 0.0 { self.fraction_of(count) } else { 1.0 }
     }
 
-    /// Probability of the infinite lights together where others can contribute.
+    /// Total probability of the infinite lights if lights in the tree can contribute.
     pub fn infinite_fraction(&self) -> f32 {
         self.fraction_of(self.infinite.len())
     }
@@ -76,7 +77,7 @@ impl TreeChoice {
         self.sample_again(&ctx, u, Turns::NONE)
     }
 
-    /// [`Self::sample`], where the point's `turns` hold what is known of it.
+    /// [`Self::sample`] with precomputed probabilities `turns` of the point.
     #[inline]
     pub fn sample_again(&self, ctx: &impl Deref<Target = LightCtx>, u: f32, turns: Turns<'_>) -> Option<SampledLight> {
         let p_infinite = turns.probability(Turns::BESIDE, || self.infinite_probability(ctx));
@@ -88,8 +89,8 @@ impl TreeChoice {
         Some(SampledLight { light, pmf: pmf * (1.0 - p_infinite), u })
     }
 
-    /// Adds runs for the positions from `first` on, which lie in [`start`, 1); `share` = 1 − `start` is a factor of all
-    /// probabilities.
+    /// Appends runs for the positions from `first` on, which are in [`start`, 1); `share` = 1 − `start` is a factor of
+    /// all probabilities.
     pub(super) fn runs(
         &self,
         ctx: &LightCtx,
@@ -99,6 +100,8 @@ impl TreeChoice {
         out: &mut Vec<LightRun>,
     ) {
         let TreeChoice { tree, infinite, .. } = self;
+
+        // Infinite lights first, in equal intervals
         let p_infinite = self.infinite_probability(ctx);
         let each = f64::from(p_infinite * share) / infinite.len() as f64;
         let mut first = first;
@@ -112,6 +115,8 @@ impl TreeChoice {
             }
             first += count;
         }
+
+        // The tree covers the rest
         let places = [first as u32, positions.len() as u32];
         if !tree.is_empty() && p_infinite < 1.0 {
             let start = start + f64::from(p_infinite * share);

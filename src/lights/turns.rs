@@ -1,29 +1,29 @@
-//! Choices of several lights at the same point by a [`LightTree`](super::LightTree): what they have in common.
+//! Probabilities shared by several choices of lights at the same point in a [`LightTree`](super::LightTree).
 
-/// Probabilities at the top of a light tree for one of many points, as far as they are known.
+/// Precomputed probabilities at the top of a light tree for one of many points; may be empty.
 #[derive(Clone, Copy, Debug)]
 pub struct Turns<'a> {
-    /// A column for each number.
+    /// One column per node number.
     columns: &'a [f32],
     len: usize,
     point: usize,
 }
 
 impl<'a> Turns<'a> {
-    /// Inner nodes of four levels, and one number more.
+    /// Number of columns: the inner nodes of four levels, and [`Self::BESIDE`].
     pub const COUNT: usize = 16;
-    /// The number of what is no node: the probability of the lights beside the tree.
+    /// Index that stands for lights beside the tree.
     pub const BESIDE: usize = 0;
-    /// Nothing is known.
+    /// No precomputed probabilities.
     pub const NONE: Turns<'static> = Turns { columns: &[], len: 0, point: 0 };
 
-    /// Those of a point, by [`Self::COUNT`] columns of the length `len`, or by none.
+    /// The probabilities of a point, in [`Self::COUNT`] columns of length `len`, or none.
     #[inline]
     pub fn new(columns: &'a [f32], len: usize, point: usize) -> Self {
         Turns { columns, len, point }
     }
 
-    /// The probability of this `number`, by `determine` where it is not known.
+    /// The probability of the node `number`; computed by `determine` if it is not precomputed.
     #[inline]
     pub fn probability(&self, number: usize, determine: impl FnOnce() -> f32) -> f32 {
         self.columns.get(number * self.len + self.point).copied().unwrap_or_else(determine)

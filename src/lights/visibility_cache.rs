@@ -1,16 +1,18 @@
-//! The visibility cache: finds the lights that contribute at a point, by the photons that arrived around it straight
-//! from lights [Keller and Wald 2000, §3].
+//! The visibility cache: for a point, the lights whose photons arrived nearby on a direct path [Keller and Wald 2000,
+//! §3].
 //!
-//! Space is divided into cubes of edge 2r. A photon is stored in the 8 cubes touched by a cube of half-edge r about it,
-//! so that a single lookup finds every photon within r of the point, and some up to 3r away. The lights of these
-//! photons are 𝓛_con; all others are most probably occluded. Cubes are also distinguished by the orientation of the
-//! surface: a photon is stored for each of the six axis directions within [`SIDE_COS`] of its normal, and a lookup uses
-//! the direction nearest to its own normal. So photons whose normals are within 17° of that of the point are always
-//! found, and photons on the other side of a wall never.
+//! Space is divided into cubes of edge 2r. A photon is stored in the 8 cubes that overlap a cube of half-edge r about
+//! it, so that a single lookup returns every photon within r of the point, and some up to 3r away. The lights of these
+//! photons are 𝓛_con; all others are most probably occluded.
 //!
-//! A radius is safe if a visible light almost surely has a photon within it. If μ photons are expected, none arrives
-//! with probability e^−μ; [`VisibilityCache::adapted`] chooses the radius at which a photon has [`SECURE_COUNT`]
-//! photons of its light around it on average.
+//! Cubes are also distinguished by the orientation of the surface: a photon is stored for each of the six axis
+//! directions within [`SIDE_COS`] of its normal, and a lookup uses the direction nearest to its own normal. A lookup
+//! therefore returns all photons whose normals are within 17° of the normal of the point, and never photons on the
+//! other side of a wall.
+//!
+//! A radius is safe if a visible light almost surely has a photon within it. If μ photons are expected, there is none
+//! with probability e^−μ. [`VisibilityCache::adapted`] chooses the radius at which a photon has on average
+//! [`SECURE_COUNT`] photons of its light around it.
 
 use super::LightId;
 use lumiris_numbers::math::{Bounds3, Vec3};
@@ -26,7 +28,7 @@ const RADIUS_RANGE: [f32; 2] = [1.0 / 4096.0, 1.0 / 16.0];
 
 /// Bits of a cube's index along each axis.
 const AXIS_BITS: u32 = 20;
-/// Key of a slot that holds nothing.
+/// Key of an empty slot.
 const EMPTY: u64 = u64::MAX;
 
 /// A cube for one orientation, with its range of entries.
@@ -37,7 +39,7 @@ struct Slot {
     len: u32,
 }
 
-/// The visibility cache: the lights that contribute around a point, found by photons that came straight from them.
+/// The visibility cache: the lights that contribute around a point, according to photons that came straight from them.
 #[derive(Clone, Debug)]
 pub struct VisibilityCache {
     origin: Vec3,
@@ -98,9 +100,9 @@ fn index_of(x: f32) -> u64 {
 }
 
 impl VisibilityCache {
-    /// Built from photons that came straight from lights: position, unit normal on the lit side, light. `radius` (m) is
-    /// enlarged where the scene has more than 2²⁰ cubes along an axis. Photons without a finite position or without a
-    /// normal are ignored.
+    /// Built from photons that came straight from lights: position, unit normal on the illuminated side, light.
+    /// `radius` (m) is enlarged if the scene has more than 2²⁰ cubes along an axis. Photons without a finite position
+    /// or without a normal are ignored.
     pub fn new(primary: impl Iterator<Item = (Vec3, Vec3, LightId)>, radius: f32) -> Self {
         let photons: Vec<_> = primary.collect();
         VisibilityCache::of_photons(&photons, radius)
@@ -111,7 +113,7 @@ impl VisibilityCache {
         Self::adapted_by(primary, scene_radius, Self::mean_count)
     }
 
-    /// [`Self::adapted`] to the points where it will be used: position and unit normal.
+    /// [`Self::adapted`] to the points of later lookups: position and unit normal.
     pub fn adapted_to(points: &[(Vec3, Vec3)], primary: &[(Vec3, Vec3, LightId)], scene_radius: f32) -> Self {
         Self::adapted_by(primary, scene_radius, |cache| cache.mean_count_at(points))
     }
@@ -161,8 +163,8 @@ impl VisibilityCache {
         VisibilityCache { paths, ..VisibilityCache::from_sorted(origin, radius, &merged(spread.collect())) }
     }
 
-    /// The same, where some photon paths did not arrive at a surface: with the number of photon paths of each light, ids
-    /// ascending.
+    /// Sets the number of photon paths of each light, ids ascending, for scenes in which some photon paths did not
+    /// reach a surface.
     #[must_use]
     pub fn with_paths(self, paths: impl Iterator<Item = (LightId, f32)>) -> Self {
         VisibilityCache { paths: paths.collect(), ..self }
@@ -193,7 +195,7 @@ impl VisibilityCache {
         cache
     }
 
-    /// The slot of a key, or the empty one where it would be.
+    /// The slot of a key, or the empty slot for its insertion.
     #[inline]
     fn find(&self, key: u64) -> usize {
         let mask = self.slots.len() - 1;
@@ -204,7 +206,7 @@ impl VisibilityCache {
         slot
     }
 
-    /// The same for some of the lights only.
+    /// Restricts the cache to some of the lights.
     #[must_use]
     pub fn of_lights(self, is_light: impl Fn(LightId) -> bool) -> Self {
         if self.entries.iter().all(|&(light, _)| is_light(light)) {
@@ -220,18 +222,17 @@ impl VisibilityCache {
         VisibilityCache { paths: self.paths, ..VisibilityCache::from_sorted(self.origin, self.radius, &items) }
     }
 
-    /// Area (m²) of a plane surface in which photons are found from one point: they come from within r around a cube of
-    /// edge 2r.
+    /// Area (m²) of a plane surface that a lookup covers: photons come from within r around a cube of edge 2r.
     pub fn area(&self) -> f32 {
         16.0 * self.radius * self.radius
     }
 
-    /// Number of photon paths of a light; unless they are known, that of its photons.
+    /// Number of photon paths of a light; by default, its number of photons.
     pub fn paths(&self, light: LightId) -> f32 {
         self.paths.binary_search_by_key(&light, |&(id, _)| id).map_or(0.0, |i| self.paths[i].1)
     }
 
-    /// The radius r (m) within which photons are always found.
+    /// The radius r (m) within which a lookup returns all photons.
     pub fn radius(&self) -> f32 {
         self.radius
     }
@@ -247,8 +248,8 @@ impl VisibilityCache {
         (self.slots.len() * size_of::<Slot>() + self.entries.len() * entry) as u64
     }
 
-    /// 𝓛_con of the point `p` on the side of the unit normal `n`, with photon counts; ids ascend. Empty where no photon
-    /// was found, and for a zero normal.
+    /// 𝓛_con of the point `p` on the side of the unit normal `n`, with photon counts; ids ascend. Empty without
+    /// photons, and for a zero normal.
     #[inline]
     pub fn lookup(&self, p: Vec3, n: Vec3) -> &[(LightId, u32)] {
         self.lookup_with_sums(p, n).lights
@@ -266,7 +267,7 @@ impl VisibilityCache {
         ContributingLights { lights: &self.entries[range.clone()], sums: &self.sums[range] }
     }
 
-    /// Mean over points with photons of the number of photons found there of the same light as a photon found there.
+    /// Mean over the points with photons: the expected count of a light, averaged over the photons of the lookup.
     fn mean_count_at(&self, points: &[(Vec3, Vec3)]) -> f64 {
         let (mut sum, mut lit) = (0.0, 0);
         for &(p, n) in points {
@@ -280,7 +281,7 @@ impl VisibilityCache {
         if lit > 0 { sum / f64::from(lit) } else { 0.0 }
     }
 
-    /// Mean over all photons of the number of photons of the same light found at their position.
+    /// Mean over all photons: the number of photons of the same light in a lookup at their position.
     pub fn mean_count(&self) -> f64 {
         let sum = |f: fn(f64) -> f64| self.entries.iter().map(|&(_, count)| f(f64::from(count))).sum::<f64>();
         let (photons, squares) = (sum(|c| c), sum(|c| c * c));
@@ -288,7 +289,7 @@ impl VisibilityCache {
     }
 }
 
-/// Sorted items; those of the same cube and light are merged.
+/// Sorts the items and merges items of the same cube and light.
 fn merged(mut items: Vec<(u64, LightId, u32)>) -> Vec<(u64, LightId, u32)> {
     items.par_sort_unstable();
     items.dedup_by(|next, kept| {
@@ -340,7 +341,7 @@ mod tests {
                 assert!(contributing.iter().any(|(id, _)| id == light));
                 found += 1;
             }
-            // No photon is found beyond three radii or from the other side, and each only once.
+            // A lookup returns no photon beyond three radii or from the other side, and each photon only once.
             for &(light, count) in contributing {
                 let max = near(radius * 3.001, -0.61).filter(|(_, _, id)| *id == light).count();
                 assert!(count as usize <= max, "{light} {count} {max}");
@@ -379,7 +380,7 @@ mod tests {
     fn the_adapted_radius_gives_photons_enough_company() {
         let mut s = pcg32([7, 7, 7]);
         for count in [3_000, 100_000] {
-            // Four lights on a square of 10 m, each seen in its own quarter
+            // Four lights on a square of 10 m, each visible in its own quarter
             let photons: Vec<_> = (0..count)
                 .map(|_| {
                     let [x, y] = s.random::<[f32; 2]>().map(|u| u * 10.0);

@@ -1,13 +1,13 @@
-//! A light sampler that prefers the lights that the visibility cache finds at a point [Keller and Wald 2000, §3], mixed
-//! with a light tree.
+//! A light sampler that prefers the lights in the visibility cache at a point [Keller and Wald 2000, §3], mixed with a
+//! light tree.
 //!
 //! pmf(l) = (1 − δ)·w_l/Σ w + δ·pmf_base(l), where w_l = 0 for lights that are not in the cache. The base is the
-//! [`LightTree`] with the infinite lights beside it, so every light that can contribute has a positive probability, and
-//! estimates are unbiased whatever the cache holds. Where the cache is empty, δ = 1.
+//! [`LightTree`] with the infinite lights beside it. Every light that can contribute therefore has a positive
+//! probability, and estimates are unbiased for any content of the cache. If the cache is empty at the point, δ = 1.
 //!
 //! w_l is the tree's bound of the light's contribution at the point, cos θ′·cos θi′·I/d², or the irradiance of an
-//! infinite light [lm/m² by luminance, both up to a common factor]. Beyond [`MAX_WEIGHTED`] lights w_l is the number of
-//! their photons instead, so that sampling takes logarithmic time.
+//! infinite light (lm/m² by luminance); both up to a common factor. With more than [`MAX_WEIGHTED`] lights, w_l is the
+//! photon count instead, so that sampling takes logarithmic time.
 //!
 //! [`LightTree`]: super::LightTree
 
@@ -32,10 +32,10 @@ pub struct VisibilityCacheSampler {
     pub(super) visibility_cache: Option<Arc<VisibilityCache>>,
 }
 
-/// The contributing lights of a point, with their weights.
+/// The contributing lights at a point, with their weights.
 struct Known<'a> {
     contributing: ContributingLights<'a>,
-    /// Cumulative weights; not used where photon counts are the weights.
+    /// Cumulative weights; unused if the weights are photon counts.
     sums: [f32; MAX_WEIGHTED],
     total: f32,
 }
@@ -76,7 +76,7 @@ impl Known<'_> {
         } else {
             cumulative::find(&self.sums[..count], x)
         };
-        // Rounding may reach the total: the last light with a weight
+        // Rounding may reach the total: then take the last light with a weight
         let place = if place < count { place } else { (0..count).rfind(|&i| self.pmf_at(i) > 0.0).unwrap_or(0) };
         let before = self.sum_before(place);
         let rest = (x - before) / (self.sum_before(place + 1) - before);
@@ -134,12 +134,14 @@ impl VisibilityCacheSampler {
         self.known(ctx).map_or(base, |known| mixed(known.pmf(light), base))
     }
 
-    /// Contributing lights first, then those of the base; a light may have a run of each.
+    /// Runs of the contributing lights, then of the base; a light may have a run in each.
     pub(super) fn runs(&self, ctx: &LightCtx, positions: &[u32], out: &mut Vec<LightRun>) {
         let Some(known) = self.known(ctx) else {
             self.base.runs(ctx, positions, 0, (0.0, 1.0), out);
             return;
         };
+
+        // Runs of the contributing lights
         let fraction = f64::from(1.0 - BASE_FRACTION);
         let end_of = |i: usize| fraction * f64::from(known.sum_before(i + 1)) / f64::from(known.total);
         let count = known.contributing.lights.len();
@@ -157,6 +159,8 @@ impl VisibilityCacheSampler {
             out.push(LightRun { light, pmf, places: [first as u32, last as u32], interval });
             first = last;
         }
+
+        // Runs of the base, with the probabilities of both
         let of_base = out.len();
         self.base.runs(ctx, positions, first, (fraction, BASE_FRACTION), out);
         for run in &mut out[of_base..] {
@@ -164,7 +168,7 @@ impl VisibilityCacheSampler {
         }
     }
 
-    /// Mixes the probabilities of the contributing lights into those of the groups by the base.
+    /// Mixes the probabilities of the contributing lights into the group probabilities of the base.
     pub(super) fn group_pmfs(&self, ctx: &LightCtx, group_of: impl Fn(LightId) -> Option<usize>, pmfs: &mut [f32]) {
         let Some(known) = self.known(ctx) else { return };
         pmfs.iter_mut().for_each(|p| *p *= BASE_FRACTION);
@@ -175,8 +179,8 @@ impl VisibilityCacheSampler {
         }
     }
 
-    /// Chooses a light of the group of probability `group_pmf` by `u` in [0, 1); `base` does so for the base alone. The
-    /// probability of the answer includes that of the group.
+    /// Chooses a light of a group by `u` in [0, 1). `base` does the same for the base alone. The returned probability
+    /// includes `group_pmf`, the probability of the group.
     pub(super) fn sample_group(
         &self,
         ctx: &LightCtx,
@@ -189,10 +193,14 @@ impl VisibilityCacheSampler {
         let places = || (0..known.contributing.lights.len()).filter(|&i| is_in(known.contributing.lights[i].0));
         let p_known = places().map(|i| known.pmf_at(i)).sum::<f32>();
         let fraction = ((1.0 - BASE_FRACTION) * p_known / group_pmf).min(1.0);
+
+        // Choose by the base
         if u >= fraction {
             let choice = base(((u - fraction) / (1.0 - fraction)).min(ONE_MINUS_EPSILON))?;
             return Some(SampledLight { pmf: self.pmf(ctx, choice.light), ..choice });
         }
+
+        // Choose among the contributing lights of the group
         let mut x = u / fraction * p_known;
         let mut chosen = None;
         for i in places().filter(|&i| known.pmf_at(i) > 0.0) {
@@ -209,7 +217,7 @@ impl VisibilityCacheSampler {
     }
 }
 
-/// The probability of a choice with the probability `known` among the contributing lights and `base` by the base.
+/// The probability of a choice that has the probability `known` among the contributing lights and `base` in the base.
 #[inline]
 fn mixed(known: f32, base: f32) -> f32 {
     (1.0 - BASE_FRACTION) * known + BASE_FRACTION * base

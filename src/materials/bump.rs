@@ -5,15 +5,15 @@ use crate::geometry::SurfaceHit;
 use crate::textures::{FloatTextureId, TextureContext, TextureSet};
 use lumiris_numbers::math::{Frame, Vec2, Vec3};
 
-/// Step in u and v of the finite differences where the footprint is unknown.
+/// Step in u and v of the finite differences without a known footprint.
 const DEFAULT_STEP: f32 = 5e-4;
 
-/// Shading frame at a hit: z is the shading normal after normal map or displacement, x is nearest to ∂p/∂u.
+/// Shading frame at a hit: z is the shading normal after normal map or displacement, x is as near to ∂p/∂u as possible.
 pub fn shading_frame(entry: &MaterialEntry, textures: &TextureSet, hit: &SurfaceHit, ctx: &TextureContext) -> Frame {
     match (entry.normal_map, entry.displacement) {
         (Some(map), _) => normal_mapped(map, textures, hit, ctx),
         (None, Some(displacement)) => displaced(displacement, textures, hit, ctx),
-        // Lambertian reflection needs no tangent, and the lanes do without
+        // Lambertian reflection needs no tangent; the vectorised code uses this frame, too
         (None, None) if matches!(entry.material, Material::Diffuse { .. }) => Frame::from_z(hit.ns),
         (None, None) => Frame::from_xz(hit.dpdus, hit.ns),
     }
@@ -33,10 +33,10 @@ fn normal_mapped(map: NormalMap, textures: &TextureSet, hit: &SurfaceHit, ctx: &
     Frame::from_xz(hit.dpdus, facing(ns, hit.n))
 }
 
-/// The normal of the surface p + d·n for the displacement d: ∂p'/∂u = ∂p/∂u + ∂d/∂u n, by forward differences. The
-/// term d ∂n/∂u is left out: it matters only for displacements near the radius of curvature.
+/// The normal of the surface p + d·n for the displacement d: ∂p'/∂u = ∂p/∂u + ∂d/∂u n, by forward differences. The term
+/// d ∂n/∂u is omitted: it matters only for displacements near the radius of curvature.
 fn displaced(displacement: FloatTextureId, textures: &TextureSet, hit: &SurfaceHit, ctx: &TextureContext) -> Frame {
-    // As pbrt-v4: with interpolated normals the second tangent is perpendicular to the first, and as long.
+    // As in pbrt-v4: with interpolated normals the second tangent is perpendicular to the first, and has its length.
     let dpdvs = if hit.ns == hit.n { hit.dpdv } else { hit.ns.cross(hit.dpdus) };
     let step = |width: f32| if width > 0.0 { 0.5 * width } else { DEFAULT_STEP };
     let (du, dv) = (step(ctx.uv_width.x), step(ctx.uv_width.y));
@@ -52,7 +52,7 @@ fn displaced(displacement: FloatTextureId, textures: &TextureSet, hit: &SurfaceH
     Frame::from_xz(dpdu, facing(ns, hit.n))
 }
 
-/// `ns` turned to the side of `n`.
+/// `ns` flipped to the side of `n`.
 fn facing(ns: Vec3, n: Vec3) -> Vec3 {
     if ns.dot(n) < 0.0 { -ns } else { ns }
 }

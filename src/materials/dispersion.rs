@@ -1,13 +1,13 @@
 //! Dispersion: an index of refraction that depends on the wavelength, in paths that carry RGB.
 //!
-//! A path carries all wavelengths until it meets a dispersive surface. There it gets one wavelength λ, which it keeps, and its
-//! throughput the factor r(λ)/p(λ), where r are the responses of the channels to white light, each with the integral 1.
-//! So the mean over λ of what does not depend on it is what it was without dispersion, and all the light that one
-//! path finds belongs to the same λ. The density p is the mean of the responses, which bounds the factor by 3.
+//! A path carries all wavelengths until it reaches a dispersive surface. There one wavelength λ is sampled for the rest
+//! of the path, and its throughput is multiplied by r(λ)/p(λ), where r are the responses of the channels to white
+//! light, each with the integral 1. Results that do not depend on λ therefore keep their mean, and all light of one
+//! path belongs to the same λ. The density p is the mean of the responses, which bounds the factor by 3.
 //!
-//! Responses are those of the CIE 1931 observer to D65 in Rec.709, without their negative parts: colours of single
-//! wavelengths lie outside of Rec.709, and are nearer to white here than they would be. As everywhere, the spectra of lights
-//! and reflectances within a channel count as flat.
+//! The responses are those of the CIE 1931 observer to D65 in Rec.709, without their negative parts. Monochromatic
+//! colours are outside of Rec.709, and are therefore rendered less saturated. As everywhere, the spectra of lights and
+//! reflectances within a channel are treated as constant.
 
 use lumiris_formats::spectra::{Spectrum, white_responses};
 use lumiris_numbers::math::{PiecewiseConstant1D, Rgb};
@@ -20,7 +20,7 @@ const LEAST_DIFFERENCE: f32 = 1e-5;
 /// The index of refraction by wavelength.
 #[derive(Clone, Debug)]
 pub struct Dispersion {
-    /// At each nm of the responses.
+    /// Index at each nm of the responses.
     eta: Vec<f32>,
 }
 
@@ -43,11 +43,11 @@ fn white() -> &'static White {
     })
 }
 
-/// A wavelength (nm) of density p, and r/p there.
+/// Samples a wavelength (nm) with density p; returns also r/p.
 #[inline]
 pub fn sample_wavelength(u: f32) -> (f32, Rgb) {
     let white = white();
-    // There is white light, so a sample
+    // White light has power, so there is always a sample
     white.density.sample(u).map_or((white.first, Rgb::BLACK), |s| {
         let bins = white.density.len() as f32;
         (white.first + s.x * bins - 0.5, white.weights[s.index])
@@ -63,7 +63,8 @@ pub fn pdf_wavelength(lambda: f32) -> f32 {
 }
 
 impl Dispersion {
-    /// That of a spectrum of indices, which goes on at its ends; `None` if it is the same everywhere or not positive.
+    /// The dispersion of a spectrum of indices, which is extended by its end values; `None` if it is constant or not
+    /// positive.
     pub fn new(eta: &Spectrum) -> Option<Self> {
         let (lambda, _): (RangeInclusive<u32>, _) = white_responses();
         let eta: Vec<f32> = lambda.map(|l| eta.at_clamped(l as f32)).collect();

@@ -28,7 +28,7 @@ pub enum EvaluatedMaterial {
         specular: RgbTextureId,
         /// Root mean square slope of the facets.
         slope: FloatTextureId,
-        /// Part of the surface that is facets.
+        /// The facets' fraction of the surface.
         amount: FloatTextureId,
     },
     /// Power of a cosine over a Lambertian.
@@ -39,7 +39,7 @@ pub enum EvaluatedMaterial {
         specular: RgbTextureId,
         /// Exponent.
         exponent: FloatTextureId,
-        /// What the lobe is about.
+        /// Axis of the lobe.
         axis: LobeAxis,
     },
     /// Anisotropic power of a cosine over a diffuse base.
@@ -48,7 +48,7 @@ pub enum EvaluatedMaterial {
         reflectance: RgbTextureId,
         /// Reflectance of the lobe at normal incidence.
         specular: RgbTextureId,
-        /// Exponents along ∂p/∂u and across.
+        /// Exponents along ∂p/∂u and across it.
         exponents: [FloatTextureId; 2],
     },
 }

@@ -6,26 +6,26 @@ use crate::bsdfs::hair::HairLobes;
 use crate::textures::{FloatTextureId, RgbTextureId};
 use lumiris_numbers::math::Rgb;
 
-/// What colours a fibre.
+/// The colour parameters of a fibre.
 #[derive(Clone, Copy, Debug)]
 pub enum HairColor {
     /// Absorption per radius of the fibre.
     SigmaA(RgbTextureId),
-    /// Color of many fibres together.
+    /// Colour of a bulk of fibres.
     Reflectance(RgbTextureId),
     /// Concentrations of melanin.
     Melanin {
-        /// The brown one.
+        /// Brown melanin.
         eumelanin: FloatTextureId,
-        /// The red one.
+        /// Red melanin.
         pheomelanin: FloatTextureId,
     },
 }
 
-/// Parameters of `hair`. Where across the fibre a path meets it is the texture coordinate v.
+/// Parameters of `hair`. The texture coordinate v is the offset of a path across the fibre.
 #[derive(Clone, Copy, Debug)]
 pub struct HairMaterial {
-    /// What colours it.
+    /// Colour parameters.
     pub color: HairColor,
     /// Index of refraction.
     pub eta: FloatTextureId,

@@ -1,25 +1,25 @@
-//! The share of light that a scattering interior gives back, and the interior that gives back a given share.
+//! The reflectance of a scattering interior, and its inverse: the interior with a given reflectance.
 //!
 //! The interior fills the half-space below a smooth boundary of relative index η and scatters isotropically with the
-//! single-scattering albedo α. Light comes evenly from all directions outside, and what has entered has the radiance S(μ) below
-//! the boundary, where μ is the cosine to the normal. The radiance D down and U up there follow
+//! single-scattering albedo α. Uniform light from outside, after refraction, has the radiance S(μ) below the boundary,
+//! where μ is the cosine to the normal. There, the downward radiance D and the upward radiance U satisfy
 //!
 //! U(μ) = α/2 H(μ) ∫₀¹ μ'/(μ + μ') H(μ') D(μ') dμ',  D = S + F U,
 //!
-//! with F the reflectance of the boundary from below and H the function of [Chandrasekhar 1960, ch. IV and V], for which
-//! 1/H(μ) = √(1 − α) + α/2 ∫₀¹ μ' H(μ')/(μ + μ') dμ'. The share ρ(α) is the flux ∫ (1 − F) U μ dμ of the light that leaves
-//! over the flux ∫ S μ dμ of what has entered: 0 for α = 0, 1 for α = 1, and monotone between. Light that the boundary reflects
-//! from outside is not of it. A phase function of asymmetry g counts as an isotropic one of (1 − g) σ_s, the relation of
-//! similarity [van de Hulst 1980].
+//! with F the reflectance of the boundary from below and H the function of [Chandrasekhar 1960, ch. IV and V], for
+//! which 1/H(μ) = √(1 − α) + α/2 ∫₀¹ μ' H(μ')/(μ + μ') dμ'. The reflectance ρ(α) is the flux ∫ (1 − F) U μ dμ of the
+//! light that leaves over the flux ∫ S μ dμ of the light that entered: 0 for α = 0, 1 for α = 1, and monotone between.
+//! It excludes the reflection of the boundary on the outside. A phase function of asymmetry g is equivalent to an
+//! isotropic one with (1 − g) σ_s, by the similarity relation [van de Hulst 1980].
 
 use crate::bsdfs::fresnel::fr_dielectric;
 
 /// Nodes of the quadrature on either side of the critical angle.
 const NODES: usize = 24;
-/// Steps of the iterations for H, and for light that goes to and fro between boundary and interior.
+/// Maximum number of iterations for H, and for interreflections between boundary and interior.
 const MAX_STEPS: usize = 2000;
 
-/// A boundary, ready for any albedo.
+/// A boundary, with precomputed data for any albedo.
 #[derive(Clone, Debug)]
 pub struct HalfSpace {
     /// Cosines and their weights, ∫₀¹ f dμ = Σ w f(μ).
@@ -31,9 +31,9 @@ pub struct HalfSpace {
 }
 
 impl HalfSpace {
-    /// Below a boundary of relative index `eta` > 0.
+    /// The half-space below a boundary of relative index `eta` > 0.
     pub fn new(eta: f32) -> Self {
-        // F has a kink where total reflection begins, and S where refraction does
+        // F has a kink at the onset of total reflection, and S at the onset of refraction
         let critical = (1.0 - f64::from(eta).min(1.0 / f64::from(eta)).powi(2)).sqrt();
         let mut nodes = Vec::new();
         for (from, to) in [(0.0, critical), (critical, 1.0)] {
@@ -45,7 +45,7 @@ impl HalfSpace {
         HalfSpace { nodes, fresnel, entered }
     }
 
-    /// ρ of a single-scattering albedo (0..=1).
+    /// ρ for a single-scattering albedo (0..=1).
     pub fn reflectance(&self, albedo: f64) -> f64 {
         let h = self.h(albedo);
         let n = self.nodes.len();
@@ -72,7 +72,7 @@ impl HalfSpace {
         flux(&|i| (1.0 - self.fresnel[i]) * up[i]) / flux(&|i| self.entered[i])
     }
 
-    /// The albedo for which ρ is `reflectance` (0..=1), with the phase function's asymmetry `g`.
+    /// The albedo with the reflectance ρ = `reflectance` (0..=1), for a phase function of asymmetry `g`.
     pub fn albedo(&self, reflectance: f64, g: f64) -> f64 {
         if reflectance >= 1.0 {
             return 1.0;
@@ -95,7 +95,7 @@ impl HalfSpace {
                 let mu = self.nodes[i][0];
                 let sum: f64 =
                     (0..n).map(|j| self.nodes[j][1] * self.nodes[j][0] * h[j] / (mu + self.nodes[j][0])).sum();
-                // Halfway to the next value, which lies on the other side of the solution
+                // Average with the next value, which lies on the other side of the solution
                 0.5 * (h[i] + 1.0 / ((1.0 - albedo).sqrt() + 0.5 * albedo * sum))
             };
             let next: Vec<f64> = (0..n).map(of).collect();
@@ -109,7 +109,7 @@ impl HalfSpace {
     }
 }
 
-/// Abscissae in 0..1 and weights of the rule of Gauss and Legendre, by Newton's method.
+/// Abscissae in 0..1 and weights of Gauss-Legendre quadrature, by Newton's method.
 fn gauss_legendre() -> impl Iterator<Item = [f64; 2]> {
     (0..NODES).map(|i| {
         let n = NODES as f64;
@@ -134,7 +134,7 @@ mod tests {
 
     #[test]
     fn without_a_boundary_the_share_is_that_of_chandrasekhar() {
-        // 1 − √(1 − α) H̄, where H̄ = 2 ∫ H μ dμ; H(1) is of his table XI
+        // 1 − √(1 − α) H̄, where H̄ = 2 ∫ H μ dμ; H(1) is from Chandrasekhar's table XI
         let space = HalfSpace::new(1.0);
         for albedo in [0.2, 0.5, 0.9, 0.99, 1.0] {
             let h = space.h(albedo);

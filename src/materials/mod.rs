@@ -1,7 +1,7 @@
-//! Materials: evaluate textures at a hit and build the BSDF in its shading frame. Semantics are pbrt-v4's.
+//! Materials: evaluate textures at a hit and build the BSDF in its shading frame. The semantics are those of pbrt-v4.
 //!
-//! Reading order: this file, [`dispersion`], [`evaluated`], [`hair`], [`principled`], [`bump`], [`surface`]; [`half_space`] is what an
-//! interior gives back.
+//! Reading order: this file, [`dispersion`], [`evaluated`], [`hair`], [`principled`], [`bump`], [`surface`];
+//! [`half_space`] computes the reflectance of an interior.
 
 pub mod bump;
 pub mod dispersion;
@@ -40,7 +40,7 @@ pub type MaterialId = u32;
 pub struct Roughness {
     /// Along ∂p/∂u.
     pub u: FloatTextureId,
-    /// Across.
+    /// Across it.
     pub v: FloatTextureId,
     /// True for alpha = √roughness, false for alpha = roughness.
     pub remap: bool,
@@ -136,7 +136,7 @@ pub enum Material {
     Principled(PrincipledMaterial),
     /// Fibres.
     Hair(HairMaterial),
-    /// What was measured.
+    /// Measured reflection.
     Measured {
         /// Index into the tables of the [`MaterialSet`].
         tables: u32,
@@ -150,12 +150,12 @@ pub enum Material {
         /// Probability of the second.
         amount: FloatTextureId,
     },
-    /// No surface: rays pass.
+    /// No surface: rays pass through.
     Interface,
 }
 
 impl Material {
-    /// What kind of material it is, for people.
+    /// Name of the kind of material, for messages.
     pub fn kind_name(&self) -> &'static str {
         self.into()
     }
@@ -168,13 +168,13 @@ pub struct NormalMap {
     pub image: ImageTexture,
     /// Factor of the tangential components.
     pub strength: f32,
-    /// True if the second axis of tangent space is on the side of the bitangent, as in glTF; else it is at the left of the
-    /// first, as in pbrt-v4.
+    /// True if the second axis of tangent space is on the side of the bitangent, as in glTF; else it is to the left of
+    /// the first axis, as in pbrt-v4.
     pub is_along_v: bool,
 }
 
 impl NormalMap {
-    /// The map as pbrt-v4 reads it.
+    /// The map with the conventions of pbrt-v4.
     pub fn unscaled(image: ImageId) -> Self {
         let image = ImageTexture { image, mapping: Mapping2d::default(), udim: None, scale: 1.0, invert: false };
         NormalMap { image, strength: 1.0, is_along_v: false }
@@ -188,11 +188,11 @@ pub struct MaterialEntry {
     pub name: String,
     /// The material.
     pub material: Material,
-    /// Tangent-space normal map, stored linear; it goes before displacement.
+    /// Tangent-space normal map, stored linear; it takes precedence over displacement.
     pub normal_map: Option<NormalMap>,
-    /// Displacement along the normal, which bends the normal only (scene units).
+    /// Displacement along the normal, which affects only the shading normal (scene units).
     pub displacement: Option<FloatTextureId>,
-    /// The index of glass by wavelength, in place of the material's own.
+    /// The index of refraction by wavelength, which replaces the index of the material.
     pub dispersion: Option<Arc<Dispersion>>,
 }
 
@@ -201,15 +201,15 @@ pub struct MaterialEntry {
 pub struct MaterialSet {
     entries: Vec<MaterialEntry>,
     coats: Vec<CoatTable>,
-    /// Per material, its table.
+    /// Per material, the index of its coat table.
     coat_of: Vec<Option<u32>>,
     /// Tables of measured materials.
     measured: Vec<Arc<MeasuredTables>>,
-    /// Per material, whether it bundles light to caustics.
+    /// Per material, true if it makes caustics.
     caustics: Vec<bool>,
 }
 
-/// What a coat's table depends on, by bits: η, thickness, and the alphas unless they are textured.
+/// The arguments of a coat's table, as bits: η, thickness, and the alphas unless they are textured.
 #[derive(Clone, Copy, PartialEq)]
 struct CoatKey {
     eta: f32,
@@ -218,9 +218,8 @@ struct CoatKey {
 }
 
 impl MaterialSet {
-    /// Takes the materials and tabulates their coats, some 30 ms for each (η, thickness, roughness), and one second
-    /// where the roughness is textured. `textures` is the set that the materials refer to; its images need not be there
-    /// yet.
+    /// Tabulates the coats of the materials, in about 30 ms for each (η, thickness, roughness), and one second for
+    /// textured roughness. `textures` is the set that the materials refer to; its images need not be loaded yet.
     pub fn new(entries: Vec<MaterialEntry>, textures: &TextureSet) -> Self {
         let mut keys: Vec<CoatKey> = Vec::new();
         let mut intern = |key: CoatKey| {
@@ -246,9 +245,9 @@ impl MaterialSet {
         MaterialSet { measured, ..self }
     }
 
-    /// Finds out which materials bundle light to caustics, by one value of each of their textures, that of an image being its
-    /// mean. Images are there by now. It is the same at all points of a material: techniques that share paths, and see a texture at other places, must
-    /// agree on it.
+    /// Determines which materials make caustics, by one value of each of their textures; for an image, its mean. The
+    /// images must be loaded. The result is constant over each material: techniques that share paths look up textures
+    /// at different points and must agree on it.
     #[must_use]
     pub fn find_caustics(self, textures: &TextureSet) -> Self {
         let t = Textures { set: textures, ctx: &TextureContext::whole() };
@@ -257,18 +256,18 @@ impl MaterialSet {
         MaterialSet { caustics, ..self }
     }
 
-    /// True if any material bundles light to caustics.
+    /// True if any material makes caustics.
     pub fn make_caustics(&self) -> bool {
         self.caustics.contains(&true)
     }
 
-    /// True if what a hit of the material is made of is drawn anew for every direction.
+    /// True if the material is a mixture, in which every direction chooses a material.
     pub fn is_mixture(&self, id: MaterialId) -> bool {
         matches!(self.entries[id as usize].material, Material::Mix { .. })
     }
 
-    /// Maximum number of lobes of a BSDF of these materials, by [`Bsdf::first_lobe`], if `density` proposes directions
-    /// for those that can only be evaluated.
+    /// Maximum number of lobes of a BSDF of these materials, by [`Bsdf::first_lobe`]; `density` is the proposal density
+    /// of BSDFs that can only be evaluated.
     pub fn lobes(&self, density: ProposalDensity) -> usize {
         let has_two = |material: &Material| match material {
             Material::Principled(_)
@@ -293,8 +292,8 @@ impl MaterialSet {
         &self.entries
     }
 
-    /// The material that stands for `id` at a hit: mixtures are resolved by a hash of the point, the direction and the
-    /// mixed materials. A mixture that holds itself resolves to `None`.
+    /// Resolves mixtures at a hit, by a hash of the point, the direction and the mixed materials. A mixture that
+    /// contains itself resolves to `None`.
     pub fn resolve(&self, id: MaterialId, textures: &TextureSet, ctx: &TextureContext, wo: Vec3) -> Option<MaterialId> {
         let mut id = id;
         for _ in 0..=self.entries.len() {
@@ -309,12 +308,12 @@ impl MaterialSet {
         None
     }
 
-    /// True if the index of any depends on the wavelength.
+    /// True if the index of any material depends on the wavelength.
     pub fn has_dispersion(&self) -> bool {
         self.entries.iter().any(|entry| entry.dispersion.is_some())
     }
 
-    /// By material, true if there may be no surface at a hit: those that only bound a medium, and mixtures with them.
+    /// For each material, true if there may be no surface at a hit: interfaces between media, and mixtures with them.
     pub fn may_pass(&self) -> Vec<bool> {
         let mut holders: Vec<Vec<MaterialId>> = vec![Vec::new(); self.entries.len()];
         let mut open = Vec::new();
@@ -334,7 +333,8 @@ impl MaterialSet {
         may_pass
     }
 
-    /// The reflectance of a material that is Lambertian, the same everywhere, and does not bend normals.
+    /// The reflectance of a Lambertian material that is constant and has no normal map or displacement; `None` for
+    /// others.
     pub fn plain_reflectance(&self, id: MaterialId, textures: &TextureSet) -> Option<Rgb> {
         let MaterialEntry { material: Material::Diffuse { reflectance }, normal_map: None, displacement: None, .. } =
             self.entries[id as usize]
@@ -344,8 +344,8 @@ impl MaterialSet {
         textures.constant_rgb(reflectance).map(|c| c.clamp(0.0, 1.0))
     }
 
-    /// The scattering at a hit seen from the world-space direction `wo`; `None` where rays pass. `id` and its textures
-    /// are of the sets that the materials were made with.
+    /// The BSDF at a hit for the world-space direction `wo`; `None` if rays pass through. `id` and its textures must
+    /// belong to the sets that the materials were made with.
     pub fn bsdf(
         &self,
         id: MaterialId,
@@ -403,7 +403,7 @@ impl MaterialSet {
     }
 }
 
-/// The table that a material needs: none unless a closed form can serve it.
+/// The key of the coat table of a material; `None` if it has no closed form.
 fn coat_key(material: &Material, textures: &TextureSet) -> Option<CoatKey> {
     let Material::CoatedDiffuse { coat: Coat { roughness, thickness, eta, albedo, .. }, .. } = material else {
         return None;
@@ -415,14 +415,14 @@ fn coat_key(material: &Material, textures: &TextureSet) -> Option<CoatKey> {
     let alphas = (textures.constant_float(roughness.u), textures.constant_float(roughness.v));
     let distribution = match alphas {
         (Some(u), Some(v)) => Some(distribution_of(u, v, roughness.remap)),
-        // Tables over the roughness are isotropic; other textures are left to walks.
+        // Tables over the roughness are isotropic; other textured roughness needs walks.
         _ if roughness.u == roughness.v => None,
         _ => return None,
     };
     Some(CoatKey { eta: valid_eta(*eta), thickness, distribution })
 }
 
-/// pbrt-v4 reads an index of 0 as no interface; a negative one or NaN means as little.
+/// Treats an index of 0 as no interface, as pbrt-v4 does, and also a negative one or NaN.
 fn valid_eta(eta: f32) -> f32 {
     if eta > 0.0 { eta } else { 1.0 }
 }
@@ -469,7 +469,7 @@ impl Textures<'_> {
         }
     }
 
-    /// The metal under a medium of index `outside`.
+    /// The metal under a medium with index of refraction `outside`.
     fn conductor(&self, spectrum: ConductorSpectrum, roughness: Roughness, outside: f32) -> Conductor {
         let (eta, k) = match spectrum {
             ConductorSpectrum::EtaK { eta, k } => (self.rgb(eta), self.rgb(k)),

@@ -7,29 +7,29 @@ use crate::bsdfs::sheen::{LEAST_ALPHA, Sheen};
 use crate::textures::{FloatTextureId, RgbTextureId};
 use lumiris_numbers::math::{Frame, Vec2, Vec3, sqr};
 
-/// Strength of the anisotropy, 0..1, of several models: with 0 both alphas are that of the roughness.
+/// Anisotropy of several models, by its strength, 0..1. With 0 both alphas equal the alpha of the roughness.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Anisotropy {
-    /// `KHR_materials_anisotropy`: along, alpha goes to 1 with the square of the strength.
+    /// `KHR_materials_anisotropy`: alpha along the direction tends to 1 with the square of the strength.
     Gltf(f32),
-    /// OpenPBR: the ratio of the alphas is 1 − strength, and the mean of their squares is kept.
+    /// OpenPBR: the ratio of the alphas is 1 − strength, with the same mean of their squares.
     OpenPbr(f32),
-    /// The ratio is 1 − 0.9 strength, and their product is kept [Burley 2012].
+    /// The ratio is 1 − 0.9 strength, with the same product [Burley 2012].
     Disney(f32),
 }
 
-/// The direction along which alpha is that along, where it is not ∂p/∂u.
+/// The direction of the anisotropy, if it is not ∂p/∂u.
 #[derive(Clone, Copy, Debug)]
 pub struct AnisotropyDirection {
     /// Angle from ∂p/∂u towards ∂p/∂v (radians).
     pub rotation: f32,
-    /// Red and green of `KHR_materials_anisotropy`: the direction before the rotation, along ∂p/∂u and ∂p/∂v, from −1 to 1
-    /// for 0 to 1. Blue is a factor of the strength.
+    /// Texture of `KHR_materials_anisotropy`. Red and green are the direction before the rotation, along ∂p/∂u and
+    /// ∂p/∂v, where 0 to 1 map to −1 to 1. Blue is a factor of the strength.
     pub map: Option<RgbTextureId>,
 }
 
 impl AnisotropyDirection {
-    /// `frame` turned about its z. `dpdv` is ∂p/∂v, which tells on which side of x the direction is.
+    /// `frame` rotated about its z axis to the direction. ∂p/∂v, `dpdv`, determines the sense of rotation.
     fn turned(&self, frame: &Frame, dpdv: Vec3, t: &Textures<'_>) -> Frame {
         let direction = self.map.map_or(Vec2::X, |map| {
             let c = t.rgb(map) * 2.0;
@@ -43,7 +43,7 @@ impl AnisotropyDirection {
 }
 
 impl Anisotropy {
-    /// With `factor` times the strength.
+    /// Multiplies the strength by `factor`.
     fn times(self, factor: f32) -> Self {
         match self {
             Anisotropy::Gltf(strength) => Anisotropy::Gltf(strength * factor),
@@ -52,7 +52,7 @@ impl Anisotropy {
         }
     }
 
-    /// Alphas along and across.
+    /// Alphas along the direction and across it.
     fn alphas(self, alpha: f32) -> [f32; 2] {
         match self {
             Anisotropy::Gltf(strength) => [alpha + (1.0 - alpha) * sqr(strength.clamp(0.0, 1.0)), alpha],
@@ -74,11 +74,11 @@ impl Anisotropy {
 pub struct PrincipledMaterial {
     /// Colour of metal, diffuse base and glass.
     pub base_color: RgbTextureId,
-    /// Part that is metal.
+    /// Fraction of metal.
     pub metalness: FloatTextureId,
     /// Square root of alpha.
     pub roughness: FloatTextureId,
-    /// How alpha differs along ∂p/∂u and across.
+    /// Ratio of alpha along ∂p/∂u and across it.
     pub anisotropy: Anisotropy,
     /// Direction of the anisotropy; `None`: along ∂p/∂u.
     pub direction: Option<AnisotropyDirection>,
@@ -88,9 +88,9 @@ pub struct PrincipledMaterial {
     pub specular: FloatTextureId,
     /// Colour of the dielectric's reflectance at normal incidence.
     pub specular_color: RgbTextureId,
-    /// Part of the dielectric that is glass.
+    /// Fraction of glass in the dielectric.
     pub transmission: FloatTextureId,
-    /// True if glass is a sheet; else a solid.
+    /// True if glass is a thin sheet; else a solid.
     pub is_thin: bool,
     /// Weight of the sheen.
     pub sheen: FloatTextureId,
@@ -105,7 +105,7 @@ pub struct PrincipledMaterial {
 }
 
 impl PrincipledMaterial {
-    /// The frame of the BSDF: `frame`, or that turned to the direction of the anisotropy.
+    /// The frame of the BSDF: `frame`, rotated to the direction of the anisotropy if there is one.
     pub(super) fn frame(&self, frame: Frame, dpdv: Vec3, t: &Textures<'_>) -> Frame {
         self.direction.map_or(frame, |direction| direction.turned(&frame, dpdv, t))
     }

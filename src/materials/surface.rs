@@ -4,30 +4,30 @@ use crate::bsdfs::{Bsdf, BsdfSample, Lambertian, Phase, ProposalDensity, Resampl
 use lumiris_lanes::kernels::{One, Values, evaluate_one};
 use lumiris_numbers::math::{Frame, Rgb, Vec3};
 
-/// The scattering at a hit. Sides are told by the shading normal alone, as in pbrt-v4: where it disagrees with the
-/// geometric normal, light may leak through or fail to arrive, and the integrator finds the former blocked.
+/// The BSDF at a hit. Sides are determined by the shading normal alone, as in pbrt-v4. If it disagrees with the
+/// geometric normal, light may leak through or be lost; the integrator treats leaks as occluded.
 #[derive(Clone, Copy, Debug)]
 pub struct SurfaceBsdf<'a> {
     /// Scattering in the shading frame.
     pub bsdf: Bsdf<'a>,
     /// Shading frame.
     pub frame: Frame,
-    /// Geometric normal, unit, not turned to the viewer.
+    /// Geometric normal, unit, not flipped to the viewer.
     pub n: Vec3,
-    /// True if its material bundles light to caustics, see [`super::MaterialSet::find_caustics`].
+    /// True if its material makes caustics, see [`super::MaterialSet::find_caustics`].
     pub makes_caustics: bool,
 }
 
 impl<'a> SurfaceBsdf<'a> {
-    /// Scattering in a medium of asymmetry `g` by the phase function, seen from `wo`: no surface, so the geometric normal
-    /// is zero.
+    /// Scattering in a medium of asymmetry `g` by the phase function, for the direction `wo`. There is no surface, so
+    /// the geometric normal is zero.
     #[inline]
     pub fn in_medium(g: f32, wo: Vec3) -> Self {
         let frame = Frame::from_z(wo);
         SurfaceBsdf { bsdf: Bsdf::Phase(Phase::new(g)), frame, n: Vec3::ZERO, makes_caustics: false }
     }
 
-    /// The same, directions of what can only be evaluated being proposed by `density`.
+    /// The same, where `density` proposes directions for BSDFs that can only be evaluated.
     #[inline]
     #[must_use]
     pub fn proposed_by(mut self, density: ProposalDensity) -> Self {
@@ -67,14 +67,14 @@ impl<'a> SurfaceBsdf<'a> {
         self.bsdf.first_lobe(self.frame.to_local(wo))
     }
 
-    /// The part of the density `pdf` that is the first lobe's, see [`Bsdf::pdf_first_lobe`].
+    /// The contribution of the first lobe to the density `pdf`, see [`Bsdf::pdf_first_lobe`].
     #[inline]
     pub fn pdf_first_lobe(&self, wo: Vec3, wi: Vec3, pdf: f32) -> f32 {
         self.bsdf.pdf_first_lobe(self.frame.to_local(wo), self.frame.to_local(wi), pdf)
     }
 
-    /// [`f_cos`](Self::f_cos) and [`pdf`](Self::pdf) for many directions `wi` in world space, by component and channel: the
-    /// bits of single calls. All slices have the same length.
+    /// [`f_cos`](Self::f_cos) and [`pdf`](Self::pdf) for many directions `wi` in world space, by component and channel;
+    /// bit-identical to single calls. All slices have the same length.
     pub fn eval_lanes(&self, wo: Vec3, wi: [&[f32]; 3], f_cos: [&mut [f32]; 3], pdf: &mut [f32]) {
         let local = self.frame.to_local(wo);
         match self.bsdf.kernel() {
@@ -100,7 +100,7 @@ impl<'a> SurfaceBsdf<'a> {
         }
     }
 
-    /// A direction to the light, in world space.
+    /// Samples a direction to the light, in world space.
     #[inline]
     pub fn sample(&self, wo: Vec3, uc: f32, u: [f32; 2]) -> Option<BsdfSample> {
         let mut sample = self.bsdf.sample(self.frame.to_local(wo), uc, u)?;
@@ -108,7 +108,7 @@ impl<'a> SurfaceBsdf<'a> {
         Some(sample)
     }
 
-    /// A direction by the same density, in world space, whether it carries light or not, see
+    /// Samples a direction by the same density, in world space, including directions that carry no light, see
     /// [`Bsdf::sample_direction`].
     #[inline]
     pub fn sample_direction(&self, wo: Vec3, uc: f32, u: [f32; 2]) -> Option<BsdfSample> {
@@ -122,7 +122,7 @@ impl<'a> SurfaceBsdf<'a> {
         self.bsdf.wide_lobe(self.frame.to_local(wo))
     }
 
-    /// One of `proposals` directions to the light, in world space, see [`resample()`].
+    /// Resamples one of `proposals` directions to the light, in world space, see [`resample()`].
     #[inline]
     pub fn resample(
         &self,
@@ -136,7 +136,7 @@ impl<'a> SurfaceBsdf<'a> {
         Some(drawn)
     }
 
-    /// The geometric normal on the side that light must come from to reach `wo`; zero if it may come from both.
+    /// The geometric normal on the side from which light can scatter to `wo`; zero if this is both sides.
     #[inline]
     pub fn lit_normal(&self, wo: Vec3) -> Vec3 {
         match (self.bsdf.transmits(), self.n.dot(wo) < 0.0) {
@@ -152,20 +152,20 @@ impl<'a> SurfaceBsdf<'a> {
         if self.bsdf.has_surface() { self.frame.z.dot(w).abs() } else { 1.0 }
     }
 
-    /// The factor of f where light is followed from `wo` to `wi` instead of radiance, which refraction by the relative index
-    /// `eta` has scaled [Veach 1997, §5.3.2].
+    /// The factor of f for transport of light from `wo` to `wi` instead of radiance, which refraction with the relative
+    /// index `eta` scales [Veach 1997, §5.3.2].
     #[inline]
     pub fn adjoint_cos(&self, wo: Vec3, wi: Vec3, eta: f32) -> f32 {
         (wo.dot(self.frame.z) * wi.dot(self.n) / wo.dot(self.n)).abs() * eta * eta
     }
 
-    /// The Lambertian part as seen from `wo`, see [`Bsdf::lambertian`].
+    /// The Lambertian part for the direction `wo`, see [`Bsdf::lambertian`].
     #[inline]
     pub fn lambertian(&self, wo: Vec3) -> Option<Lambertian<'a>> {
         self.bsdf.lambertian(self.frame.to_local(wo))
     }
 
-    /// Fraction of uniform light that reaches `wo`, see [`Bsdf::albedo_estimate`].
+    /// Fraction of uniform light that is scattered to `wo`, see [`Bsdf::albedo_estimate`].
     #[inline]
     pub fn albedo_estimate(&self, wo: Vec3, u: impl FnOnce() -> [f32; 3]) -> Rgb {
         self.bsdf.albedo_estimate(self.frame.to_local(wo), u)
@@ -181,7 +181,7 @@ mod tests {
     use lumiris_numbers::math::warp::sample_uniform_sphere;
     use lumiris_test_support::random::{RngExt, pcg32};
 
-    /// Near equal, relative to the value and to 1e-3.
+    /// Asserts near equality, relative to the value or to 1e-3, whichever is greater.
     fn assert_near(a: f32, b: f32, what: &dyn std::fmt::Debug) {
         assert!((a - b).abs() <= 2e-4 * (b.abs() + 1e-3), "{a} {b} {what:?}");
     }

@@ -230,7 +230,7 @@ fn coats_share_tables_and_walk_only_where_they_must() {
         assert!(matches!(bsdf(id).bsdf, Bsdf::Layered(_)));
     }
     assert!(bsdf(mirror).bsdf.has_specular() && !bsdf(constant).bsdf.has_specular());
-    // The table over all roughnesses gives what the table of the one gives.
+    // The table over all roughnesses agrees with the table of this roughness.
     let wi = (UP - Vec3::X * 0.2 + Vec3::Y * 0.4).normalize();
     let (a, b) = (bsdf(map).f(wo, wi).g, bsdf(constant).f(wo, wi).g);
     assert!((a - b).abs() < 2e-3 * b, "{a} {b}");
@@ -254,7 +254,7 @@ fn indices_are_relative_to_the_coat_and_roughness_is_remapped() {
     assert!((c.eta.g - 0.4).abs() < 1e-6 && (c.k.r - 2.0).abs() < 1e-6);
     assert!((c.distribution.alpha_x - 0.3).abs() < 1e-6 && l.top.distribution.is_smooth());
     assert_eq!((l.top.eta, l.samples), (1.5, 1));
-    // Without an index there is no interface: light goes straight on.
+    // Without an index there is no interface: light passes unrefracted.
     let x = bsdf(glass).sample(UP, 0.0, [0.5, 0.5]).unwrap();
     assert!(x.lobe.contains(Lobe::SPECULAR | Lobe::TRANSMISSION) && (x.wi + UP).length() < 1e-6);
 }

@@ -1,5 +1,5 @@
-//! The procedural cloud of pbrt-v4: gradient noise of five frequencies, at places that noise has displaced, which becomes
-//! thinner with height.
+//! The procedural cloud of pbrt-v4: gradient noise of five frequencies at positions displaced by noise. Its density
+//! decreases with height.
 
 use lumiris_numbers::math::noise::{gradient, noise};
 use lumiris_numbers::math::{DVec3, Rgb};
@@ -13,19 +13,19 @@ pub struct Cloud {
     pub sigma_s: Rgb,
     /// Factor of the noise.
     pub density: f32,
-    /// How far places are displaced.
+    /// Displacement of the positions.
     pub wispiness: f32,
     /// Frequency of the noise (1/unit).
     pub frequency: f32,
 }
 
-/// From one frequency of noise to the next: not quite 2, so that the lattices have no points in common.
+/// Ratio of successive noise frequencies: not quite 2, so that the lattices have no points in common.
 const OCTAVE: f32 = 1.99;
 
 impl Cloud {
     /// Density at a point, 0..=1.
     pub fn density_at(&self, p: DVec3) -> f32 {
-        // Displace the place
+        // Displace the position
         let mut place = p * f64::from(self.frequency);
         if self.wispiness > 0.0 {
             let (mut amplitude, mut frequency) = (0.05 * self.wispiness, 10.0);

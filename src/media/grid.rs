@@ -1,14 +1,14 @@
-//! Media that are given by samples on a grid over the unit cube, between which they are interpolated linearly.
+//! Media defined by samples on a grid over the unit cube, with linear interpolation.
 //!
-//! As in pbrt-v4, sample i of n of a dense grid lies at (i + ½)/n, and beyond the outermost samples there are zeros. Those of
-//! a sparse grid lie where its map places their indices.
+//! As in pbrt-v4, sample i of n of a dense grid lies at (i + ½)/n, and the samples beyond the outermost ones are zero.
+//! A sparse grid has a map from its indices to positions.
 
 use super::Coefficients;
 use super::sparse::SparseSamples;
 use lumiris_numbers::math::{Rgb, Vec3};
 use std::ops::{Add, Mul};
 
-/// Samples on a grid, x first.
+/// Samples on a grid, x fastest.
 #[derive(Clone, Debug)]
 pub struct Samples<T> {
     resolution: [usize; 3],
@@ -16,7 +16,7 @@ pub struct Samples<T> {
 }
 
 impl<T: Copy + Default + Add<Output = T> + Mul<f32, Output = T>> Samples<T> {
-    /// As many values as the resolution says; `None` if they are not.
+    /// A grid of the given resolution; `None` if the number of values does not match.
     pub fn new(resolution: [usize; 3], values: Vec<T>) -> Option<Self> {
         let count = resolution.iter().try_fold(1_usize, |product, &n| product.checked_mul(n))?;
         (count == values.len() && count > 0).then_some(Samples { resolution, values })
@@ -32,7 +32,7 @@ impl<T: Copy + Default + Add<Output = T> + Mul<f32, Output = T>> Samples<T> {
         size_of_val(&self.values[..])
     }
 
-    /// All values, x first.
+    /// All values, x fastest.
     pub fn values(&self) -> &[T] {
         &self.values
     }
@@ -67,13 +67,13 @@ impl<T: Copy + Default + Add<Output = T> + Mul<f32, Output = T>> Samples<T> {
         lerp(t.z, plane(z), plane(z + 1))
     }
 
-    /// The greatest of what `measure` says of the samples that take part in values of a box in the unit cube. Outside the
-    /// grid, samples are zero, and so is their measure.
+    /// The maximum of `measure` over the samples that contribute to values in a box of the unit cube. Samples outside
+    /// the grid are zero, and so is their measure.
     pub fn bound(&self, low: Vec3, high: Vec3, measure: impl Fn(T) -> f32) -> f32 {
         let range = |axis: usize| {
             let n = self.resolution[axis] as f32;
             let first = (low[axis] * n - 0.5).floor() as isize;
-            // One more, lest rounding leave out a sample that a point on the wall needs
+            // One sample more, since rounding may shift a point on the wall
             let last = (high[axis] * n - 0.5).floor() as isize + 1;
             (first - 1).max(0) as usize..(last + 2).clamp(0, self.resolution[axis] as isize) as usize
         };
@@ -89,7 +89,7 @@ impl<T: Copy + Default + Add<Output = T> + Mul<f32, Output = T>> Samples<T> {
     }
 }
 
-/// Numbers in the unit cube.
+/// A scalar field in the unit cube.
 #[derive(Clone, Debug)]
 pub enum Scalars {
     /// A sample for each cell.
@@ -159,7 +159,7 @@ pub struct Temperature {
     pub step: f32,
 }
 
-/// Temperature up to which nothing glows (K).
+/// Maximum temperature without emission (K).
 const COLD: f32 = 100.0;
 
 impl Temperature {
@@ -184,11 +184,11 @@ pub struct UniformGrid {
     pub sigma_s: Rgb,
     /// The density.
     pub density: Scalars,
-    /// Emitted radiance; with a temperature, its factor.
+    /// Emitted radiance; with a temperature, a factor of its radiance.
     pub le: Rgb,
-    /// Factor of the emission, if it varies.
+    /// Spatially varying factor of the emission, if any.
     pub le_scale: Option<Samples<f32>>,
-    /// What determines the colour of the emission, if not `le` alone.
+    /// Determines the colour of the emission, if present.
     pub temperature: Option<Temperature>,
 }
 
@@ -215,7 +215,7 @@ impl UniformGrid {
     }
 }
 
-/// Coefficients of a colour for each sample.
+/// An RGB coefficient for each sample.
 #[derive(Clone, Debug)]
 pub struct RgbGrid {
     /// Absorption before scale; 1 if there is none.
@@ -224,7 +224,7 @@ pub struct RgbGrid {
     pub sigma_s: Option<Samples<Rgb>>,
     /// Factor of both (1/m).
     pub scale: f32,
-    /// Emitted radiance, if there is any.
+    /// Emitted radiance, if any.
     pub le: Option<Samples<Rgb>>,
 }
 

@@ -1,24 +1,25 @@
-//! A medium that varies in a box: tracking by tentative collisions.
+//! A heterogeneous medium in a box, sampled by tentative collisions.
 //!
-//! Tentative collisions come at the rate of a majorant σ̄, a bound of σ_t of all channels in a cell of a coarse grid. At each
-//! of them the medium is looked up, and the flight is scattered or goes on (a *null collision*), so that σ_s and σ_n = σ̄ − σ_t
-//! have their part, whatever the channel [Kutz et al. 2017]:
+//! Tentative collisions occur at the rate of a majorant σ̄, a bound of σ_t of all channels in a cell of a coarse grid.
+//! At each tentative collision the medium is looked up, and the flight either scatters or continues (a *null
+//! collision*). With σ_n = σ̄ − σ_t, the probability of scattering depends on all channels [Kutz et al. 2017]:
 //!
 //! P_s = Σ_c |β_c w_c| σ_s,c / Σ_c |β_c w_c| (σ_s,c + |σ_n,c|),  w ← w σ_s/(σ̄ P_s) or w σ_n/(σ̄ (1 − P_s)),
 //!
-//! where β_c w_c is the throughput so far: probabilities follow the channels that still carry something, which keeps weights
-//! bounded. Absorption is part of the weights, and no event. At any place the weight, or 0 once the flight is scattered, has the
-//! expectation T: so what is sent out is added at places that do not depend on the collisions, at a rate λ: w σ_a L_e/λ.
+//! where β_c w_c is the throughput so far. The channels that still carry energy dominate the probability, which keeps
+//! the weights bounded. Absorption only reduces the weights. At every point of the segment, the weight (0 after
+//! scattering) has the expectation T. Emission is therefore added at points independent of the collisions, at a rate λ:
+//! w σ_a L_e/λ.
 //!
-//! All of this is unbiased for any σ̄ > 0, also where σ_t exceeds it: σ_n is negative there. The bounds of clouds are
-//! estimated, and use that.
+//! This is unbiased for any σ̄ > 0, also where σ_t exceeds σ̄ and σ_n is negative. The estimated bounds of clouds rely
+//! on this.
 
 use super::majorants::{MajorantGrid, Pieces};
 use super::track::{End, Flight, Glimpse, Numbers, Segment};
 use super::{Cloud, Coefficients, RgbGrid, Scalars, UniformGrid};
 use lumiris_numbers::math::{Affine3A, Bounds3, DAffine3, DVec3, Rgb, Vec3};
 
-/// What varies.
+/// The spatially varying field.
 #[derive(Clone, Debug)]
 pub enum Field {
     /// A density on a grid.
@@ -33,9 +34,9 @@ pub enum Field {
 #[derive(Clone, Debug)]
 pub struct Heterogeneous {
     field: Field,
-    /// The least and the greatest corner, in the space of the medium.
+    /// The minimum and maximum corner, in the space of the medium.
     corners: [DVec3; 2],
-    /// The box as the unit cube.
+    /// Transform from world space to the box as the unit cube.
     unit_from_world: Affine3A,
     world_from_unit: Affine3A,
     majorants: MajorantGrid,
@@ -43,20 +44,21 @@ pub struct Heterogeneous {
     pub g: f32,
 }
 
-/// Samples along an axis for which there is a majorant.
+/// Samples along an axis per majorant.
 const SAMPLES_PER_CELL: usize = 4;
-/// Most majorants along an axis.
+/// Maximum number of majorants along an axis.
 const MAX_CELLS: usize = 64;
-/// Majorants of a cloud along each axis, and points along an axis of a cell from which they are estimated.
+/// Majorants of a cloud along each axis, and number of points along an axis of a cell that estimate its bound.
 const CLOUD_CELLS: usize = 16;
 const CLOUD_POINTS: usize = 3;
-/// What is added to the greatest density that was found: a factor, and a density below which none is taken for a bound.
+/// Margin of the estimated maximum density: a factor, and the minimum bound.
 const CLOUD_MARGIN: [f32; 2] = [1.25, 0.05];
-/// Weight of a shadow segment below which roulette decides about it, and the probability of going on.
+/// Weight of a shadow segment below which Russian roulette applies, and its survival probability.
 const FAINT: [f32; 2] = [0.1, 0.25];
 
 impl Heterogeneous {
-    /// A field in a box of its own space, from its least to its greatest corner, placed by an invertible map.
+    /// A field in a box, given by the minimum and maximum corner in the space of the medium. The map to world space
+    /// must be invertible.
     pub fn new(field: Field, corners: [DVec3; 2], world_from_medium: &DAffine3, g: f32) -> Self {
         let [min, max] = corners;
         let world_from_unit = *world_from_medium * DAffine3::from_translation(min) * DAffine3::from_scale(max - min);
@@ -73,7 +75,7 @@ impl Heterogeneous {
         Heterogeneous { field, corners, unit_from_world, world_from_unit, majorants, g }
     }
 
-    /// What kind of field it is, for people.
+    /// Name of the kind of field, for messages.
     pub fn kind_name(&self) -> &'static str {
         match &self.field {
             Field::Uniform(grid) => match grid.density {
@@ -85,7 +87,7 @@ impl Heterogeneous {
         }
     }
 
-    /// True if it sends out light.
+    /// True if it emits light.
     pub fn is_emissive(&self) -> bool {
         match &self.field {
             Field::Uniform(grid) => grid.is_emissive(),
@@ -94,7 +96,7 @@ impl Heterogeneous {
         }
     }
 
-    /// Numbers of samples along the axes of its box, or of the majorants where it has none.
+    /// Numbers of samples along the axes of its box; of majorants for fields without samples.
     pub fn resolution(&self) -> [usize; 3] {
         match &self.field {
             Field::Uniform(grid) => grid.density.resolution(),
@@ -109,7 +111,7 @@ impl Heterogeneous {
         sigma_a * le
     }
 
-    /// Rate of the glimpses of a path at a point of the unit cube (1/m), where no more are asked for.
+    /// Default rate of a path's emission lookups at a point of the unit cube (1/m).
     pub fn glimpse_rate(&self, p: Vec3) -> f32 {
         self.majorants.at(p)
     }
@@ -156,7 +158,7 @@ impl Heterogeneous {
         }
     }
 
-    /// The tentative collisions along a segment. A parameter of its line is a distance in world space (m).
+    /// The tentative collisions along a segment. Parameters of the line are distances in world space (m).
     fn collisions(&self, segment: &Segment) -> Collisions<'_> {
         let o = self.unit_point(segment.o);
         let d = self.unit_from_world.transform_vector3(segment.d);
@@ -164,8 +166,8 @@ impl Heterogeneous {
         Collisions { medium: self, o, d, pieces, from: 0.0, to: 0.0, majorant: 0.0 }
     }
 
-    /// The points along a segment at which it is seen whether the medium glows, of which the first has the place `offset` in
-    /// its part.
+    /// The emission lookups along a segment. `offset` is the position of the first lookup in its interval; `least` is
+    /// the minimum rate (1/m).
     fn glimpses(&self, segment: &Segment, (least, offset): (f32, f32)) -> Glimpses<'_> {
         let Collisions { o, d, pieces, .. } = self.collisions(segment);
         Glimpses { o, d, pieces, least, from: 0.0, to: 0.0, rate: 0.0, left: offset, count: 0 }
@@ -179,6 +181,7 @@ impl Heterogeneous {
         numbers: &mut Numbers,
         (least, weigh): (f32, impl Fn(&Glimpse) -> f32),
     ) -> Flight {
+        // Adds the emission of the lookups up to the distance t
         let (mut weight, mut emitted) = (Rgb::WHITE, Rgb::BLACK);
         let mut collisions = self.collisions(segment);
         let mut glimpses = self.is_emissive().then(|| self.glimpses(segment, (least, numbers.offset())));
@@ -195,6 +198,8 @@ impl Heterogeneous {
         let mut u = numbers.pair();
         while let Some(Collision { t, majorant, at: Coefficients { sigma_a, sigma_s, .. } }) = collisions.next(u[0]) {
             glow_before(t, weight, numbers);
+
+            // Probability of scattering
             let sigma_n = (sigma_a + sigma_s).map(|sigma_t| majorant - sigma_t);
             let carried = (weight * beta).map(f32::abs);
             let sum = |v: Rgb| v.r + v.g + v.b;
@@ -248,14 +253,14 @@ struct Collisions<'a> {
     o: Vec3,
     d: Vec3,
     pieces: Pieces<'a>,
-    /// What is left of the present piece.
+    /// The rest of the current piece.
     from: f32,
     to: f32,
     majorant: f32,
 }
 
 impl Collisions<'_> {
-    /// The next one, at an optical depth that `u` determines; `None` beyond the end of the line.
+    /// The next collision, at an optical depth given by `u`; `None` beyond the end of the line.
     fn next(&mut self, u: f32) -> Option<Collision> {
         let mut depth = -(-u).ln_1p();
         loop {
@@ -272,25 +277,26 @@ impl Collisions<'_> {
     }
 }
 
-/// Points at which a flight looks for what the medium sends out: at a stated rate, one in each of equal parts.
+/// Emission lookups of a flight: stratified, one in each of equal intervals, at a given rate.
 struct Glimpses<'a> {
     /// The line in the unit cube.
     o: Vec3,
     d: Vec3,
     pieces: Pieces<'a>,
-    /// Rate at least where there is any medium (1/m).
+    /// Minimum rate where the medium is not empty (1/m).
     least: f32,
-    /// The present piece, and the rate there.
+    /// The current piece, and its rate.
     from: f32,
     to: f32,
     rate: f32,
-    /// What is left from its begin up to its first point, as a part of a part, and points so far.
+    /// Remaining fraction of an interval before the first lookup of the piece, and the number of lookups in the piece.
     left: f32,
     count: u32,
 }
 
 impl Glimpses<'_> {
-    /// The next one up to the distance `end`.
+    /// The next lookup up to the distance `end`.
+    // A lookup in the current piece
     fn next_before(&mut self, end: f32) -> Option<Glimpse> {
         loop {
             let passed = self.left + self.count as f32;
@@ -305,6 +311,8 @@ impl Glimpses<'_> {
             if self.to > end {
                 return None;
             }
+
+            // Carry the remaining interval over to the next piece
             self.left = (passed - self.rate * (self.to - self.from)).max(0.0);
             self.count = 0;
             let piece = self.pieces.next()?;
@@ -319,7 +327,7 @@ fn point_in(&[min, max]: &[DVec3; 2], p: Vec3) -> DVec3 {
     min + (max - min) * p.as_dvec3()
 }
 
-/// Estimated bounds: the greatest density at some points of each cell and of those around it, and a margin.
+/// Estimated bounds: the maximum density at some points of each cell and its neighbours, with a margin.
 fn cloud_majorants(cloud: &Cloud, corners: &[DVec3; 2]) -> MajorantGrid {
     let greatest = MajorantGrid::new([CLOUD_CELLS; 3], |low, high| {
         (0..CLOUD_POINTS.pow(3)).fold(0.0_f32, |greatest, i| {

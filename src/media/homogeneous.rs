@@ -1,4 +1,4 @@
-//! A medium that is the same everywhere: all in closed form.
+//! A homogeneous medium, in closed form.
 
 use super::track::{End, Flight, Segment};
 use lumiris_numbers::math::{Rgb, Vec3};
@@ -23,7 +23,7 @@ fn attenuation(sigma: f32, distance: f32) -> f32 {
 }
 
 impl Homogeneous {
-    /// True if it sends out light.
+    /// True if it emits light.
     pub fn is_emissive(&self) -> bool {
         !(self.le * self.sigma_a).is_black()
     }
@@ -34,7 +34,7 @@ impl Homogeneous {
         (self.sigma_a + self.sigma_s).map(|sigma| attenuation(sigma, distance))
     }
 
-    /// The light that it sends out along a segment, towards its origin: ∫ T σ_a L_e = L_e σ_a/σ_t (1 − T).
+    /// Emission along a segment towards its origin: ∫ T σ_a L_e = L_e σ_a/σ_t (1 − T).
     fn emitted(&self, transmittance: Rgb) -> Rgb {
         let sigma_t = self.sigma_a + self.sigma_s;
         let of = |c: usize| {
@@ -46,17 +46,19 @@ impl Homogeneous {
 
     /// A flight along a segment of a path of throughput `beta`.
     ///
-    /// The distance follows σ_c exp(−σ_c t), where σ_c is σ_t of a channel that `u[1]` chooses in proportion to |β_c|; the
-    /// density p is the sum over the channels, as the balance heuristic for one sample wants it. So no channel gets a
-    /// weight above 1/|β_c| relative to all. What only absorbs is passed for certain.
+    /// The distance follows σ_c exp(−σ_c t), where σ_c is σ_t of a channel that `u[1]` chooses in proportion to |β_c|.
+    /// The density p is the sum over the channels (one-sample balance heuristic), so no channel gets a weight above
+    /// 1/|β_c| relative to all. A medium without scattering is always passed.
     ///
-    /// Of the flights that are scattered, which have a probability P, every other one gets a distance that is equiangular
-    /// about a point of a light in its place [Kulla and Fajardo 2012], if `focus` knows one. Distances then have the
-    /// density (p + P·p_e)/2, and flights that pass are as before.
+    /// If `focus` returns a point of a light, half of the scattered flights get an equiangular distance about that
+    /// point instead [Kulla and Fajardo 2012]. With P the probability of scattering, the density of distances is then
+    /// (p + P·p_e)/2. Flights that pass are unchanged.
     #[inline]
     pub fn fly(&self, segment: &Segment, beta: Rgb, u: [f32; 4], focus: impl FnOnce() -> Option<Vec3>) -> Flight {
         let length = segment.length;
         let through = self.transmittance(length);
+
+        // Choose a channel
         let emitted = if self.is_emissive() { self.emitted(through) } else { Rgb::BLACK };
         let p = beta.map(f32::abs);
         let sum = p.r + p.g + p.b;
@@ -73,17 +75,23 @@ impl Homogeneous {
             2
         };
         let mean = |values: Rgb| p[0] * values.r + p[1] * values.g + p[2] * values.b;
+
+        // Sample the distance in that channel
         let t = if sigma_t[channel] > 0.0 { -(-u[0]).ln_1p() / sigma_t[channel] } else { f32::INFINITY };
         if !(t < length) {
             let weight = through / mean(through);
             let weight = if weight.is_finite() { weight } else { Rgb::BLACK };
             return Flight { emitted, end: End::Through { weight } };
         }
+
+        // Replace it by an equiangular distance
         let equiangular = focus().and_then(|focus| Equiangular::new(segment, focus));
         let t = match &equiangular {
             Some(equiangular) if u[2] < 0.5 => equiangular.sample(u[3]),
             Some(_) | None => t,
         };
+
+        // Balance heuristic over the channels and the two techniques
         let here = self.transmittance(t);
         let density = match &equiangular {
             Some(equiangular) => 0.5 * (mean(sigma_t * here) + mean(Rgb::WHITE - through) * equiangular.pdf(t)),
@@ -95,7 +103,7 @@ impl Homogeneous {
     }
 }
 
-/// Distances along a segment that are uniform in the angle seen from a point.
+/// Distances along a segment with a uniform angle at a point.
 #[derive(Clone, Copy, Debug)]
 struct Equiangular {
     /// Distance of the segment's origin from the foot of the perpendicular, along the segment (m).
@@ -107,7 +115,8 @@ struct Equiangular {
     length: f32,
 }
 
-/// Least distance from the line, relative to that of the foot of the perpendicular: any is right, and 0 has no density.
+/// Minimum distance from the line, relative to the distance of the foot of the perpendicular. Any positive value is
+/// unbiased; 0 has no density.
 const LEAST_BESIDE: f32 = 1e-3;
 
 impl Equiangular {
@@ -148,7 +157,7 @@ mod tests {
             let segment = Segment { o: Vec3::ZERO, d: Vec3::X, length };
             let equiangular = Equiangular::new(&segment, Vec3::new(before, beside, 0.0)).unwrap();
             let mut stream = pcg32([k as u32, 2, 5]);
-            // Bins of the distance, of which the last one has no end
+            // Histogram of the distance; the last bin is unbounded
             let end = if length.is_finite() { f64::from(length) } else { 5.0 };
             let (bins, count) = (50, 400_000);
             let mut observed = vec![0.0; bins + 1];
@@ -166,7 +175,7 @@ mod tests {
             let rest = (f64::from(count) - expected.iter().sum::<f64>()).max(0.0);
             expected.push(rest);
             if length.is_finite() {
-                // A distance that rounding has put at the end
+                // Rounding may put a distance at the end
                 expected[bins - 1] += expected[bins];
                 observed[bins - 1] += observed[bins];
                 expected.truncate(bins);

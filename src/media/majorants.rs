@@ -1,4 +1,4 @@
-//! A coarse grid of upper bounds of σ_t over the unit cube, and the pieces into which it divides a ray.
+//! A coarse grid of upper bounds of σ_t over the unit cube, and its intersection with rays.
 
 use lumiris_numbers::math::Vec3;
 
@@ -6,23 +6,23 @@ use lumiris_numbers::math::Vec3;
 #[derive(Clone, Debug)]
 pub struct MajorantGrid {
     resolution: [usize; 3],
-    /// (1/m), x first.
+    /// (1/m), x fastest.
     values: Vec<f32>,
 }
 
 /// A part of a ray in one cell.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Piece {
-    /// Where it begins, by the parameter of the ray.
+    /// Ray parameter of its begin.
     pub begin: f32,
-    /// Where it ends.
+    /// Ray parameter of its end.
     pub end: f32,
     /// The bound (1/m).
     pub majorant: f32,
 }
 
 impl MajorantGrid {
-    /// A grid whose cells have the bounds that `bound` gives for their lower and upper corners.
+    /// A grid with the bound `bound(lower corner, upper corner)` for each cell.
     pub fn new(resolution: [usize; 3], bound: impl Fn(Vec3, Vec3) -> f32 + Sync) -> Self {
         use rayon::prelude::*;
         let [nx, ny, nz] = resolution;
@@ -35,7 +35,7 @@ impl MajorantGrid {
         MajorantGrid { resolution, values: (0..nx * ny * nz).into_par_iter().map(of).collect() }
     }
 
-    /// The grid whose cells have what `f` makes of the greatest bound of a cell and the 26 around it.
+    /// The grid with the values `f(m)`, where m is the maximum bound of a cell and its 26 neighbours.
     #[must_use]
     pub fn with_neighbors(&self, f: impl Fn(f32) -> f32) -> Self {
         let [nx, ny, nz] = self.resolution;
@@ -71,7 +71,7 @@ impl MajorantGrid {
         self.values[x + nx * (y + ny * z)]
     }
 
-    /// The place of a point among the cells along an axis.
+    /// Index of the cell of a point along an axis.
     #[inline]
     fn cell(&self, p: Vec3, axis: usize) -> usize {
         let n = self.resolution[axis];
@@ -98,7 +98,7 @@ impl MajorantGrid {
             walk.t = f32::INFINITY;
             return walk;
         }
-        // The first cell, and where the ray leaves it
+        // The first cell, and the ray parameters of its exits
         let p = o + d * begin;
         for axis in 0..3 {
             let (n, cell) = (self.resolution[axis], self.cell(p, axis));
@@ -118,11 +118,11 @@ impl MajorantGrid {
 #[derive(Clone, Debug)]
 pub struct Pieces<'a> {
     grid: &'a MajorantGrid,
-    /// Where the next piece begins; infinite after the last.
+    /// Begin of the next piece; infinite after the last.
     t: f32,
     end: f32,
     cell: [usize; 3],
-    /// Where the ray crosses the next wall of each axis, and how far it is from wall to wall.
+    /// Ray parameters of the next wall of each axis, and the spacing of the walls.
     next: [f32; 3],
     step: [f32; 3],
     up: [bool; 3],
@@ -139,7 +139,7 @@ impl Iterator for Pieces<'_> {
         let [nx, ny, _] = self.grid.resolution;
         let majorant = self.grid.values[self.cell[0] + nx * (self.cell[1] + ny * self.cell[2])];
         let axis = (0..3).fold(0, |best, axis| if self.next[axis] < self.next[best] { axis } else { best });
-        // By rounding, a wall may lie somewhat before the begin
+        // Rounding may put a wall slightly before the begin
         let end = self.next[axis].max(self.t).min(self.end);
         let piece = Piece { begin: self.t, end, majorant };
         self.t = end;

@@ -1,8 +1,8 @@
-//! Participating media: what absorbs, scatters and emits light between surfaces, and free flights through it.
+//! Participating media, which absorb, scatter and emit light between surfaces, and free flights through them.
 //!
-//! σ_a and σ_s are the coefficients of absorption and of scattering (1/m), σ_t = σ_a + σ_s, all of them RGB. Light that
-//! goes a distance d is weakened to T = exp(−∫₀ᵈ σ_t). A medium sends out σ_a·L_e per unit length, and scatters by
-//! [Henyey and Greenstein 1941].
+//! σ_a and σ_s are the absorption and scattering coefficients (1/m), and σ_t = σ_a + σ_s, all of them RGB. Over a
+//! distance d, light is attenuated by the transmittance T = exp(−∫₀ᵈ σ_t). A medium emits σ_a·L_e per unit length. Its
+//! phase function is [Henyey and Greenstein 1941].
 //!
 //! Reading order: [`homogeneous`], [`sparse`], [`grid`], [`cloud`], [`majorants`], [`heterogeneous`], [`track`].
 
@@ -34,24 +34,24 @@ pub struct Coefficients {
     pub sigma_a: Rgb,
     /// Scattering (1/m).
     pub sigma_s: Rgb,
-    /// Emitted radiance, of which σ_a is sent out per unit length.
+    /// Emitted radiance L_e; the emission per unit length is σ_a·L_e.
     pub le: Rgb,
 }
 
 /// A medium in world space.
 #[derive(Clone, Debug)]
 pub enum Medium {
-    /// The same everywhere.
+    /// A homogeneous medium.
     Homogeneous(Homogeneous),
-    /// The same, as the interior of a material: light walks through it from surface to surface, and what happens on the
-    /// way is no bounce.
+    /// A homogeneous medium as the interior of a material: a random walk takes light from surface to surface, and its
+    /// scattering events do not count as bounces.
     Interior(Homogeneous),
-    /// One that varies in a box, outside of which there is nothing.
+    /// A heterogeneous medium in a box, with vacuum outside.
     Heterogeneous(Arc<Heterogeneous>),
 }
 
 impl Medium {
-    /// What kind of medium it is, for people.
+    /// Name of the kind of medium, for messages.
     pub fn kind_name(&self) -> &'static str {
         match self {
             Medium::Homogeneous(_) => "homogeneous",
@@ -60,7 +60,7 @@ impl Medium {
         }
     }
 
-    /// True if it sends out light.
+    /// True if it emits light.
     pub fn is_emissive(&self) -> bool {
         match self {
             Medium::Homogeneous(m) | Medium::Interior(m) => m.is_emissive(),
@@ -91,9 +91,10 @@ impl Medium {
         }
     }
 
-    /// A flight along a segment of a path of throughput `beta`: see [`Flight`]. `focus` chooses a point of a light, about
-    /// which distances in homogeneous media may be equiangular. A medium that varies is seen to glow at places at the rate of its
-    /// majorant, or `least` (1/m) if that is more: `weigh` is the weight of what it sends out there, where another technique finds it as well.
+    /// A flight along a segment of a path of throughput `beta`: see [`Flight`]. `focus` chooses a point of a light for
+    /// equiangular sampling in homogeneous media. Heterogeneous media look up their emission at the rate of the
+    /// majorant, or `least` (1/m) if that is greater. `weigh` is the MIS weight of a lookup, if another technique also
+    /// samples the emission.
     #[inline]
     pub fn fly(
         &self,
@@ -109,8 +110,8 @@ impl Medium {
         }
     }
 
-    /// An unbiased estimate of T along a segment: exact in homogeneous media, which need no numbers, by ratio tracking
-    /// [Novák et al. 2014] in others.
+    /// An unbiased estimate of T along a segment: exact in homogeneous media, which need no random numbers; by ratio
+    /// tracking [Novák et al. 2014] in heterogeneous ones.
     #[inline]
     pub fn transmittance(&self, segment: &Segment, numbers: &mut Numbers) -> Rgb {
         match self {
@@ -120,28 +121,28 @@ impl Medium {
     }
 }
 
-/// The media on the two sides of a surface, or around a point; `None` is empty space.
+/// The media on the two sides of a surface, or around a point; `None` is vacuum.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Sides {
-    /// Where the geometric normal points to, which scene files call outside.
+    /// The side of the geometric normal, called outside in scene files.
     pub front: Option<MediumId>,
     /// The other side.
     pub back: Option<MediumId>,
 }
 
 impl Sides {
-    /// The same all around.
+    /// The same medium on both sides.
     #[inline]
     pub fn both(medium: Option<MediumId>) -> Self {
         Sides { front: medium, back: medium }
     }
 
-    /// True if light that passes comes into another medium.
+    /// True if light that passes the surface enters another medium.
     pub fn differ(&self) -> bool {
         self.front != self.back
     }
 
-    /// The medium into which the direction of cosine `cos` to the geometric normal leads.
+    /// The medium on the side of a direction whose cosine to the geometric normal is `cos`.
     #[inline]
     pub fn towards(&self, cos: f32) -> Option<MediumId> {
         if cos < 0.0 { self.back } else { self.front }
@@ -151,22 +152,22 @@ impl Sides {
 /// The media of a scene.
 #[derive(Clone, Debug, Default)]
 pub struct MediumSet {
-    /// All that are used.
+    /// All media in use.
     pub media: Vec<Medium>,
     /// Their names, for messages.
     pub names: Vec<String>,
-    /// The one around the camera.
+    /// The medium around the camera.
     pub camera: Option<MediumId>,
 }
 
 impl MediumSet {
-    /// True if all of space is empty.
+    /// True if all of space is vacuum.
     #[inline]
     pub fn is_empty(&self) -> bool {
         self.media.is_empty()
     }
 
-    /// True if one of them sends out light.
+    /// True if any medium emits light.
     pub fn is_emissive(&self) -> bool {
         self.media.iter().any(Medium::is_emissive)
     }

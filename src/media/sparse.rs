@@ -1,6 +1,6 @@
-//! Values at whole indices of a space that is empty nearly everywhere, in the tree of [Museth 2013]: blocks of 4096³ voxels
-//! in order, nodes of 32³ and of 16³ entries, and leaves of 8³ voxels. An entry is a child, or a value that all of its voxels
-//! have. Between indices, values are interpolated linearly; memory is that of the leaves, and of few nodes.
+//! A sparse grid of values at integer indices, in the tree of [Museth 2013]: sorted blocks of 4096³ voxels, nodes of
+//! 32³ and of 16³ entries, and leaves of 8³ voxels. An entry is a child, or the common value of all of its voxels.
+//! Values are interpolated linearly between indices. Leaves take most of the memory.
 
 use lumiris_numbers::math::{Affine3A, DAffine3, DVec3, Vec3};
 use std::collections::{BTreeMap, HashMap};
@@ -8,7 +8,7 @@ use std::sync::Arc;
 
 /// Voxels of a leaf.
 const LEAF: usize = 512;
-/// Of blocks, nodes and leaves, the voxels along an axis are 2 to this.
+/// log₂ of the number of voxels along an axis: of blocks, of both kinds of nodes' entries, and of voxels.
 const LOG2: [u32; 4] = [12, 7, 3, 0];
 
 /// A child, or a value.
@@ -18,7 +18,7 @@ struct Entry(u32);
 impl Entry {
     const CHILD: u32 = 1 << 31;
 
-    /// Of the level below.
+    /// The entry of a child on the level below.
     fn child(index: usize) -> Self {
         Entry(Self::CHILD | index as u32)
     }
@@ -45,20 +45,20 @@ pub struct Cube {
 /// A tree of values.
 #[derive(Debug)]
 pub struct SparseGrid {
-    /// Values of whole entries; the first is that of everything else.
+    /// Values of constant entries; the first is the background.
     constants: Vec<f32>,
-    /// Blocks in order, by their indices in units of 4096.
+    /// Sorted keys of the blocks: their indices in units of 4096.
     keys: Vec<[i32; 3]>,
     blocks: Vec<Entry>,
-    /// Entries of nodes of 32³, and of 16³; z runs fastest.
+    /// Entries of nodes of 32³, and of 16³; z fastest.
     nodes: [Vec<Entry>; 2],
     /// Values of leaves, z fastest.
     leaves: Vec<f32>,
-    /// The greatest value of each leaf.
+    /// The maximum value of each leaf.
     greatest: Vec<f32>,
 }
 
-/// The place of a voxel among the entries of the node of a level, or among the voxels of a leaf.
+/// Index of a voxel among the entries of a node on a level, or among the voxels of a leaf.
 #[inline]
 fn offset(p: [i32; 3], level: usize) -> usize {
     let (bits, shift) = (LOG2[level] - LOG2[level + 1], LOG2[level + 1]);
@@ -66,7 +66,7 @@ fn offset(p: [i32; 3], level: usize) -> usize {
     (along(0) << (2 * bits)) | (along(1) << bits) | along(2)
 }
 
-/// The value at `t` between eight, whose places have one bit for each axis, that of x highest.
+/// Trilinear interpolation at `t` between eight samples, whose indices have one bit per axis, x highest.
 #[inline]
 fn between(t: Vec3, sample: impl Fn(usize) -> f32) -> f32 {
     let lerp = |t: f32, a: f32, b: f32| a * (1.0 - t) + b * t;
@@ -75,11 +75,11 @@ fn between(t: Vec3, sample: impl Fn(usize) -> f32) -> f32 {
     lerp(t.z, plane(0), plane(1))
 }
 
-/// A tree that is being built.
+/// A tree under construction.
 struct Growth {
     grid: SparseGrid,
     blocks: BTreeMap<[i32; 3], Entry>,
-    /// Places of constants, by their bits.
+    /// Indices of constants, by their bits.
     constants: HashMap<u32, u32>,
 }
 
@@ -92,7 +92,7 @@ impl Growth {
         }))
     }
 
-    /// Sets what is at a place: a leaf, or a value of as many voxels as entries of the level have.
+    /// Sets the entry at a position: a leaf, or a value for all voxels of an entry of the level.
     fn put(&mut self, p: [i32; 3], level: usize, entry: Entry) {
         let block = self.blocks.entry(p.map(|i| i >> LOG2[0])).or_insert(Entry(0));
         if level == 0 {
@@ -112,7 +112,8 @@ impl Growth {
     }
 }
 
-/// The first entry of the node that `entry` has, which gets one if it is a value.
+/// Index of the first entry of the child node of `entry`. If the entry is a value, it is replaced by a node of this
+/// value.
 fn divided(entry: &mut Entry, nodes: &mut Vec<Entry>, size: usize) -> usize {
     let index = entry.index().unwrap_or_else(|_| {
         let index = nodes.len() / size;
@@ -124,8 +125,8 @@ fn divided(entry: &mut Entry, nodes: &mut Vec<Entry>, size: usize) -> usize {
 }
 
 impl SparseGrid {
-    /// A tree of cubes, and of leaves whose first voxels are `origins`, with 512 values each, z first. All else has the value
-    /// `background`.
+    /// A tree of cubes and of leaves. `origins` are the first voxels of the leaves, with 512 values each, z fastest.
+    /// All other voxels have the value `background`.
     pub fn new(background: f32, cubes: &[Cube], origins: &[[i32; 3]], mut values: Vec<f32>) -> Self {
         let nodes = [Vec::new(), Vec::new()];
         let (keys, blocks, constants, greatest) = (Vec::new(), Vec::new(), vec![background], Vec::new());
@@ -141,7 +142,7 @@ impl SparseGrid {
             };
             growth.put(cube.origin, level, entry);
         }
-        // Leaves of one value need no voxels
+        // Leaves of one value become constants
         let mut kept = 0;
         for (i, &origin) in origins.iter().enumerate() {
             let Some(leaf) = values.get(i * LEAF..(i + 1) * LEAF) else { break };
@@ -170,13 +171,13 @@ impl SparseGrid {
         nodes + values + size_of_val(&self.constants[..]) + self.keys.len() * (size_of::<[i32; 3]>() + 4)
     }
 
-    /// The least and the greatest value.
+    /// The minimum and maximum value.
     pub fn extremes(&self) -> [f32; 2] {
         let all = self.leaves.iter().chain(&self.constants);
         all.fold([f32::INFINITY, f32::NEG_INFINITY], |[low, high], &v| [low.min(v), high.max(v)])
     }
 
-    /// The values of the leaf that holds a voxel, or the one value around it.
+    /// The values of the leaf that contains a voxel, or the constant value of its entry.
     #[inline]
     fn leaf(&self, p: [i32; 3]) -> Result<&[f32], f32> {
         let Ok(block) = self.keys.binary_search(&p.map(|i| i >> LOG2[0])) else { return Err(self.constants[0]) };
@@ -195,7 +196,7 @@ impl SparseGrid {
         self.leaf(p).map_or_else(|constant| constant, |leaf| leaf[offset(p, 2)])
     }
 
-    /// The value between the voxel `p` and its next neighbours: at `t` of the way, 0..1 along each axis.
+    /// Trilinear interpolation between the voxel `p` and its next neighbours, at `t` in 0..1 along each axis.
     pub fn interpolated(&self, p: [i32; 3], t: Vec3) -> f32 {
         // Most cubes of eight voxels are in one leaf
         if p.iter().all(|i| i & 7 < 7) {
@@ -210,7 +211,7 @@ impl SparseGrid {
         between(t, |i| self.value([0, 1, 2].map(|axis| p[axis].wrapping_add((i >> (2 - axis) & 1) as i32))))
     }
 
-    /// The greatest value of the voxels from `low` to `high`, both included; at least zero.
+    /// The maximum value of the voxels from `low` to `high`, both included; at least zero.
     pub fn greatest(&self, low: [i32; 3], high: [i32; 3]) -> f32 {
         let [first, last] = [low, high].map(|p| p.map(|i| i >> LOG2[0]));
         let count = (0..3).map(|a| (i64::from(last[a]) - i64::from(first[a]) + 1) as u64).fold(1, u64::saturating_mul);
@@ -232,7 +233,7 @@ impl SparseGrid {
         if level == 2 && self.greatest[index] <= *greatest {
             return;
         }
-        // The entries of this node that reach into the range
+        // The entries of this node that overlap the range
         let (below, size) = (LOG2[level + 1], (1_i32 << LOG2[level]) - 1);
         let along = |axis: usize| {
             let first = range[0][axis].max(origin[axis]) - origin[axis];
@@ -256,17 +257,18 @@ impl SparseGrid {
     }
 }
 
-/// A tree in a box, seen as the unit cube.
+/// A tree within a box that is mapped to the unit cube.
 #[derive(Clone, Debug)]
 pub struct SparseSamples {
     grid: Arc<SparseGrid>,
-    /// Indices less `origin`, so that they are small.
+    /// Maps to indices minus `origin`, which keeps them small.
     index_from_unit: Affine3A,
     origin: [i32; 3],
 }
 
 impl SparseSamples {
-    /// A tree whose indices a map places in the space of a box, by two corners; `None` if the map has no inverse.
+    /// A tree within a box given by two corners; the map takes indices to the space of the box. `None` if the map has
+    /// no inverse.
     pub fn new(grid: Arc<SparseGrid>, space_from_index: &DAffine3, &[min, max]: &[DVec3; 2]) -> Option<Self> {
         let space_from_unit = DAffine3::from_translation(min) * DAffine3::from_scale(max - min);
         let mut index_from_unit = space_from_index.inverse() * space_from_unit;
@@ -282,7 +284,7 @@ impl SparseSamples {
         index_from_unit.is_finite().then_some(SparseSamples { grid, index_from_unit, origin })
     }
 
-    /// Voxels along each axis of the box.
+    /// Number of voxels along each axis of the box.
     pub fn resolution(&self) -> [usize; 3] {
         let m = self.index_from_unit.matrix3;
         [m.x_axis, m.y_axis, m.z_axis].map(|axis| (axis.length().ceil() as usize).max(1))
@@ -293,12 +295,12 @@ impl SparseSamples {
         self.grid.bytes()
     }
 
-    /// The least and the greatest value.
+    /// The minimum and maximum value.
     pub fn extremes(&self) -> [f32; 2] {
         self.grid.extremes()
     }
 
-    /// The voxel whose coordinates less `origin` are those of `place`.
+    /// The voxel at `place`, whose coordinates are relative to `origin`.
     #[inline]
     fn voxel(&self, place: Vec3) -> [i32; 3] {
         [0, 1, 2].map(|axis| self.origin[axis].wrapping_add(place[axis] as i32))
@@ -311,7 +313,7 @@ impl SparseSamples {
         self.grid.interpolated(self.voxel(base), place - base)
     }
 
-    /// The greatest of the voxels that take part in values of a box in the unit cube; at least zero.
+    /// The maximum of the voxels that contribute to values in a box of the unit cube; at least zero.
     pub fn bound(&self, low: Vec3, high: Vec3) -> f32 {
         let corners = (0..8).map(|i| {
             let corner = [0, 1, 2].map(|axis| if i >> axis & 1 == 0 { low[axis] } else { high[axis] });
@@ -319,7 +321,7 @@ impl SparseSamples {
         });
         let (first, last) = corners
             .fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(first, last), corner| (first.min(corner), last.max(corner)));
-        // Rounding must not leave out a voxel that a point on the wall needs
+        // Include voxels that rounding may add for points on the wall
         let slop = 1e-4 + 1e-6 * first.abs().max(last.abs()).max_element();
         let (first, last) = ((first - slop).floor(), (last + slop).floor());
         let high = self.voxel(last).map(|i| i.saturating_add(1));
@@ -332,7 +334,7 @@ mod tests {
     use super::*;
     use lumiris_test_support::random::{RngExt, pcg32};
 
-    /// A tree and the same values by place.
+    /// A tree, and a function with the same values.
     fn tree() -> (SparseGrid, impl Fn([i32; 3]) -> f32) {
         let origins = [[-8, 0, 8], [0, 0, 8], [-4104, 4096, 0], [40, -8, -8], [128, 0, 0]];
         let known = move |p: [i32; 3]| {
@@ -371,7 +373,7 @@ mod tests {
         for p in [[-4100, 4100, 3], [127, 255, 127], [0, 256, 0], [8192, -1, 4095], [12_288, -1, 0], [i32::MAX; 3]] {
             assert_eq!(tree.value(p), known(p), "{p:?}");
         }
-        // Four leaves have voxels, and four blocks nodes
+        // Four leaves keep voxels, and four blocks have nodes
         assert_eq!(tree.leaves.len(), 4 * 512);
         assert_eq!(tree.extremes()[1], 2.0);
         assert!(tree.bytes() < 4 * 2048 + 4 * (4 << 15) + 4 * (5 << 12) + 1000, "{}", tree.bytes());
@@ -411,7 +413,7 @@ mod tests {
             let (low, high) = ((p - 0.1 * random()).max(Vec3::ZERO), (p + 0.1 * random()).min(Vec3::ONE));
             assert!(found <= samples.bound(low, high) + 1e-6);
         }
-        // As tight as it can be
+        // The bound is tight
         let greatest = |low: [i32; 3], high: [i32; 3]| {
             let mut greatest = 0.0_f32;
             for x in low[0]..=high[0] {

@@ -1,10 +1,10 @@
-//! Free flights: segments, random numbers, and what comes of a flight.
+//! Free flights: segments, random numbers, and results.
 //!
-//! A flight either passes the segment, or ends by scattering. Its weight w has the expectation that transport asks for:
-//! E[w; passes] = T, and E[w; scatters in dt] = T σ_s dt, per channel. So beyond a segment a path carries an estimate of T,
-//! as a shadow segment does; the density of a *direction* is the same whether there is a medium or not. Multiple
-//! importance sampling of light and BSDF or phase function weights by these densities alone: the weights of the two
-//! techniques add up to 1 for every direction, and each technique estimates the same f·L·T.
+//! A flight either passes the segment or ends by scattering. Its weight w satisfies, per channel, E[w; passes] = T and
+//! E[w; scatters in dt] = T σ_s dt. Beyond a segment, a path therefore carries an estimate of T, as a shadow segment
+//! does. The density of a *direction* does not depend on the medium. MIS weights of light sampling and BSDF (or phase
+//! function) sampling use these densities only: they add up to 1 for every direction, and each technique estimates the
+//! same f·L·T.
 
 use lumiris_numbers::math::hash::HashStream;
 use lumiris_numbers::math::{Rgb, Vec3};
@@ -21,27 +21,27 @@ pub struct Segment {
     pub length: f32,
 }
 
-/// What comes of a flight along a segment.
+/// The result of a flight along a segment.
 #[derive(Clone, Copy, Debug)]
 pub struct Flight {
-    /// Estimate of the light that the medium sends out along the whole segment, weakened on its way to the origin.
+    /// Estimate of the medium's emission along the whole segment, attenuated on its way to the origin.
     pub emitted: Rgb,
-    /// How it ends.
+    /// Its end.
     pub end: End,
 }
 
-/// A place where a flight through a medium that varies looks for what it sends out.
+/// An emission lookup of a flight through a heterogeneous medium.
 #[derive(Clone, Copy, Debug)]
 pub struct Glimpse {
     /// Distance from the origin (m).
     pub t: f32,
     /// The point in the unit cube of the medium.
     pub unit: Vec3,
-    /// Rate of such places (1/m).
+    /// Rate of the lookups (1/m).
     pub rate: f32,
 }
 
-/// How a flight ends.
+/// The end of a flight.
 #[derive(Clone, Copy, Debug)]
 pub enum End {
     /// It passes.
@@ -58,34 +58,35 @@ pub enum End {
     },
 }
 
-/// The random numbers of a flight: the first ones well distributed over the samples of a pixel, later ones independent.
+/// The random numbers of a flight. The first ones are well distributed over the samples of a pixel, later ones are
+/// independent.
 #[derive(Clone, Copy, Debug)]
 pub struct Numbers {
     stream: SampleStream,
     rest: Option<HashStream>,
-    /// How many pairs were drawn: tentative collisions, each a lookup of the medium, and ends of lines.
+    /// Number of pairs drawn: one per tentative collision (a lookup of the medium) or end of a line.
     pub drawn: u32,
 }
 
-/// Domain of the numbers of later collisions.
+/// Domain of the random numbers of later collisions.
 const REST: u32 = 1;
-/// Domain of the places of glimpses.
+/// Domain of the offsets of emission lookups.
 const GLIMPSES: u32 = 2;
 
 impl Numbers {
-    /// Those of a place in the tree of random numbers.
+    /// The random numbers of a stream.
     #[inline]
     pub fn new(stream: SampleStream) -> Self {
         Numbers { stream, rest: None, drawn: 0 }
     }
 
-    /// Four numbers in [0, 1), of a flight that needs no others.
+    /// Four numbers in [0, 1), for flights that need no more.
     #[inline]
     pub fn first(&self) -> [f32; 4] {
         self.stream.draw::<4>()
     }
 
-    /// A number in [0, 1) for the places of glimpses.
+    /// A number in [0, 1) for the offset of emission lookups.
     #[inline]
     pub fn offset(&self) -> f32 {
         self.stream.domain(GLIMPSES).draw::<1>()[0]

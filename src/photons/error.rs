@@ -1,4 +1,4 @@
-//! Why a photon map could not be built.
+//! Errors of photon maps.
 
 /// Errors of photon and importon tracing.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
@@ -6,7 +6,7 @@ pub enum PhotonError {
     /// There is no light.
     #[error("the scene has no light, so there are no photons to trace")]
     NoLight,
-    /// There are lights, and all of them are black.
+    /// There are lights, but all of them are black.
     #[error("the lights of the scene emit nothing, so there are no photons to trace")]
     NoEmission,
     /// A number of paths, photons or importons is 0.
@@ -24,21 +24,21 @@ pub enum PhotonError {
         if *.by_importance { " that matters to the camera" } else { "" }
     )]
     NothingStored {
-        /// How many were traced.
+        /// Number of photon paths traced.
         paths: u64,
-        /// Whether photons arrived that had too little importance.
+        /// True if photons arrived but had too little importance.
         by_importance: bool,
     },
     /// No importon was stored.
     #[error("the camera sees no diffuse surface, directly or in mirrors, so visual importance is zero everywhere")]
     CameraSeesNothing,
-    /// The observer ended it.
+    /// The observer stopped the tracing.
     #[error("stopped after {paths} photon paths, before the photon maps were complete")]
     Stopped {
-        /// How many were traced.
+        /// Number of photon paths traced.
         paths: u64,
     },
-    /// The maps do not fit.
+    /// The maps exceed the memory limit.
     #[error(
         "the photon maps need more than {} kB, which {photons} photons took: ask for fewer photons or allow more memory",
         limit / 1000
@@ -46,7 +46,7 @@ pub enum PhotonError {
     OutOfMemory {
         /// The limit (bytes).
         limit: u64,
-        /// Photons when it was reached.
+        /// Number of photons at the limit.
         photons: u64,
     },
 }

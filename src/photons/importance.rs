@@ -1,11 +1,11 @@
 //! Visual importance: importons, and the probability with which a photon is stored [Keller and Wald 2000, §2.3].
 //!
-//! Importons are particles of importance, which are emitted by the camera and scattered like light [Peter and Pietrek
-//! 1998]. With I(x) the density of their importance, p(x) = min(1, f·I(x)), where 1/f is the minimum of I that test
-//! rays from the camera find: so p = 1 wherever the camera looks, and the photons there keep their power.
+//! Importons are particles of importance, emitted by the camera and scattered like light [Peter and Pietrek 1998]. With
+//! I(x) the density of their importance, p(x) = min(1, f·I(x)), where 1/f is the minimum of I over the hits of test
+//! rays from the camera. Therefore p = 1 on all surfaces visible to the camera, and photons there keep their power.
 //!
-//! Where p is small, photons with the power Φ/p are rare and large. Either p is at least ε, which preserves the
-//! expectation of every map, or photons with p < ε are dropped, and the light that they carry is missing.
+//! Where p is small, stored photons are rare and have the large power Φ/p. Either p is at least ε, which preserves the
+//! expectation of every map, or photons with p < ε are dropped, which loses their light.
 
 use super::error::PhotonError;
 use super::map::{GatherScratch, PhotonMap, Place, Search};
@@ -17,7 +17,7 @@ use crate::scene::RenderJob;
 use lumiris_numbers::math::{Rgb, Vec2, Vec3};
 use rayon::prelude::*;
 
-/// XORed with the seed of photons to give the seeds of importons and of test rays.
+/// XORed with the seed of the photons, for the seeds of importons and of test rays.
 const SEEDS: [u32; 2] = [0x696d_706f, 0x7465_7374];
 
 /// Treatment of photons with low importance.
@@ -34,11 +34,11 @@ pub enum LowImportance {
 pub struct ImportanceSettings {
     /// Importance maps of different seeds are independent.
     pub seed: u32,
-    /// Importon paths.
+    /// Number of importon paths.
     pub paths: u64,
     /// Maximum number of scattering events of an importon.
     pub max_depth: u32,
-    /// Camera rays that determine the minimum importance.
+    /// Number of camera rays that determine the minimum importance.
     pub test_rays: u64,
     /// Fraction of the test rays whose importance may be below 1/f; 0 takes the minimum.
     pub quantile: f32,
@@ -69,7 +69,7 @@ impl Default for ImportanceSettings {
 #[derive(Clone, Debug)]
 pub struct Importance {
     map: PhotonMap,
-    /// f.
+    /// The factor f.
     scale: f32,
     search: Search,
     low_importance: LowImportance,
@@ -87,7 +87,7 @@ impl Importance {
         }
     }
 
-    /// True if maps built with it have the right expectation.
+    /// True if maps built with it have the correct expectation.
     pub fn is_unbiased(&self) -> bool {
         matches!(self.low_importance, LowImportance::Floor(_))
     }
@@ -97,12 +97,12 @@ impl Importance {
         &self.map
     }
 
-    /// f, the reciprocal of the density of importance where p becomes 1 (m²).
+    /// f, the reciprocal of the importance density at which p reaches 1 (m²).
     pub fn scale(&self) -> f32 {
         self.scale
     }
 
-    /// Rays traced for importons and tests.
+    /// Number of rays traced for importons and tests.
     pub fn rays(&self) -> u64 {
         self.rays
     }
@@ -129,7 +129,7 @@ pub fn trace_importons(job: &RenderJob, settings: &ImportanceSettings) -> Result
     let search =
         Search::Nearest { count: settings.count.max(2), max_radius: settings.max_radius * job.lights.scene_radius };
 
-    // The scale, from the first diffuse surfaces that the camera sees
+    // The scale, from the first diffuse surfaces visible to the camera
     let (seen, test_rays) = trace(job, settings.seed ^ SEEDS[1], settings.test_rays, settings.max_depth, true);
     rays += test_rays;
     let of_place = |scratch: &mut GatherScratch, seen: &Photon| density(&map, seen.p(), seen.n(), search, scratch);
@@ -141,12 +141,12 @@ pub fn trace_importons(job: &RenderJob, settings: &ImportanceSettings) -> Result
     Ok(Importance { scale: 1.0 / min, map, search, low_importance: settings.low_importance, rays })
 }
 
-/// Importons where they arrive: `paths` paths of at most `max_depth` scattering events.
+/// Importons at their arrivals: `paths` paths of at most `max_depth` scattering events.
 pub fn importons(job: &RenderJob, seed: u32, paths: u64, max_depth: u32) -> Vec<Photon> {
     trace(job, seed ^ SEEDS[0], paths, max_depth, false).0
 }
 
-/// Importons where they arrive, and the number of rays; only the first one of each path if `only_first`.
+/// Importons at their arrivals, and the number of rays. If `only_first`, only the first arrival of each path.
 fn trace(job: &RenderJob, seed: u32, count: u64, max_depth: u32, only_first: bool) -> (Vec<Photon>, u64) {
     let settings = WalkSettings { transport: Transport::Radiance, max_depth };
     let power = Rgb::splat((1.0 / count as f64) as f32);
@@ -182,7 +182,7 @@ fn trace(job: &RenderJob, seed: u32, count: u64, max_depth: u32, only_first: boo
     (batches.into_iter().flat_map(|(importons, _)| importons).collect(), rays)
 }
 
-/// An importon as it leaves the camera, anywhere in the image.
+/// An importon that leaves the camera at a random point of the image.
 fn emit(job: &RenderJob, seed: u32, index: u32, path: u64, power: Rgb) -> Particle {
     let stream = path_stream(seed, path);
     let [x, y, lens_u, lens_v] = stream.domain(domain::EMISSION).draw::<4>();

@@ -1,8 +1,8 @@
-//! The distribution of photon paths over lights: p_i = (1 − a) Φ_i/Σ Φ + a/L over the L lights that emit anything,
-//! where Φ are their powers and a is the floor, so that no light has less than a/L of the paths.
+//! The distribution of photon paths over lights: p_i = (1 − a) Φ_i/Σ Φ + a/L over the L lights with emission. Φ are
+//! their powers and a is the floor, so that no light has less than a/L of the paths.
 //!
-//! Lights are chosen by inversion, so that stratified random numbers give each light its expected number of paths up to
-//! a few.
+//! Lights are chosen by inversion, so that with stratified random numbers each light gets its expected number of paths
+//! up to a few.
 
 use crate::lights::{LightId, LightSet};
 use lumiris_numbers::math::cumulative;
@@ -16,12 +16,12 @@ pub struct LightDistribution {
 }
 
 impl LightDistribution {
-    /// `floor`: a in 0..1. `None` if no light emits anything.
+    /// `floor`: a in 0..1. `None` if no light has emission.
     pub fn new(lights: &LightSet, floor: f32) -> Option<Self> {
         Self::by_weights(lights, floor, |light| lights.lights[light as usize].phi(lights.scene_radius))
     }
 
-    /// The same with weights instead of powers; `None` if those of all lights that emit anything are 0.
+    /// The same with weights instead of powers; `None` if the weights of all lights with emission are 0.
     pub fn by_weights(lights: &LightSet, floor: f32, weight: impl Fn(LightId) -> f32) -> Option<Self> {
         let lit: Vec<(LightId, f64)> = lights.lit.iter().map(|&light| (light, f64::from(weight(light)))).collect();
         let total: f64 = lit.iter().map(|(_, phi)| phi).sum();
@@ -40,8 +40,8 @@ impl LightDistribution {
         Some(LightDistribution { lights: lit.into_iter().map(|(light, _)| light).collect(), cumulative })
     }
 
-    /// A light and its probability, by a number of twice 24 bits: `u[1]` fills the gaps between the values of `u[0]`,
-    /// which exceed the probabilities where there are many lights.
+    /// A light and its probability, by two random numbers of 24 bits: `u[1]` fills the gaps between the values of
+    /// `u[0]`, which exceed the probabilities if there are many lights.
     #[inline]
     pub fn sample(&self, u: [f32; 2]) -> (LightId, f32) {
         const STEPS: f64 = 16_777_216.0;
@@ -51,7 +51,7 @@ impl LightDistribution {
         (self.lights[i], self.pmf_at(i))
     }
 
-    /// Probability of a light; 0 if it emits nothing.
+    /// Probability of a light; 0 if it has no emission.
     pub fn pmf(&self, light: LightId) -> f32 {
         self.lights.binary_search(&light).map_or(0.0, |i| self.pmf_at(i))
     }

@@ -2,18 +2,18 @@
 //!
 //! The irradiance at x is estimated from the photons around it, E ≈ Σ K(d_k) Φ_k, with the Epanechnikov kernel K(d) =
 //! 2/(πr²) (1 − d²/r²), whose integral over the disk of radius r is 1 [Epanechnikov 1969; Silverman 1986, §4.2]. r is
-//! given, or it is the distance of the k-th nearest photon [Jensen 1996], which is then excluded: for photons of
+//! r is fixed, or the distance of the k-th nearest photon [Jensen 1996], which is then excluded: for photons of
 //! constant density λ, E[(k − 1)/(πr²)] = λ, whereas k/(πr²) would be too large by the factor k/(k − 1). If the disk of
-//! the maximum radius has fewer than k photons, all of them count with that radius; so the estimate is unbiased in
-//! either case: λ P(N ≥ k − 1) + λ P(N ≤ k − 2), N being the number of photons in the largest disk.
+//! the maximum radius has fewer than k photons, all of them count with that radius. The estimate is unbiased in both
+//! cases: λ P(N ≥ k − 1) + λ P(N ≤ k − 2), where N is the number of photons in the largest disk.
 //!
 //! A photon counts at a point if it lies on a surface of nearly the same normal, on the same side, and close to the
 //! tangent plane. The maximum of d and 4 |d·n| is compared with r, so that photons farther from the plane than r/4
 //! never count, as in the flattened spheres of [Jensen 2001, §7.2]. On a plane, and on a sphere of more than twice the
-//! radius r, that is d, and the area of a sphere within the distance d is πd² as well.
+//! radius r, this maximum is d. The area of a sphere within the distance d is πd² as well.
 //!
-//! The irradiance is about the shading normal: a photon's power is weighted by |wi·ns|/|wi·n_k|, n_k being the
-//! geometric normal at the photon, since photons are spread over the area about n_k.
+//! The irradiance refers to the shading normal: a photon's power is weighted by |wi·ns|/|wi·n_k|, where n_k is the
+//! geometric normal at the photon, since the photon density is per area about n_k.
 
 use super::photon::Photon;
 use super::tree::{Tree, Visit};
@@ -33,30 +33,30 @@ const MIN_COS: f32 = 0.01;
 pub struct Place {
     /// The point.
     pub p: Vec3,
-    /// Geometric normal on the lit side, unit.
+    /// Geometric normal on the illuminated side, unit.
     pub n: Vec3,
     /// Shading normal on that side, which defines the irradiance, unit.
     pub ns: Vec3,
 }
 
 impl Place {
-    /// A point whose shading normal is the geometric one.
+    /// A point whose shading normal is the geometric normal.
     pub fn flat(p: Vec3, n: Vec3) -> Self {
         Place { p, n, ns: n }
     }
 }
 
-/// Which photons are around.
+/// The photons that an estimate uses.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Search {
-    /// The nearest ones.
+    /// The nearest photons.
     Nearest {
-        /// Their number, at least 2.
+        /// Number of photons, at least 2.
         count: u32,
         /// Maximum radius of a search (m).
         max_radius: f32,
     },
-    /// All within a radius (m).
+    /// All photons within a radius (m).
     Radius(f32),
 }
 
@@ -66,7 +66,7 @@ pub struct GatherScratch {
     nearest: BinaryHeap<Candidate>,
 }
 
-/// A photon by its distance.
+/// A photon with its distance.
 #[derive(Clone, Copy, Debug)]
 struct Candidate {
     d2: f32,
@@ -122,9 +122,9 @@ impl PhotonMap {
         self.tree.bytes()
     }
 
-    /// Calls `f(photon, weight)` for the photons around that count. The irradiance about `at.ns` is Σ weight·power
-    /// (weight in 1/m²), the radiance that a BSDF f reflects is Σ weight·f·power, without a cosine. Returns the radius
-    /// of the kernel (m), which is 0 if there is none.
+    /// Calls `f(photon, weight)` for each photon of the estimate. The irradiance about `at.ns` is Σ weight·power
+    /// (weight in 1/m²); the radiance that a BSDF f reflects is Σ weight·f·power, without a cosine. Returns the radius
+    /// of the kernel (m), which is 0 without photons.
     pub fn gather(
         &self,
         at: &Place,
@@ -152,12 +152,12 @@ impl PhotonMap {
                 self.tree.visit(at.p, &mut nearest);
                 let bound = nearest.bound;
                 let Some(farthest) = heap.peek() else { return 0.0 };
-                // Without any bound, the photons found have to suffice
+                // Without a maximum radius, use the photons in the heap
                 let r2 = if bound.is_finite() { bound } else { farthest.d2 };
                 if !(r2 > 0.0) {
                     return 0.0;
                 }
-                // The k-th photon, if there is one, lies on the rim, where the kernel is 0
+                // The k-th photon, if there is one, is at the radius, where the kernel is 0
                 let kernel = Kernel::new(r2);
                 for candidate in heap.iter() {
                     let photon = &self.tree.photons[candidate.index as usize];
@@ -200,7 +200,7 @@ impl Place {
     }
 }
 
-/// Epanechnikov's.
+/// The Epanechnikov kernel.
 #[derive(Clone, Copy)]
 struct Kernel {
     r2: f32,
@@ -248,7 +248,7 @@ impl<F: FnMut(&Photon, f32)> Visit for Within<'_, F> {
 struct Nearest<'a> {
     at: &'a Place,
     count: usize,
-    /// Squared distance of the farthest, once there are enough.
+    /// Squared distance of the farthest photon, once there are k.
     bound: f32,
     heap: &'a mut BinaryHeap<Candidate>,
 }

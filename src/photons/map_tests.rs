@@ -28,7 +28,7 @@ fn searches() -> [Search; 5] {
         Search::Radius(0.2),
         Search::Nearest { count: 5, max_radius: 0.5 },
         Search::Nearest { count: 20, max_radius: 0.5 },
-        // Of about as many photons as the largest disk holds: both cases happen
+        // About as many photons as the largest disk holds, so that both cases occur
         Search::Nearest { count: 13, max_radius: 0.2 },
         Search::Nearest { count: 60, max_radius: f32::INFINITY },
     ]
@@ -81,7 +81,7 @@ fn photons_off_the_tangent_plane_and_of_other_normals_do_not_count() {
         let e = map.irradiance(&at, Search::Radius(1.0), &mut scratch).g;
         assert_eq!(e > 0.0, counts, "{p} {n}");
     }
-    // From below the horizon of the place, though its own surface is tilted enough to catch it
+    // Light from below the horizon of the point, although the photon's own surface faces it
     let n = Vec3::new(0.5, 1.0, 0.0).normalize();
     let photon = Photon::new(Vec3::ZERO, Vec3::new(1.0, -0.1, 0.0).normalize(), n, Rgb::WHITE, Origin::Diffuse);
     let map = PhotonMap::new(vec![photon]);
@@ -90,13 +90,13 @@ fn photons_off_the_tangent_plane_and_of_other_normals_do_not_count() {
 
 #[test]
 fn irradiance_is_about_the_shading_normal() {
-    // Even light from the hemisphere of y: about a normal tilted by θ, E/E_flat = (1 + cos θ)/2
+    // Uniform light from the hemisphere of y: about a normal tilted by θ, E/E_flat = (1 + cos θ)/2
     let mut stream = pcg32([1, 4, 79]);
     let map = PhotonMap::new(plane(400_000.0, 0.0, Vec3::Y, &mut stream));
     let ns = Vec3::new(0.6, 0.8, 0.0);
     let at = Place { p: Vec3::ZERO, n: Vec3::Y, ns };
     let e = map.irradiance(&at, Search::Radius(0.8), &mut GatherScratch::default()).g;
-    // About 2·10⁵ photons with weights that are off by the kernel and the ratio of cosines
+    // About 2·10⁵ photons, weighted by the kernel and the ratio of cosines
     assert!((e - 0.9).abs() < 0.015, "{e}");
 }
 
@@ -174,7 +174,7 @@ fn photons_at_one_point_and_no_photons_do_no_harm() {
     for search in [Search::Radius(0.0), Search::Radius(f32::NAN), Search::Nearest { count: 0, max_radius: 1.0 }] {
         assert_eq!(one_point.irradiance(&at, search, &mut scratch), Rgb::BLACK);
     }
-    // All photons count where fewer than k are in the largest disk
+    // All photons count if the largest disk holds fewer than k
     let e = one_point.irradiance(&at, Search::Nearest { count: 2000, max_radius: 1.0 }, &mut scratch).g;
     assert!((e / (1000.0 * 2.0 / std::f32::consts::PI) - 1.0).abs() < 1e-3, "{e}");
 }

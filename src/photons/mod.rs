@@ -5,9 +5,9 @@
 //! lights ─random walks─▶ arrivals ─store with probability p(x), or q·p(x)─▶ caustic and global photons ─tree─▶ maps
 //! ```
 //!
-//! Photons lie on surfaces whose BSDF has a Lambertian part ([`crate::bsdfs::Bsdf::lambertian`]), and record how they
-//! got there ([`Origin`]): straight from a light, scattered by a Lambertian lobe, or by any other one, which makes them
-//! caustic photons, whether the light before that was direct or not.
+//! Photons lie on surfaces whose BSDF has a Lambertian part ([`crate::bsdfs::Bsdf::lambertian`]), and record their last
+//! scattering event ([`Origin`]): none (straight from a light), a Lambertian lobe, or another lobe. The last kind are
+//! caustic photons, whether the light before that event was direct or indirect.
 //!
 //! Reading order: [`photon`], `tree`, [`map`]; [`light_distribution`], `path`, `walk`; [`importance`],
 //! [`trace`]; [`error`].

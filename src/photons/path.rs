@@ -1,12 +1,12 @@
-//! Photon paths of photons and of importons: their random numbers, and how many are traced together.
+//! Paths of photons and importons: their random numbers, and the batch size.
 //!
 //! Photon path t is a point of a scrambled Sobol' sequence over path space [Keller 1998, ch. 3; Burley 2020]. The
-//! sequence has 2¹⁶ points, so photon paths come in blocks of as many, which are scrambled independently.
+//! sequence has 2¹⁶ points. Each block of 2¹⁶ photon paths is scrambled independently.
 
 use lumiris_numbers::math::hash::pcg4d;
 use lumiris_numbers::samplers::{SampleStream, SamplerKind};
 
-/// Photon paths that are traced together.
+/// Number of photon paths that are traced together.
 pub(crate) const BATCH: u64 = 4096;
 /// log₂ of the points of a sequence.
 const SEQUENCE_BITS: u32 = 16;

@@ -1,4 +1,4 @@
-//! A photon in 28 bytes: what arrives at a surface, from where, and how it got there.
+//! A photon in 28 bytes: power, position, direction, and last scattering event.
 //!
 //! | bits | what |
 //! |---|---|
@@ -15,7 +15,7 @@ use lumiris_numbers::math::{Rgb, Vec3};
 const MANTISSA_BITS: u32 = 12;
 /// Bits of a light's id.
 const LIGHT_BITS: u32 = 26;
-/// The id that stands for lights whose id does not fit.
+/// Stands for all lights whose id does not fit.
 const NO_LIGHT: u32 = (1 << LIGHT_BITS) - 1;
 
 /// The last scattering event of a photon. Interface materials do not count.
@@ -23,9 +23,9 @@ const NO_LIGHT: u32 = (1 << LIGHT_BITS) - 1;
 pub enum Origin {
     /// Straight from a light.
     Primary(LightId),
-    /// The last scattering before was by a Lambertian lobe.
+    /// The last scattering event was by a Lambertian lobe.
     Diffuse,
-    /// The last scattering before was by any other lobe: a caustic.
+    /// The last scattering event was by any other lobe: a caustic.
     Caustic,
 }
 
@@ -43,7 +43,7 @@ impl Origin {
     }
 }
 
-/// A photon where it arrived.
+/// A photon at its arrival.
 #[derive(Clone, Copy, Debug, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
 pub struct Photon {
@@ -75,13 +75,13 @@ impl Photon {
         }
     }
 
-    /// Where it arrived.
+    /// Position of arrival.
     #[inline]
     pub fn p(&self) -> Vec3 {
         Vec3::from_array(self.p)
     }
 
-    /// Direction to where it came from: unit, away from the surface.
+    /// Direction towards its origin: unit, away from the surface.
     #[inline]
     pub fn wi(&self) -> Vec3 {
         unpack_unit(self.wi)
@@ -93,7 +93,7 @@ impl Photon {
         unpack_unit(self.n)
     }
 
-    /// What it carries (W).
+    /// Its power (W).
     #[inline]
     pub fn power(&self) -> Rgb {
         let exponent = self.wi >> PACKED_BITS | self.n >> PACKED_BITS << 4;
@@ -102,7 +102,7 @@ impl Photon {
         unpack_power(exponent, [self.rgb & mask, self.rgb >> MANTISSA_BITS & mask, blue])
     }
 
-    /// The same photon with its power times `factor`.
+    /// Scales the power by `factor`.
     #[must_use]
     pub fn scaled(&self, factor: f32) -> Self {
         let (exponent, [r, g, b]) = pack_power(self.power() * factor);
@@ -116,7 +116,7 @@ impl Photon {
         }
     }
 
-    /// The light that it came straight from, if so; ids from 2²⁶ − 1 on are not stored.
+    /// The light, for photons straight from a light. Ids from 2²⁶ − 1 on are not stored.
     #[inline]
     pub fn light(&self) -> Option<LightId> {
         let (kind, light) = (self.rest >> 4 & 3, self.rest >> 6);
@@ -129,7 +129,7 @@ impl Photon {
         self.rest >> 4 & 3 == Origin::PRIMARY
     }
 
-    /// True if the last scattering before was by a lobe that is not Lambertian.
+    /// True if the last scattering event was by a non-Lambertian lobe.
     #[inline]
     pub fn is_caustic(&self) -> bool {
         self.rest >> 4 & 3 == Origin::CAUSTIC
@@ -142,7 +142,7 @@ fn power_of_two(e: i32) -> f64 {
     f64::from_bits(((1023 + e) as u64) << 52)
 }
 
-/// The exponent of the largest channel as f32 has it, and the mantissas; powers below the smallest normal number are 0.
+/// The f32 exponent of the largest channel, and the mantissas; powers below the smallest normal number are 0.
 #[inline]
 fn pack_power(power: Rgb) -> (u32, [u32; 3]) {
     let power = power.map(|c| c.clamp(0.0, f32::MAX)).to_array().map(|c| if c.is_nan() { 0.0 } else { c });
@@ -151,7 +151,7 @@ fn pack_power(power: Rgb) -> (u32, [u32; 3]) {
     if exponent == 0 {
         return (0, [0; 3]);
     }
-    // largest is in [2^(e − 1), 2^e), e = exponent − 126; what rounding lifts to 2^e is cut
+    // largest is in [2^(e − 1), 2^e), e = exponent − 126; values that round up to 2^e are clamped
     let scale = power_of_two(MANTISSA_BITS as i32 + 126 - exponent as i32);
     let mantissa = |c: f32| ((f64::from(c) * scale + 0.5) as u32).min((1 << MANTISSA_BITS) - 1);
     (exponent, power.map(mantissa))
@@ -223,7 +223,7 @@ mod tests {
         assert!(back(Rgb::splat(f32::INFINITY)).is_finite());
         assert!((back(Rgb::splat(f32::MAX)).r / f32::MAX - 1.0).abs() < 2.5e-4);
         assert!((back(Rgb::splat(2e-38)).r / 2e-38 - 1.0).abs() < 2.5e-4);
-        // A black photon is scaled without harm
+        // A black photon can be scaled
         let black = Photon::new(Vec3::ZERO, Vec3::Z, Vec3::Z, Rgb::BLACK, Origin::Primary(7));
         assert_eq!((black.scaled(1e9).power(), black.light()), (Rgb::BLACK, Some(7)));
     }

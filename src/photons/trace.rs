@@ -1,8 +1,8 @@
 //! Photon tracing: random walks from the lights in batches, assembled in the order of the photon paths.
 //!
-//! The random numbers of a photon path determine the light, where and in which direction the photon leaves it, and
-//! every scattering event. What is stored depends only on the scene, the settings and the number of photon paths, which
-//! is fixed before they are traced, see [`path_count`].
+//! The random numbers of a photon path determine the light, the emitted ray, and every scattering event. The stored
+//! photons depend only on the scene, the settings and the number of photon paths, which is fixed before tracing; see
+//! [`path_count`].
 //!
 //! The photons of the global map (from lights, and scattered by Lambertian surfaces) and those of caustics come from
 //! the same photon paths, of which there are more than the global map needs, so that the caustic map is finer [Keller and
@@ -37,10 +37,10 @@ const PILOT_DIVISOR: u64 = 8;
 const PILOT_PHOTONS: [u64; 2] = [1024, 16_384];
 /// Seed of pilots.
 const PILOT_SEED: u32 = 0x70_69_6c_6f;
-/// Bytes that a photon takes in a map, tree included.
+/// Bytes per photon in a map, including the tree.
 const BYTES: u64 = 31;
 
-/// How photons are traced.
+/// Settings of photon tracing.
 #[derive(Clone, Copy, Debug)]
 pub struct Tracing<'a> {
     /// Maps of different seeds are independent.
@@ -53,11 +53,11 @@ pub struct Tracing<'a> {
     pub q: f32,
     /// Fraction of the photon paths distributed evenly over the lights, whatever their powers (0..1).
     pub floor: f32,
-    /// Weights that the lights have instead of their powers.
+    /// Weights of the lights that replace their powers.
     pub light_weights: Option<&'a [f32]>,
-    /// Maximum number of photon paths of a pilot; if nothing is stored by then, it is an error.
+    /// Maximum number of photon paths of a pilot. Storing no photon by then is an error.
     pub max_in_pilot: u64,
-    /// Ends tracing between two rounds when it becomes true.
+    /// Stops tracing between two rounds when it becomes true.
     pub stop: Option<&'a AtomicBool>,
     /// Maximum memory of the maps (bytes).
     pub memory: Option<u64>,
@@ -80,7 +80,7 @@ impl Default for Tracing<'_> {
 }
 
 impl Tracing<'_> {
-    /// How the photon paths are distributed over the lights; `None` if none of them emits anything.
+    /// The distribution of photon paths over the lights; `None` if no light has emission.
     pub fn light_distribution(&self, lights: &LightSet) -> Option<LightDistribution> {
         match self.light_weights {
             None => LightDistribution::new(lights, self.floor),
@@ -89,12 +89,12 @@ impl Tracing<'_> {
     }
 }
 
-/// How many photons are traced.
+/// The amount of photon tracing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PhotonBudget {
     /// N photon paths.
     Paths(u64),
-    /// As many photon paths as store about a given number of photons, see [`path_count`].
+    /// The number of photon paths that stores about the given number of photons; see [`path_count`].
     Stored {
         /// Photons of the global map.
         global: u64,
@@ -103,27 +103,27 @@ pub enum PhotonBudget {
     },
 }
 
-/// What was traced.
+/// The result of photon tracing.
 #[derive(Clone, Debug, Default)]
 pub struct Traced {
     /// Photons from lights and from Lambertian surfaces, in the order of photon paths.
     pub global: Vec<Photon>,
     /// Photons whose last scattering was not Lambertian.
     pub caustic: Vec<Photon>,
-    /// N.
+    /// N, the number of photon paths.
     pub paths: u64,
-    /// Photon paths that filled the global map.
+    /// Number of photon paths that filled the global map.
     pub global_paths: u64,
     /// Photons that arrived at Lambertian surfaces, stored or not, on photon paths of either map.
     pub arrivals: u64,
-    /// Rays traced.
+    /// Number of rays traced.
     pub rays: u64,
-    /// Time that it took.
+    /// Elapsed time.
     pub elapsed: Duration,
 }
 
 impl Traced {
-    /// Photons stored.
+    /// Number of photons stored.
     pub fn stored(&self) -> u64 {
         (self.global.len() + self.caustic.len()) as u64
     }
@@ -139,8 +139,8 @@ impl Traced {
     }
 }
 
-/// Traces photons, on all threads of the current pool. The powers are such that Σ weight·power of a map's photons is an
-/// estimate of the irradiance that it holds; a map without photons is an estimate of 0.
+/// Traces photons on all threads of the current pool. The powers are scaled such that Σ weight·power of a map's photons
+/// estimates its irradiance; a map without photons estimates 0.
 pub fn trace_photons(
     job: &RenderJob,
     tracing: &Tracing<'_>,
@@ -161,9 +161,9 @@ pub fn trace_photons(
 }
 
 /// The number N of photon paths that [`trace_photons`] traces. If a number of photons is requested, a pilot determines
-/// N with random numbers that no map uses: maps of N photon paths have the right expectation whatever N is, while the
-/// number of photons that they store varies. If tracing ended with the last photon requested instead, powers would be
-/// divided by a random number of paths, and n photons would be too bright by about one part in n [Haldane 1945].
+/// N with random numbers that no map uses. Maps of N photon paths have the correct expectation for every N, while the
+/// number of stored photons varies. If tracing ended with the last requested photon instead, powers would be divided by
+/// a random number of paths, and n photons would be too bright by about one part in n [Haldane 1945].
 ///
 /// The pilot stores about an eighth of the photons, at least 1024 and at most 16 384; the same N can be used for many
 /// maps. It is an error if the pilot stores nothing.
@@ -188,7 +188,7 @@ pub fn path_count(
 /// A photon with the index of its path.
 type Deposit = (u64, Photon);
 
-/// What a batch stored, in the order of photon paths.
+/// The photons stored by a batch, in the order of photon paths.
 #[derive(Default)]
 struct Batch {
     global: Vec<Deposit>,
@@ -221,7 +221,7 @@ impl<'a> Run<'a> {
         Ok(Run { job, tracing, importance, light_distribution })
     }
 
-    /// The photon paths of the global map among `all`.
+    /// Number of photon paths of the global map among `all`.
     fn global_part(&self, all: u64) -> u64 {
         ((f64::from(self.tracing.q) * all as f64) as u64).max(1)
     }
@@ -245,7 +245,7 @@ impl<'a> Run<'a> {
             return Err(PhotonError::NothingStored { paths: traced, by_importance: arrivals > 0 });
         }
 
-        // Where only caustics are stored, the number of paths of the pilot
+        // If only caustics are stored, use the number of paths of the pilot
         let of_global = if global > 0 { wanted as f64 * traced as f64 / global as f64 } else { traced as f64 };
         Ok(((of_global / f64::from(self.tracing.q)).ceil() as u64).clamp(1, max))
     }
@@ -304,13 +304,13 @@ impl<'a> Run<'a> {
             self.deposit(&mut batch, arrival, path, path < global, scratch);
         });
         batch.rays = walker.traced;
-        // From the order of vertices to that of photon paths; stable
+        // Stable sort from the order of vertices to the order of photon paths
         batch.global.sort_by_key(|(t, _)| *t);
         batch.caustic.sort_by_key(|(t, _)| *t);
         batch
     }
 
-    /// A photon as it leaves a light.
+    /// A photon that leaves a light.
     fn emit(&self, index: u32, path: u64) -> Option<Particle> {
         let scene = &self.job.world.scene;
         let stream = path_stream(self.tracing.seed, path);

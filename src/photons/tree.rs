@@ -1,29 +1,29 @@
-//! A kd-tree over photons, which are stored in the order of its leaves: 8 bytes a node, in preorder.
+//! A kd-tree over photons, which are stored in the order of its leaves: 8 bytes per node, in preorder.
 //!
-//! A node divides its photons in halves across the longest side of their box. Photons lie on walls, and many share one
-//! coordinate: these stay together, so that the two cells do not touch; the halves are then unequal, but photons with
-//! an equal coordinate are never divided along it again, which makes the tree deeper by at most three.
+//! A node splits its photons in halves across the longest side of their box. Photons lie on walls, and many have equal
+//! coordinates. Photons with equal coordinates stay together, so that the two cells do not touch. The halves are then
+//! unequal, but such photons are never split along that axis again, which adds at most three levels.
 
 use super::photon::Photon;
 use lumiris_numbers::math::Vec3;
 
 /// Maximum number of photons in a leaf, unless they are all at one point.
 const LEAF: usize = 10;
-/// Number of photons from which on halves are built in parallel.
+/// Minimum number of photons for which halves are built in parallel.
 const PARALLEL: usize = 1 << 14;
 /// The kind of leaves, beside the axes 0, 1, 2.
 const IS_LEAF: u32 = 3;
 
-/// A plane, or a leaf.
+/// A splitting plane, or a leaf.
 #[derive(Clone, Copy, Debug)]
 struct Node {
-    /// The plane's coordinate, as bits, or the first photon.
+    /// The plane's coordinate, as bits, or the index of the first photon.
     value: u32,
-    /// Axis or `IS_LEAF` in two bits; the offset of the second child, or the number of photons.
+    /// Two bits: axis or `IS_LEAF`. Other bits: the offset of the second child, or the number of photons.
     kind: u32,
 }
 
-/// Photons in a tree.
+/// Photons in a kd-tree.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Tree {
     pub(super) photons: Vec<Photon>,
@@ -34,13 +34,13 @@ pub(super) struct Tree {
 pub(super) trait Visit {
     /// Maximum squared distance (m²).
     fn bound(&self) -> f32;
-    /// A photon within the bound, by its offset and squared distance.
+    /// Called for a photon within the bound, with its offset and squared distance.
     fn photon(&mut self, index: usize, photon: &Photon, d: Vec3, d2: f32);
 }
 
 impl Tree {
     pub(super) fn new(mut photons: Vec<Photon>) -> Self {
-        // A position that is NaN is on no side
+        // A NaN position is on no side of a plane
         photons.retain(|photon| photon.p().is_finite());
         let mut nodes = Vec::with_capacity(photons.len() / (LEAF / 3) + 1);
         if !photons.is_empty() {
@@ -55,14 +55,14 @@ impl Tree {
         (size_of_val(&self.photons[..]) + size_of_val(&self.nodes[..])) as u64
     }
 
-    /// Visits the photons around `p`, the nearer halves first.
+    /// Visits the photons around `p`, nearer halves first.
     pub(super) fn visit(&self, p: Vec3, visitor: &mut impl Visit) {
         if !self.nodes.is_empty() {
             self.visit_node(0, p, Vec3::ZERO, visitor);
         }
     }
 
-    /// `offset`: from `p` to the nearest point of the node's cell, by axis.
+    /// `offset`: vector from `p` to the nearest point of the node's cell.
     fn visit_node(&self, node: usize, p: Vec3, offset: Vec3, visitor: &mut impl Visit) {
         let Node { value, kind } = self.nodes[node];
         if kind & 3 == IS_LEAF {
@@ -89,7 +89,7 @@ impl Tree {
     }
 }
 
-/// Appends the tree of some photons, which are those from `begin` on.
+/// Appends the tree over `photons`, the first of which has the index `begin`.
 fn build(photons: &mut [Photon], begin: u32, nodes: &mut Vec<Node>) {
     let bounds = |photons: &[Photon]| {
         let extremes = |(min, max): (Vec3, Vec3), photon: &Photon| (min.min(photon.p()), max.max(photon.p()));
@@ -102,7 +102,7 @@ fn build(photons: &mut [Photon], begin: u32, nodes: &mut Vec<Node>) {
         return;
     }
 
-    // Cut
+    // Split
     let middle = cut(photons, axis);
     let (first, second) = photons.split_at_mut(middle);
     let (low, high) = (bounds(first).1[axis], bounds(second).0[axis]);
@@ -123,8 +123,8 @@ fn build(photons: &mut [Photon], begin: u32, nodes: &mut Vec<Node>) {
     }
 }
 
-/// Partitions photons into two sets, the first of which has the smaller coordinates, with equal ones in the same set;
-/// about half of all if possible. Returns the size of the first. Not all coordinates are equal.
+/// Partitions photons into two non-empty sets of nearly equal size, smaller coordinates first. Equal coordinates are in
+/// the same set. Returns the size of the first. The coordinates must not all be equal.
 fn cut(photons: &mut [Photon], axis: usize) -> usize {
     let half = photons.len() / 2;
     let (below, median, above) = photons.select_nth_unstable_by(half, |a, b| a.p()[axis].total_cmp(&b.p()[axis]));

@@ -1,18 +1,18 @@
 //! Random walks of particles, a batch at a time: photons from lights, and importons from the camera.
 //!
 //! At each surface a particle is scattered by its BSDF and survives with the probability by which its power would
-//! decrease, so that powers stay about equal [Arvo and Kirk 1990]. Photons carry flux, importons importance; their
+//! decrease, so that powers remain nearly equal [Arvo and Kirk 1990]. Photons carry flux, importons importance; their
 //! weights differ by the adjoint [Veach 1997, §5.3.2]:
 //!
 //! * importons, like camera paths: f |wi·ns|/p
-//! * photons: f η² |wo·ns| |wi·n|/(|wo·n| p), f being that of radiance, which is scaled by 1/η² where light is
-//!   refracted
+//! * photons: f η² |wo·ns| |wi·n|/(|wo·n| p), where f is the BSDF for radiance, which includes the factor 1/η² of
+//!   refraction
 //!
-//! with the shading normal ns and the geometric normal n, and `wo` pointing to where the particle comes from.
+//! with the shading normal ns, the geometric normal n, and `wo` pointing towards the particle's origin.
 //!
-//! A scattering event belongs either to the Lambertian part of the BSDF or to the other lobes. Where both scatter into
-//! the sampled direction, one of them is chosen in proportion to its f, and the weight is that of the chosen one over
-//! its probability.
+//! A scattering event belongs either to the Lambertian part of the BSDF or to the other lobes. If both scatter into the
+//! sampled direction, one of them is chosen in proportion to its f. Its weight is then divided by the probability of
+//! the choice.
 
 use super::photon::Origin;
 use crate::accel::{Coherence, Hit, RayBatch};
@@ -24,7 +24,7 @@ use lumiris_numbers::math::sphere_map::equal_area_sphere_to_square;
 use lumiris_numbers::math::{Ray, Rgb, Vec3};
 use lumiris_numbers::samplers::SampleStream;
 
-/// Surfaces without scattering that a particle may pass between two vertices.
+/// Maximum number of surfaces without scattering between two vertices.
 const MAX_PASSED: u32 = 64;
 
 /// Random-number domains of a vertex.
@@ -45,7 +45,7 @@ pub(super) struct Particle {
     /// Index in its batch.
     pub(super) index: u32,
     pub(super) ray: Ray,
-    /// What it carries.
+    /// Its power.
     pub(super) power: Rgb,
     /// Its last scattering event.
     pub(super) origin: Origin,
@@ -64,12 +64,12 @@ impl Particle {
 pub(super) struct Arrival<'a> {
     pub(super) particle: &'a Particle,
     pub(super) p: Vec3,
-    /// To where it came from, unit.
+    /// Unit direction towards the particle's origin.
     pub(super) wi: Vec3,
     /// Geometric normal on the side of `wi`.
     pub(super) n: Vec3,
     pub(super) part: &'a Lambertian<'a>,
-    /// Number of scattering events before.
+    /// Number of scattering events so far.
     pub(super) scatterings: u32,
     stream: SampleStream,
 }
@@ -92,7 +92,7 @@ pub(super) struct WalkSettings {
 /// Walks with particles; holds the buffers of one worker.
 #[derive(Debug, Default)]
 pub(super) struct Walker {
-    /// The particles that are to walk.
+    /// The particles to trace.
     pub(super) active: Vec<Particle>,
     next: Vec<Particle>,
     passing: Vec<Particle>,
@@ -103,8 +103,8 @@ pub(super) struct Walker {
 }
 
 impl Walker {
-    /// Traces the active particles until all have ended, and reports their arrivals at Lambertian surfaces: vertex by
-    /// vertex, not particle by particle.
+    /// Traces the active particles until all have ended, and reports their arrivals at Lambertian surfaces in the order
+    /// of vertices.
     pub(super) fn walk(&mut self, job: &RenderJob, settings: &WalkSettings, mut arrive: impl FnMut(&Arrival<'_>)) {
         self.sort(job);
         let mut coherence = Coherence::Packets;
@@ -119,7 +119,7 @@ impl Walker {
         self.active.clear();
     }
 
-    /// Sorts the particles so that neighbours start alike: at the same light, in similar directions, close together.
+    /// Sorts the particles so that neighbours have the same light, similar directions, and near origins.
     fn sort(&mut self, job: &RenderJob) {
         let lights = &job.lights;
         let key = |particle: &Particle| {
@@ -133,7 +133,7 @@ impl Walker {
         self.active.sort_by_cached_key(key);
     }
 
-    /// Takes the active particles to the next surface; those that pass it stay active.
+    /// Traces the active particles to the next surface. Particles that pass it stay active.
     fn step(
         &mut self,
         job: &RenderJob,
@@ -146,6 +146,7 @@ impl Walker {
         job.world.accel.intersect(&self.rays, coherence, &mut self.hits);
         self.traced += self.rays.len() as u64;
 
+        // Particles that pass the surface continue without a scattering event
         self.passing.clear();
         for (particle, hit) in self.active.iter().zip(&self.hits) {
             let Some(hit) = hit else { continue };
@@ -157,6 +158,8 @@ impl Walker {
                 }
                 continue;
             };
+
+            // Report the arrival
             let stream = particle.stream.domain(domain::VERTEX + vertex);
             let part = bsdf.lambertian(interaction.wo);
             if let Some(part) = &part {
@@ -171,6 +174,8 @@ impl Walker {
                     stream,
                 });
             }
+
+            // Scatter
             if vertex < settings.max_depth {
                 let proposals = job.settings().integrator.bsdf_proposals;
                 let scattering =
@@ -182,23 +187,23 @@ impl Walker {
     }
 }
 
-/// The bits of coordinates below 64 by turns, highest first: near points have near codes [Morton 1966].
+/// The Morton code of coordinates below 64, with interleaved bits: near points have near codes [Morton 1966].
 fn interleave<const N: usize>(coordinates: [u32; N]) -> u32 {
     (0..6).rev().flat_map(|bit| coordinates.map(move |x| x >> bit & 1)).fold(0, |code, bit| code << 1 | bit)
 }
 
-/// A surface that a particle leaves.
+/// A scattering event of a particle.
 struct Scattering<'a> {
     interaction: &'a SurfaceInteraction,
     bsdf: &'a SurfaceBsdf<'a>,
     part: Option<&'a Lambertian<'a>>,
     stream: SampleStream,
-    /// Of BSDFs that can only be evaluated.
+    /// Number of proposals for BSDFs that can only be evaluated.
     proposals: u32,
 }
 
 impl Scattering<'_> {
-    /// The particle after the surface; `None` if it ends there.
+    /// The particle after the scattering event; `None` if it ends there.
     fn scatter(&self, particle: &Particle, transport: Transport) -> Option<Particle> {
         let drawn = self.draw()?;
         let (wo, wi) = (self.interaction.wo, drawn.wi);
@@ -214,7 +219,7 @@ impl Scattering<'_> {
             return None;
         }
 
-        // Roulette by what is left, apart from the scaling of radiance by refraction
+        // Russian roulette by the weight, without the scaling of radiance by refraction
         let scale = match transport {
             Transport::Radiance => drawn.eta * drawn.eta,
             Transport::Importance => 1.0,
@@ -228,7 +233,7 @@ impl Scattering<'_> {
         Some(Particle { ray, power, origin, passed: 0, ..*particle })
     }
 
-    /// A direction by the BSDF; of one that can only be evaluated, by resampling.
+    /// Samples a direction by the BSDF; by resampling if the BSDF can only be evaluated.
     fn draw(&self) -> Option<Resampled> {
         let wo = self.interaction.wo;
         if self.bsdf.bsdf.is_only_evaluated() {
@@ -242,7 +247,7 @@ impl Scattering<'_> {
         Some(Resampled { f: s.f, wi: s.wi, weight: 1.0 / s.pdf, lobe: s.lobe, eta: s.eta })
     }
 
-    /// f of the part that scatters, over the probability of its choice; and what that part is.
+    /// The f of the chosen part over the probability of the choice, and the resulting origin.
     fn of_part(&self, drawn: &Resampled) -> (Rgb, Origin) {
         let Some(part) = self.part else { return (drawn.f, Origin::Caustic) };
         let Some(rest) = part.rest else { return (drawn.f, Origin::Diffuse) };

@@ -1,4 +1,4 @@
-//! What a rendering works on: a world, its settings, and what these prepare.
+//! A render job: a world with its settings, and the data derived from both.
 
 use super::{PixelSamples, SampleCountMap, Scene, World};
 use crate::accel::Hit;
@@ -9,40 +9,44 @@ use crate::settings::{IntegratorSettings, Settings};
 use lumiris_numbers::math::Rgb;
 use std::sync::Arc;
 
-/// A world with the settings that it is rendered by.
+/// A world with its render settings.
 pub struct RenderJob {
     /// Geometry, materials, lights, and ray tracers.
     pub world: World,
     settings: Settings,
     /// The lights, with the light sampler and the visibility cache.
     pub lights: LightSampling,
-    /// Irradiances of lights that are known in closed form.
+    /// Irradiances of lights in closed form.
     pub irradiances: Irradiances,
-    /// Sample counts of each pixel, if they are chosen per pixel.
+    /// Sample counts of each pixel, if they vary between pixels.
     pub sample_count_map: Option<SampleCountMap>,
-    /// Camera samples of each pixel, if their numbers differ.
+    /// Numbers of camera samples of each pixel, if they vary between pixels.
     pub pixel_samples: Option<PixelSamples>,
     lobes: usize,
-    /// Reflectance of the geometries that are nothing but meshes of one Lambertian reflectance.
+    /// Reflectance of geometries that are meshes with a constant Lambertian reflectance; `None` for others.
     plain: Vec<Option<Rgb>>,
-    /// Geometries that rays may pass: those of materials that are no surface, at least somewhere.
+    /// True for geometries that rays may pass: their material has no surface, at least in some points.
     may_pass: Vec<bool>,
     /// See [`Self::shadows_pass`].
     shadows_pass: bool,
 }
 
 impl RenderJob {
-    /// Prepares everything that needs no rays.
+    /// Prepares all data that needs no ray tracing.
     pub fn new(world: World, settings: Settings) -> Self {
         let i = &settings.integrator;
         let scene = &world.scene;
         let lobes = scene.materials.lobes(i.bsdf_density);
         let has_alpha = |geometry: GeometryId| scene.geometry.geometries[geometry as usize].alpha.is_some();
         let irradiances = Irradiances::new(&scene.lights, has_alpha);
+
+        // Geometries that rays may pass
         let plain = (0..scene.geometry.geometries.len() as GeometryId).map(|g| plain_reflectance(scene, g)).collect();
         let of_material = scene.materials.may_pass();
         let may_pass: Vec<bool> = scene.surfaces.iter().map(|s| of_material[s.material as usize]).collect();
         let shadows_pass = may_pass.contains(&true);
+
+        // Lights
         let choice = light_choice(i, shadows_pass);
         let lights = LightSampling::new(Arc::clone(&scene.lights), choice, max_groups(i, lobes));
         RenderJob {
@@ -59,7 +63,7 @@ impl RenderJob {
         }
     }
 
-    /// Prepares everything for other settings, as [`Self::new`] does; results of photons and pilots are dropped.
+    /// Prepares all data for other settings, as [`Self::new`] does. Results of photons and pilots are dropped.
     pub fn reset(&mut self, settings: Settings) {
         let i = &settings.integrator;
         self.settings = settings;
@@ -70,21 +74,21 @@ impl RenderJob {
         self.pixel_samples = None;
     }
 
-    /// The reflectance at a hit of a mesh in world space that does not emit, reflects the same everywhere, and has the same
-    /// medium on both sides.
+    /// The reflectance at a hit, if the geometry is a mesh in world space that does not emit, has a constant Lambertian
+    /// reflectance, and has the same medium on both sides.
     #[inline]
     pub fn plain_reflectance(&self, hit: &Hit) -> Option<Rgb> {
         if hit.instance == Hit::NO_INSTANCE { self.plain[hit.geometry as usize] } else { None }
     }
 
-    /// True if shadow segments may pass surfaces on their way: those that only bound a medium, and mixtures with them.
-    /// Without one, segments that begin in empty space stay there.
+    /// True if shadow segments may pass surfaces: interfaces between media, and mixtures with them. Otherwise, segments
+    /// that begin in vacuum stay in vacuum.
     #[inline]
     pub fn shadows_pass(&self) -> bool {
         self.shadows_pass
     }
 
-    /// True if rays may pass what they have hit: the material there may be no surface.
+    /// True if rays may pass the hit: its material may have no surface there.
     #[inline]
     pub fn may_pass(&self, hit: &Hit) -> bool {
         self.may_pass[hit.geometry as usize]
@@ -96,7 +100,7 @@ impl RenderJob {
         &self.settings
     }
 
-    /// Changes the settings, and what depends on them. The results of photons and pilots are kept.
+    /// Changes the settings and the data that depend on them. Results of photons and pilots are kept.
     pub fn change(&mut self, change: impl FnOnce(&mut Settings)) {
         let before = self.settings.integrator;
         change(&mut self.settings);
@@ -111,7 +115,7 @@ impl RenderJob {
         }
     }
 
-    /// Number of components of BSDFs in a mixture: the maximum number of lobes of any BSDF.
+    /// Number of BSDF components of a mixture: the maximum number of lobes of any BSDF.
     pub fn lobes(&self) -> usize {
         self.lobes
     }
@@ -126,8 +130,8 @@ impl RenderJob {
         self.lobes == MAX_LOBES
     }
 
-    /// Number of control variates over pixels: groups of lights, then the first of two lobes. The column of the last lobe
-    /// depends on these.
+    /// Number of control variates over pixels: one per light group, and one for the first of two lobes. The last lobe
+    /// is linearly dependent on these.
     pub fn controls(&self) -> usize {
         self.lights.groups.len() + usize::from(self.has_two_lobes())
     }
@@ -141,13 +145,13 @@ fn plain_reflectance(scene: &Scene, geometry: GeometryId) -> Option<Rgb> {
     (is_mesh && !is_between_media && !scene.lights.emits(geometry)).then_some(reflectance)
 }
 
-/// How lights are chosen. Segments that see into media that glow are those that pass boundaries.
+/// The choice of lights. Segments reach emitting media only by passing interfaces.
 fn light_choice(settings: &IntegratorSettings, shadows_pass: bool) -> LightChoice {
     let choice = settings.light_choice();
     LightChoice { glows: choice.glows && shadows_pass, ..choice }
 }
 
-/// Maximum number of groups of lights: the components of a mixture other than `lobes`.
+/// Maximum number of light groups: the components of a mixture without `lobes`.
 fn max_groups(settings: &IntegratorSettings, lobes: usize) -> usize {
     settings.ocv.max_components().saturating_sub(lobes).max(1)
 }

@@ -1,7 +1,7 @@
-//! A scene owns everything that is rendered, in vectors; what refers to something holds its index.
+//! A scene owns everything that is rendered, in vectors. References are indices.
 //!
-//! [`Scene`] is data, as an importer makes it; [`World`] is a scene with its ray tracers; [`RenderJob`] is a world with
-//! the settings that it is rendered by, and with what they prepare.
+//! [`Scene`] is the data from an importer. [`World`] is a scene with its ray tracers. [`RenderJob`] is a world with its
+//! render settings and the data derived from both.
 
 mod job;
 mod pixel_samples;
@@ -26,7 +26,7 @@ use crate::textures::TextureSet;
 use lumiris_numbers::math::{DVec3, Mat3, Rgb, Vec3};
 use std::sync::Arc;
 
-/// What is rendered.
+/// The input of a rendering.
 #[derive(Debug)]
 pub struct Scene {
     /// The camera.
@@ -37,31 +37,31 @@ pub struct Scene {
     pub textures: Arc<TextureSet>,
     /// All materials.
     pub materials: MaterialSet,
-    /// All shapes and their placement.
+    /// All shapes and their transforms.
     pub geometry: Arc<GeometrySet>,
     /// One per geometry of `geometry`.
     pub surfaces: Vec<Surface>,
     /// All lights.
     pub lights: Arc<LightSet>,
-    /// What is between surfaces.
+    /// Participating media.
     pub media: MediumSet,
-    /// What the file has in place of this scene and its camera.
+    /// Alternative cameras and scenes of the file.
     pub choices: Choices,
-    /// The point of the file's world that is the origin of the world which is rendered. It is near to the camera, so that f32
-    /// has bits for what that sees: see [`lumiris_numbers::math::origin`].
+    /// The point of the file's world space that becomes the origin of the rendered world. It is near the camera, so
+    /// that f32 coordinates are precise there: see [`lumiris_numbers::math::origin`].
     pub origin: DVec3,
 }
 
 /// Names of what a file lets people choose from, by their indices. A pbrt file has no choice.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Choices {
-    /// Cameras of the scene; empty for those without a name.
+    /// Names of the file's cameras; empty strings for unnamed ones.
     pub cameras: Vec<String>,
-    /// Scenes of the file; empty for those without a name.
+    /// Names of the file's scenes; empty strings for unnamed ones.
     pub scenes: Vec<String>,
-    /// The index of the camera that is shown, unless that is the first.
+    /// Index of the chosen camera; `None` for the first.
     pub camera: Option<usize>,
-    /// The index of the scene that is shown, unless that is the one of the file.
+    /// Index of the chosen scene; `None` for the file's default scene.
     pub scene: Option<usize>,
 }
 
@@ -70,7 +70,7 @@ pub struct Choices {
 pub struct Surface {
     /// Its material.
     pub material: MaterialId,
-    /// A readable name: the file or shape that it came from.
+    /// A readable name: the file or shape of origin.
     pub name: String,
     /// The media on its sides; `None` where both sides are in the same, whatever it is.
     pub sides: Option<Sides>,
@@ -89,12 +89,12 @@ pub struct FilmSettings {
     pub file_name: Option<String>,
     /// Factor from radiance to pixel value (ISO and exposure of the sensor); 1 by default.
     pub scale: f32,
-    /// White balance, a linear map of colours; `None` leaves them.
+    /// White balance, a linear map of colours; `None` leaves colours unchanged.
     pub balance: Option<Mat3>,
 }
 
 impl FilmSettings {
-    /// The colour that the film has for one of the scene.
+    /// Applies the white balance to a colour.
     #[inline]
     pub fn balanced(&self, c: Rgb) -> Rgb {
         self.balance.map_or(c, |balance| Rgb::from_array((balance * Vec3::from_array(c.to_array())).to_array()))

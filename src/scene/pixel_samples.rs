@@ -1,4 +1,4 @@
-//! Camera samples of each pixel, where pixels have different numbers.
+//! Numbers of camera samples, if they vary between pixels.
 
 use crate::film::PixelBounds;
 
@@ -7,26 +7,27 @@ use crate::film::PixelBounds;
 pub struct PixelSamples {
     /// The pixels.
     pub bounds: PixelBounds,
-    /// Samples per pixel that the numbers were made for: about their mean.
+    /// Number of samples per pixel that was asked for: approximately the mean of `counts`.
     pub spp: u32,
-    /// Numbers, row by row, at least 1.
+    /// Sample counts, row by row, at least 1.
     pub counts: Vec<u32>,
-    /// Camera rays of each sample that see lights directly, row by row, at least 1; if none are given, 1 everywhere. The path of
-    /// a sample begins with one of them.
+    /// Emission rays: camera rays per sample that measure the emission of directly visible lights, row by row, at least
+    /// 1. If the list is empty, the count is 1 everywhere. One of the rays continues as the path of the sample.
     pub looks: Vec<u8>,
 }
 
 impl PixelSamples {
-    /// Samples of a pixel when a pixel of the mean number would have `done` of [`Self::spp`]: an image that is stopped has
-    /// its samples distributed in the same way.
+    /// Number of samples of a pixel at the time when a pixel with the mean count has `done` of [`Self::spp`]. A stopped
+    /// image therefore has the same relative sample distribution.
     #[inline]
     pub fn until(&self, pixel: [u32; 2], done: u32) -> u32 {
         let all = u64::from(self.count(pixel));
         (all * u64::from(done)).div_ceil(u64::from(self.spp)).min(u64::from(u32::MAX)) as u32
     }
 
-    /// When sample `index` of a pixel is taken: the number of samples that a pixel of the mean number has by then, and in the
-    /// upper bits which of those it is that the pixel takes meanwhile. So samples of one turn are taken together.
+    /// Order of sample `index` of a pixel. The lower bits hold the number of samples that a pixel with the mean count
+    /// has by then. The upper bits count the samples that the pixel itself takes at that step. Samples of the same step
+    /// are processed together.
     #[inline]
     pub fn turn(&self, pixel: [u32; 2], index: u32) -> u32 {
         let all = u64::from(self.count(pixel));
@@ -34,12 +35,12 @@ impl PixelSamples {
         done ^ (index - self.until(pixel, done)) << 20
     }
 
-    /// All samples of a pixel.
+    /// Number of samples of a pixel.
     fn count(&self, pixel: [u32; 2]) -> u32 {
         self.counts[self.index(pixel)]
     }
 
-    /// Camera rays of each sample of a pixel.
+    /// Emission rays per sample of a pixel.
     #[inline]
     pub fn looks(&self, pixel: [u32; 2]) -> u32 {
         if self.looks.is_empty() { 1 } else { u32::from(self.looks[self.index(pixel)]) }
@@ -49,7 +50,7 @@ impl PixelSamples {
         (y - self.bounds.y0) as usize * self.bounds.width() as usize + (x - self.bounds.x0) as usize
     }
 
-    /// All samples of the image.
+    /// Number of samples of the image.
     pub fn total(&self) -> u64 {
         self.counts.iter().map(|&n| u64::from(n)).sum()
     }

@@ -1,10 +1,10 @@
-//! The best sample counts, pixel by pixel.
+//! The optimal sample counts of each pixel.
 
 use crate::film::PixelBounds;
 use crate::settings::SampleCounts;
 use lumiris_numbers::estimators::ris::choice::{Costs, counts};
 
-/// M/N of every pixel, with the same time per estimate in all [Talbot 2005, §4.3; Talbot et al. 2005, Fig. 3].
+/// M/N of every pixel, with equal time per estimate [Talbot 2005, §4.3; Talbot et al. 2005, Fig. 3].
 #[derive(Clone, Debug, PartialEq)]
 pub struct SampleCountMap {
     /// The pixels.
@@ -26,7 +26,7 @@ impl SampleCountMap {
         self.ratios[row + (x - self.bounds.x0) as usize]
     }
 
-    /// Sample counts of one estimate in a pixel, rounded up or down by `u` so that their expectations are right.
+    /// Sample counts of one estimate in a pixel, rounded stochastically by `u`, so that their expectations are exact.
     pub fn sample_counts(&self, pixel: [u32; 2], u: [f32; 2]) -> SampleCounts {
         let costs = Costs { t1: self.t1, t2: self.t2 };
         let counts = counts(f64::from(self.ratio(pixel)), costs, self.time, u);

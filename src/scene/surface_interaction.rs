@@ -1,4 +1,4 @@
-//! A surface interaction: a hit with what shading needs of it.
+//! A surface interaction: a hit with the data for shading.
 
 use super::RenderJob;
 use crate::accel::Hit;
@@ -12,11 +12,11 @@ use lumiris_numbers::math::{Ray, Vec2, Vec3};
 /// A ray's hit on a surface, with its differential geometry and texture footprint.
 #[derive(Clone, Copy, Debug)]
 pub struct SurfaceInteraction {
-    /// What was hit.
+    /// The hit.
     pub hit: Hit,
     /// The point on the surface.
     pub surface: SurfaceHit,
-    /// Unit direction to where the ray came from.
+    /// Unit direction towards the origin of the ray.
     pub wo: Vec3,
     /// Width of a pixel at the hit along the path (m).
     pub width: f32,
@@ -26,10 +26,11 @@ pub struct SurfaceInteraction {
 }
 
 impl SurfaceInteraction {
-    /// The first hit of `ray`. A pixel is `width` wide at its origin, and `spread` wider per unit length.
+    /// The interaction of the first hit of `ray`. A pixel is `width` wide at the ray's origin, and `spread` wider per
+    /// unit length.
     ///
-    /// Textures are filtered by the pixel that sees the point directly, whatever path comes here: light paths, photons and
-    /// shadow rays must meet the same surface as the camera paths with which they share light.
+    /// The texture footprint is the pixel that sees the point directly, for every kind of path. Light paths, photons
+    /// and shadow rays must evaluate the same surface as the camera paths that they are combined with.
     pub fn new(job: &RenderJob, ray: &Ray, (width, spread): (f32, f32), hit: &Hit) -> Self {
         let set = &job.world.scene.geometry;
         let surface = set.surface_hit_of_ray(hit.geometry, hit.primitive, hit.instance, hit.uv, ray);
@@ -48,7 +49,7 @@ impl SurfaceInteraction {
         SurfaceInteraction { hit: *hit, surface, wo: -ray.d.normalize(), width, distance, context }
     }
 
-    /// The BSDF at the hit; `None` where rays pass through.
+    /// The BSDF at the hit; `None` if rays pass the surface.
     pub fn scatter<'j>(&self, job: &'j RenderJob) -> Option<SurfaceBsdf<'j>> {
         let scene = &job.world.scene;
         let material = scene.surfaces[self.hit.geometry as usize].material;
@@ -56,13 +57,13 @@ impl SurfaceInteraction {
         Some(bsdf.proposed_by(job.settings().integrator.bsdf_density))
     }
 
-    /// True if what is hit is one of several materials, drawn by the direction that it is seen from.
+    /// True if the material is a mixture, from which the direction chooses one material.
     pub fn is_mixture(&self, job: &RenderJob) -> bool {
         let scene = &job.world.scene;
         scene.materials.is_mixture(scene.surfaces[self.hit.geometry as usize].material)
     }
 
-    /// How the index of the material depends on the wavelength, if it does.
+    /// The wavelength dependence of the material's index of refraction, if any.
     pub fn dispersion<'j>(&self, job: &'j RenderJob) -> Option<&'j Dispersion> {
         let scene = &job.world.scene;
         let material = scene.surfaces[self.hit.geometry as usize].material;
@@ -70,13 +71,13 @@ impl SurfaceInteraction {
         scene.materials.entries()[id as usize].dispersion.as_deref()
     }
 
-    /// The media on the sides of the surface, which a ray in `medium` meets.
+    /// The media on the sides of the surface, for a ray in `medium`.
     #[inline]
     pub fn sides(&self, job: &RenderJob, medium: Option<MediumId>) -> Sides {
         job.world.scene.surfaces[self.hit.geometry as usize].sides.unwrap_or(Sides::both(medium))
     }
 
-    /// What a ray of direction `d` in `medium` comes into where it passes the surface.
+    /// The medium that a ray of direction `d` in `medium` enters by passing the surface.
     #[inline]
     pub fn medium_beyond(&self, job: &RenderJob, d: Vec3, medium: Option<MediumId>) -> Option<MediumId> {
         self.sides(job, medium).towards(self.surface.n.dot(d))

@@ -14,7 +14,7 @@ use lumiris_numbers::math::{Ray, Vec2, Vec3};
 use std::sync::Arc;
 use strum::{EnumString, IntoStaticStr, VariantNames};
 
-/// Which ray tracer.
+/// The kind of ray tracer.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, EnumString, IntoStaticStr, VariantNames)]
 #[strum(serialize_all = "kebab-case")]
 pub enum AccelKind {
@@ -25,29 +25,29 @@ pub enum AccelKind {
     Bvh,
 }
 
-/// A scene and two ray tracers: over everything, and over emitters only.
+/// A scene and two ray tracers: over all geometry, and over emitters only.
 ///
-/// The second one determines what a BSDF sample would hit if nothing else were in the way, so that proposing candidates
-/// needs no visibility.
+/// The second ray tracer determines which emitter a BSDF sample would hit without occluders, so that proposing
+/// candidates needs no visibility.
 pub struct World {
     /// The scene.
     pub scene: Scene,
-    /// Everything.
+    /// Ray tracer over all geometry.
     pub accel: Box<dyn Accel>,
-    /// Emitters only; geometry ids are indices into `emitter_geometry`.
+    /// Ray tracer over emitters only; its geometry ids are indices into `emitter_geometry`.
     emitters: Option<Box<dyn Accel>>,
     emitter_geometry: Vec<GeometryId>,
-    /// The emitters, if they are few triangles without cut-outs.
+    /// The emitters, if they are a few triangles without alpha textures.
     few_emitters: Option<FewTriangles>,
-    /// False if no emitter can hide another.
+    /// False if no emitter can occlude another.
     emitters_hide: bool,
 }
 
-/// Number of triangles up to which a ray is tested with each of them: faster than a tree for it.
+/// Maximum number of triangles that a ray is tested with one by one, which is then faster than a tree.
 const MAX_FEW: usize = 32;
 
-/// Distance from the plane of a triangle, relative to coordinates, within which an exact test must decide whether a ray
-/// leaves the triangle or meets it: more than what the parameter in lanes is off, but for slivers.
+/// Distance of a ray's origin from the plane of a triangle, relative to coordinates, below which an exact test must
+/// decide whether the ray hits the triangle. Larger than the error of the vectorised parameter, except for slivers.
 const NEAR_PLANE: f32 = 1.0 / (1 << 13) as f32;
 
 /// Triangles with their unit normals, geometries and primitives.
@@ -56,7 +56,7 @@ struct FewTriangles {
     corners: Vec<[Vec3; 3]>,
     normals: Vec<Vec3>,
     places: Vec<(GeometryId, u32)>,
-    /// Their largest coordinate.
+    /// Their maximum coordinate.
     extent: f32,
 }
 
@@ -69,7 +69,7 @@ struct FewHit {
 }
 
 impl FewTriangles {
-    /// The triangles of all `ids`, if they are nothing else and few.
+    /// The triangles of all `ids`; `None` if there are other shapes or too many triangles.
     fn new(geometry: &GeometrySet, ids: &[GeometryId]) -> Option<Self> {
         let mut few = FewTriangles::default();
         for &id in ids {
@@ -88,8 +88,8 @@ impl FewTriangles {
         Some(few)
     }
 
-    /// The hit of ray `i` that [`Self::intersect`] has found. In lanes a ray that starts near a triangle may meet it by
-    /// rounding: there all triangles are tested exactly.
+    /// The hit of ray `i` according to [`Self::intersect`]. By rounding, the vectorised test may hit a triangle next to
+    /// the ray's origin; then all triangles are tested exactly.
     #[inline]
     fn hit(&self, scratch: &EmitterScratch, i: usize, ray: impl Fn() -> Ray) -> Option<FewHit> {
         let [t, b1, b2, triangle] = &scratch.columns;
@@ -114,7 +114,7 @@ impl FewTriangles {
         hits.reduce(|first, hit| if hit.t < first.t { hit } else { first })
     }
 
-    /// First hits of rays without end.
+    /// First hits of unbounded rays.
     fn intersect(&self, o: [&[f32]; 3], d: [&[f32]; 3], scratch: &mut EmitterScratch) {
         scratch.columns.iter_mut().for_each(|c| c.resize(o[0].len(), 0.0));
         let [t, b1, b2, triangle] = &mut scratch.columns;
@@ -187,12 +187,12 @@ impl World {
         Ok(World { scene, accel, emitters, emitter_geometry, few_emitters, emitters_hide })
     }
 
-    /// True if an emitter can hide another.
+    /// True if an emitter can occlude another.
     pub fn emitters_hide(&self) -> bool {
         self.emitters_hide
     }
 
-    /// For each segment, whether an emitter occludes it.
+    /// Determines for each segment if an emitter occludes it.
     pub fn occluded_by_emitters(&self, segments: &RayBatch, out: &mut Vec<bool>) {
         match &self.emitters {
             Some(emitters) => emitters.occluded(segments, Coherence::Incoherent, out),
@@ -203,7 +203,7 @@ impl World {
         }
     }
 
-    /// What each ray would hit first if there were only emitters.
+    /// First hits of the rays with emitters, ignoring all other geometry.
     pub fn intersect_emitters(&self, rays: &RayBatch, scratch: &mut EmitterScratch, out: &mut Vec<Option<EmitterHit>>) {
         out.clear();
         if let Some(few) = &self.few_emitters {
@@ -238,8 +238,8 @@ impl World {
         }));
     }
 
-    /// [`intersect_emitters`](Self::intersect_emitters) for the rays from `o` in the directions `d` without end, where
-    /// emitters are few: a function of the index of a ray and the ray. `None` elsewhere.
+    /// [`intersect_emitters`](Self::intersect_emitters) for unbounded rays with origins `o` and directions `d`: a
+    /// function of a ray's index and the ray. `None` if there are too many emitters.
     pub fn intersect_few_emitters<'a>(
         &'a self,
         o: [&[f32]; 3],

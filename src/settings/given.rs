@@ -1,10 +1,10 @@
-//! Settings that were given explicitly, on the command line, in a scene file or in Python, and which of them an image does
-//! not depend on.
+//! Settings that are given explicitly, on the command line, in a scene file or in Python, and the settings among them
+//! without effect on an image.
 
 use super::table::Setting;
 use super::{Settings, Value};
 
-/// Settings that were given, each with its last value.
+/// Explicit settings, each with its last value.
 #[derive(Clone, Debug, Default)]
 pub struct Given(Vec<GivenSetting>);
 
@@ -17,21 +17,21 @@ struct GivenSetting {
 }
 
 impl Given {
-    /// Adds a setting, which replaces what was given of it before. `text` is what messages call it, with its value, such as
+    /// Adds a setting, which replaces an earlier value. `text` is the setting with its value in messages, such as
     /// `--estimator ocv`.
     pub fn add(&mut self, row: &'static Setting, value: Value, text: String) {
         self.0.retain(|given| given.row.flag != row.flag);
         self.0.push(GivenSetting { row, value, text });
     }
 
-    /// Adds settings that were given later.
+    /// Adds later settings.
     pub fn extend(&mut self, later: Given) {
         later.0.into_iter().for_each(|given| self.add(given.row, given.value, given.text));
     }
 
-    /// A sentence for each setting that has no effect on an image. `asked` are its settings before the renderer has completed
-    /// and checked them, `used` those that it is rendered with. What was overridden, by another setting or by those of a part
-    /// that is continued, is left out.
+    /// Returns a sentence for each setting without effect on an image. `asked` are its settings before completion and
+    /// checks by the renderer; `used` are the settings of the rendering. Settings that are overridden, by another
+    /// setting or by a part that is continued, are left out.
     pub fn without_effect(&self, asked: &Settings, used: &Settings) -> Vec<String> {
         let in_force = self.0.iter().filter(|given| (given.row.get)(asked) == Some(given.value));
         in_force.filter_map(|given| given.without_effect(asked, used)).collect()
@@ -66,7 +66,7 @@ mod tests {
         (given, row, value)
     }
 
-    /// Values of a kind: all names, and the ends of a range.
+    /// Test values of a kind: all names, and the ends of a range.
     fn values(kind: &Kind) -> Vec<Value> {
         let texts: Vec<String> = match kind {
             Kind::Choice { names, .. } => names.iter().map(ToString::to_string).collect(),
@@ -86,8 +86,8 @@ mod tests {
         texts.iter().map(|text| kind.parse(text).unwrap()).collect()
     }
 
-    /// Metadata are what an image depends on: where a value of a setting is recorded as given, or is left to the renderer, it
-    /// has an effect, and otherwise that is said, once and by its name.
+    /// Metadata record all settings that the image depends on. If a value of a setting is recorded as given, or left to
+    /// the renderer, it has an effect. Otherwise exactly one message names it.
     #[test]
     fn every_value_of_every_setting_is_recorded_or_said_to_have_no_effect() {
         let mut counts = [0, 0];
@@ -133,7 +133,7 @@ mod tests {
         let mis = |s: &mut Settings| s.integrator.estimator = EstimatorKind::Mis;
         assert_eq!(line(|_| (), mis, "estimator", "ocv"), ["--estimator ocv has no effect on this image: mis is used"]);
         assert_eq!(line(|_| (), mis, "estimator", "auto"), [""; 0]);
-        // What asks for proposals fewer than samples
+        // Requests fewer proposals than samples
         let ris = |s: &mut Settings| {
             (s.integrator.estimator, s.integrator.samples) = (EstimatorKind::Ris, Some(8));
         };

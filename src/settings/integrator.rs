@@ -1,7 +1,7 @@
-//! Light transport: the integrator, and how direct light is estimated.
+//! Light transport: the integrator, and the estimator of direct light.
 //!
-//! Settings of other estimators than the chosen one are kept: options may come in any order. What the chosen one needs,
-//! `direct::Estimator` takes from here.
+//! Settings of other estimators than the chosen one are kept, so that options may come in any order.
+//! `direct::Estimator` extracts the settings of the chosen estimator.
 
 use super::photon_map::PhotonMapSettings;
 use super::ris::RisSettings;
@@ -16,23 +16,24 @@ use strum::{EnumString, IntoStaticStr, VariantNames};
 pub struct IntegratorSettings {
     /// The integrator.
     pub kind: IntegratorKind,
-    /// Maximum number of bounces; 1 is direct light. In records of `irradiance-cache` they are counted from the record.
+    /// Maximum number of bounces; 1 is direct light. `irradiance-cache` counts the bounces of a record from the record.
     pub max_depth: u32,
-    /// The bounce from which on paths end by Russian roulette on their throughput; `None`: they go on to `max_depth`.
+    /// The first bounce at which Russian roulette on the throughput may end a path; `None`: only `max_depth` ends
+    /// paths.
     pub roulette_depth: Option<u32>,
-    /// Edge of the blocks of pixels that share paths from their second diffuse vertex on; 1: none do. `None`: what `auto`
-    /// chooses, or 1.
+    /// Edge of the pixel blocks that share paths from their second diffuse vertex on; 1: no sharing. `None`: chosen by
+    /// `auto`, or 1.
     pub path_reuse: Option<u32>,
-    /// Light paths per camera sample that bring caustics; 0: none do. `None`: what `auto` chooses, or 0.
+    /// Light paths per camera sample for caustics; 0: none. `None`: chosen by `auto`, or 0.
     pub light_paths: Option<f32>,
-    /// Lights that name groups have layers of their own in the image.
+    /// True if light groups have layers of their own in the image.
     pub light_groups: bool,
     /// Direct-light estimator at each path vertex.
     pub estimator: EstimatorKind,
     /// Samples per estimate (N): shadow segments per shading point. `None` is the default of the estimator,
     /// [`Self::sample_counts`].
     pub samples: Option<u32>,
-    /// Samples per estimate at later vertices of a path than the first. `None`: as many as at the first; `ris` halves them
+    /// Samples per estimate at path vertices after the first. `None`: the number at the first vertex; `ris` halves it
     /// at every bounce.
     pub later_samples: Option<u32>,
     /// Weights of the techniques; see [`Self::heuristic`].
@@ -42,8 +43,8 @@ pub struct IntegratorSettings {
     pub bsdf_fraction: Option<f32>,
     /// The light sampler.
     pub light_sampler: LightSamplerKind,
-    /// Fraction of the light samples by a light tree that go to lights at infinity (0 to 1, exclusive). `None`: what `auto`
-    /// chooses, or as many to each as to all other lights together.
+    /// Fraction of the light samples that go to infinite lights beside a light tree (0 to 1, exclusive). `None`: chosen
+    /// by `auto`, or the same probability for each infinite light as for the whole tree.
     pub infinite_fraction: Option<f32>,
     /// Settings of `ris`.
     pub ris: RisSettings,
@@ -53,9 +54,9 @@ pub struct IntegratorSettings {
     pub photons: PhotonMapSettings,
     /// Settings of `ocv`.
     pub ocv: OcvSettings,
-    /// How `optimal-mis` determines its weights.
+    /// Source of the weights of `optimal-mis`.
     pub optimal_mis: OptimalForm,
-    /// What draws the samples of `correlated`.
+    /// Sampling technique of `correlated`.
     pub correlated_technique: SamplingTechnique,
     /// Settings of `contributing`.
     pub contributing: ContributingSettings,
@@ -104,8 +105,8 @@ impl IntegratorSettings {
         }
     }
 
-    /// The same with another integrator, as if it had been asked for by name: `direct` has one bounce, and others as many
-    /// as by default if there was only one.
+    /// The same settings with another integrator, as if it were chosen by name. `direct` has one bounce; others get the
+    /// default number of bounces if there was only one.
     #[must_use]
     pub fn of_kind(self, kind: IntegratorKind) -> Self {
         let max_depth = match kind {
@@ -122,32 +123,32 @@ impl IntegratorSettings {
         self.heuristic.unwrap_or(like.default_heuristic())
     }
 
-    /// Fraction of the samples drawn by BSDF sampling. That of `mis` lets a path continue by its only BSDF sample, which
-    /// costs no ray of its own; control variates need samples of all components, unless they correct those of `mis`.
+    /// Fraction of the samples drawn by BSDF sampling. `mis` continues a path by its only BSDF sample, which needs no
+    /// additional ray. Control variates need samples of all components, unless they correct the samples of `mis`.
     pub fn bsdf_fraction(&self) -> f32 {
         self.bsdf_fraction.unwrap_or(if self.is_like_mis() { 0.25 } else { 0.5 })
     }
 
-    /// How lights are chosen.
+    /// The choice of lights.
     pub fn light_choice(&self) -> LightChoice {
         let glows = self.finds_glows_at(0) && self.finds_glows_at(1);
         LightChoice { kind: self.light_sampler, infinite_fraction: self.infinite_fraction, glows }
     }
 
-    /// True if light samples at a path vertex, counted from 0, may look for what media send out: then the path is their only
-    /// BSDF sample, which finds it too.
+    /// True if light samples at a path vertex, counted from 0, may include the emission of media. The path is then
+    /// their only BSDF sample, which samples that emission too.
     fn finds_glows_at(&self, vertex: u32) -> bool {
         let is_mis = matches!(self.estimator, EstimatorKind::Auto | EstimatorKind::Mis);
         let samples = self.sample_counts_at(vertex).samples;
         is_mis && samples >= 2 && bsdf_samples(samples, self.bsdf_fraction()) == 1
     }
 
-    /// True if lights are chosen by a light tree, and those at infinity beside it.
+    /// True if lights are chosen by a light tree, with infinite lights beside it.
     pub fn has_light_tree(&self) -> bool {
         matches!(self.light_sampler, LightSamplerKind::Tree | LightSamplerKind::Photons)
     }
 
-    /// True if samples are drawn and weighted as `mis` does.
+    /// True if samples are drawn and weighted as in `mis`.
     fn is_like_mis(&self) -> bool {
         match self.estimator {
             EstimatorKind::Auto | EstimatorKind::Mis => true,
@@ -160,7 +161,7 @@ impl IntegratorSettings {
         }
     }
 
-    /// True if the throughput of a path decides whether it takes the bounce of this number, counted from 1.
+    /// True if Russian roulette on the throughput decides about this bounce, counted from 1.
     pub fn has_roulette(&self, bounce: u32) -> bool {
         self.roulette_depth.is_some_and(|first| bounce >= first)
     }
@@ -172,13 +173,13 @@ impl IntegratorSettings {
             || self.estimator == EstimatorKind::Ris && self.ris.target.uses_visibility_cache()
     }
 
-    /// True if non-contributing lights are left out, which is biased.
+    /// True if non-contributing lights are omitted, which is biased.
     pub fn leaves_lights_out(&self) -> bool {
         self.estimator == EstimatorKind::Contributing && self.contributing.noncontributing_samples() == 0
     }
 
-    /// Default number of samples per estimate. What is fixed in the cost of a shading point justifies four: with
-    /// `ris` anywhere, with `mis` where a camera sample has one. Powers of two are well distributed.
+    /// Default number of samples per estimate. Fixed costs of a shading point justify four: with `ris` always, with
+    /// `mis` if there is one shading point per camera sample. Powers of two are well distributed.
     fn default_samples(&self) -> u32 {
         match self.estimator {
             EstimatorKind::Mc => 2,
@@ -211,12 +212,12 @@ impl IntegratorSettings {
     }
 }
 
-/// Number of BSDF samples among `n` ≥ 2 samples, of which they are a fraction: at least one, as of light samples.
+/// Number of BSDF samples among `n` ≥ 2 samples, for the given fraction; at least one sample of each technique.
 pub fn bsdf_samples(n: u32, fraction: f32) -> u32 {
     ((n as f32 * fraction) as u32).clamp(1, n - 1)
 }
 
-/// What is computed.
+/// The integrator.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, EnumString, IntoStaticStr, VariantNames)]
 #[strum(serialize_all = "kebab-case")]
 pub enum IntegratorKind {
@@ -233,10 +234,10 @@ pub enum IntegratorKind {
 /// Irradiance caching [Ward et al. 1988; Ward and Heckbert 1992; Křivánek et al. 2008].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct IrradianceCacheSettings {
-    /// What records hold.
+    /// The content of records.
     pub cached: Cached,
-    /// κ: a record is used up to a distance of κR, R being the harmonic mean distance to the surfaces that it sees, and
-    /// up to a change of the normal by some √2·κ radians. The bias grows with it.
+    /// κ: a record is used up to a distance of κR, where R is the harmonic mean distance to the surfaces visible from
+    /// it, and up to a change of the normal by about √2·κ radians. The bias increases with κ.
     pub error: f32,
     /// Minimum and maximum radius of a record, in pixels projected onto its surface.
     pub radius: [f32; 2],
@@ -252,7 +253,7 @@ impl Default for IrradianceCacheSettings {
     }
 }
 
-/// What the records of the irradiance cache hold.
+/// The content of the records of the irradiance cache.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, EnumString, IntoStaticStr, VariantNames)]
 #[strum(serialize_all = "kebab-case")]
 pub enum Cached {
@@ -262,11 +263,11 @@ pub enum Cached {
     All,
 }
 
-/// How direct light is estimated.
+/// The estimator of direct light.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, EnumString, IntoStaticStr, VariantNames)]
 #[strum(serialize_all = "kebab-case")]
 pub enum EstimatorKind {
-    /// What a rule chooses from what the camera sees: `mis` or `contributing`, with numbers of samples.
+    /// Chosen by a rule from the hits of camera rays: `mis` or `contributing`, with sample counts.
     Auto,
     /// Light sampling only (and the specular lobes of BSDFs).
     Mc,
@@ -280,15 +281,15 @@ pub enum EstimatorKind {
     OptimalMis,
     /// Importance sampling by one technique, combined with correlated sampling [Szécsi, Sbert and Szirmay-Kalos 2004].
     Correlated,
-    /// Light sampling, separately of the contributing lights that the visibility cache finds and of all others [Keller
-    /// and Wald 2000, §3].
+    /// Light sampling, with separate samples of the contributing lights of the visibility cache and of all others
+    /// [Keller and Wald 2000, §3].
     Contributing,
 }
 
 impl EstimatorKind {
-    /// Default MIS heuristic of `mis`, and of the techniques that propose for `ris`. Resampling has minimal variance if
-    /// the proposals have, which the balance heuristic approximates; the power heuristic is better where all samples
-    /// are traced.
+    /// Default MIS heuristic of `mis`, and of the proposal techniques of `ris`. Resampling has minimal variance if the
+    /// proposals have minimal variance, which the balance heuristic approximates. The power heuristic is better if all
+    /// samples are traced.
     pub fn default_heuristic(self) -> Heuristic {
         match self {
             EstimatorKind::Ris | EstimatorKind::Ocv | EstimatorKind::OptimalMis => Heuristic::Balance,
@@ -300,13 +301,13 @@ impl EstimatorKind {
 /// Optimizing control variates [Fan et al. 2006].
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct OcvSettings {
-    /// How the coefficients are determined.
+    /// The samples that determine the coefficients.
     pub form: OcvForm,
     /// Maximum number of components of the mixture: BSDF lobes and groups of lights; `None`: as many as possible.
     pub components: Option<u32>,
 }
 
-/// What the coefficients of `ocv` are fitted to; see [`lumiris_numbers::estimators::ocv::Form`].
+/// The samples that `ocv` fits its coefficients to; see [`lumiris_numbers::estimators::ocv::Form`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, EnumString, IntoStaticStr, VariantNames)]
 #[strum(serialize_all = "kebab-case")]
 pub enum OcvForm {
@@ -326,7 +327,7 @@ impl OcvSettings {
     }
 }
 
-/// How `optimal-mis` finds its weights.
+/// Source of the weights of `optimal-mis`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, EnumString, IntoStaticStr, VariantNames)]
 #[strum(serialize_all = "kebab-case")]
 pub enum OptimalForm {
@@ -339,10 +340,10 @@ pub enum OptimalForm {
 /// Direct light with separate samples on contributing and non-contributing lights [Keller and Wald 2000, §3].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct ContributingSettings {
-    /// Samples on non-contributing lights (S_non), in addition to those of an estimate (S_con), if they are not the
+    /// Samples on non-contributing lights (S_non), in addition to the samples of an estimate (S_con); `None` for the
     /// default. 0 is biased.
     pub noncontributing_samples: Option<u32>,
-    /// BSDF samples where the BSDF is not diffuse (S_b), if they are not the default.
+    /// BSDF samples if the BSDF is not diffuse (S_b); `None` for the default.
     pub bsdf_samples: Option<u32>,
 }
 
@@ -352,7 +353,7 @@ impl ContributingSettings {
         self.noncontributing_samples.unwrap_or(2)
     }
 
-    /// BSDF samples where the BSDF is not diffuse.
+    /// BSDF samples if the BSDF is not diffuse.
     pub fn bsdf_samples(&self) -> u32 {
         self.bsdf_samples.unwrap_or(1)
     }
@@ -373,7 +374,7 @@ pub enum SamplingTechnique {
 pub struct SampleCounts {
     /// N.
     pub samples: u32,
-    /// M ≥ N; equal to N for estimators that trace what they propose.
+    /// M ≥ N; equal to N for estimators that trace all proposals.
     pub proposals: u32,
 }
 
@@ -385,7 +386,7 @@ impl SampleCounts {
         self.of_ratio((self.samples >> bounces.min(31)).max(1))
     }
 
-    /// This many samples, with as many proposals for each.
+    /// The given number of samples, with the same number of proposals for each.
     fn of_ratio(self, samples: u32) -> SampleCounts {
         let proposals = (u64::from(self.proposals) * u64::from(samples)).div_ceil(u64::from(self.samples.max(1)));
         SampleCounts { samples, proposals: proposals as u32 }

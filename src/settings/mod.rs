@@ -1,7 +1,7 @@
-//! Settings of an image: what is computed, how, and with which random numbers.
+//! Settings of an image: integrator, sampling, and random numbers.
 //!
-//! [`Settings`] is plain data, which the renderer reads. [`table`] has a row for each setting, with its names, range,
-//! default, help and where it applies; command line, scene-file parameters, metadata and `lumiris info` follow from it.
+//! [`Settings`] is plain data for the renderer. [`table`] has a row for each setting, with its names, range, default,
+//! help and applicability. The command line, scene-file parameters, metadata and `lumiris info` are derived from it.
 //!
 //! Reading order: [`integrator`], [`ris`], [`photon_map`], [`sampling`], [`value`], [`table`], [`given`].
 
@@ -25,7 +25,7 @@ pub use sampling::{Allocation, SamplingSettings};
 pub use table::Setting;
 pub use value::Value;
 
-/// Fewest camera samples per pixel of which pilots can tell how many pixels need.
+/// Minimum number of samples per pixel for adaptive sampling.
 pub const MIN_ADAPTIVE_SPP: u32 = 8;
 
 /// All settings of an image, except its size and filter, which belong to the film.
@@ -38,7 +38,7 @@ pub struct Settings {
 }
 
 impl Settings {
-    /// The biases of these settings: light that is left out of the image.
+    /// The biases of these settings: light missing from the image.
     pub fn biases(&self) -> Vec<&'static str> {
         let i = &self.integrator;
         let cuts_off = i.kind == IntegratorKind::PhotonMap && matches!(i.photons.storage, PhotonStorage::CutOff(_));
@@ -47,15 +47,14 @@ impl Settings {
         lights.into_iter().chain(photons).collect()
     }
 
-    /// Every setting that the image depends on, by its name in metadata. Where the renderer is to choose, it is its
-    /// choice.
+    /// Every setting that affects the image, by its name in metadata, with the choices of the renderer.
     pub fn recorded(&self) -> impl Iterator<Item = (&'static str, Value)> {
         let rows = table::rows().filter(|row| row.is_recorded && row.applies.to(self));
         rows.filter_map(|row| Some((row.key, (row.resolved.unwrap_or(row.get))(self)?)))
     }
 
-    /// True if pixels may have different numbers of camera samples: they are not fitted in blocks, and have enough samples for a
-    /// pilot.
+    /// True if the number of camera samples may vary between pixels. Pixels must not be fitted in blocks, and the
+    /// number of samples must suffice for a pilot.
     pub fn allows_adaptive(&self) -> bool {
         let i = &self.integrator;
         let is_progressive = match i.estimator {
@@ -68,7 +67,7 @@ impl Settings {
             && self.sampling.spp >= MIN_ADAPTIVE_SPP
     }
 
-    /// How camera samples are distributed over the pixels.
+    /// The distribution of camera samples over the pixels.
     pub fn allocation(&self) -> Allocation {
         match self.sampling.allocation {
             _ if self.sampling.noise.is_some() => Allocation::Adaptive,

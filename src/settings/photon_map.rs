@@ -7,7 +7,7 @@ pub struct PhotonMapSettings {
     pub photons: u32,
     /// q: the fraction of the photon paths that also fill the global map; all of them fill the caustic map.
     pub caustic_ratio: f32,
-    /// Which photons are stored.
+    /// The storage rule of photons.
     pub storage: PhotonStorage,
     /// Photons per estimate (k).
     pub nearest: u32,
@@ -42,14 +42,14 @@ impl Default for PhotonMapSettings {
     }
 }
 
-/// Which photons are stored [Keller and Wald 2000, §2].
+/// The storage rule of photons [Keller and Wald 2000, §2].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum PhotonStorage {
-    /// All.
+    /// All photons.
     All,
-    /// With probability p(x) by visual importance, but at least this. Unbiased.
+    /// With the probability p(x) of visual importance, but at least this. Unbiased.
     Floor(f32),
-    /// With probability p(x), but none where it is below this. Biased.
+    /// With probability p(x), or none if p(x) is below this. Biased.
     CutOff(f32),
 }
 
@@ -58,7 +58,7 @@ pub enum PhotonStorage {
 pub struct ProgressiveSettings {
     /// α, above 0 and below 1: near 0, variance decreases slowly and bias fast.
     pub alpha: f32,
-    /// Radius of the first pass (m); `None`: the distance of the `nearest` photons where the camera looks.
+    /// Radius of the first pass (m); `None`: the distance of the `nearest` photons at camera hits.
     pub radius: Option<f32>,
 }
 

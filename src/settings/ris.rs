@@ -3,14 +3,14 @@
 use lumiris_numbers::estimators::ris::choice::Costs;
 use strum::{EnumString, IntoStaticStr, VariantNames};
 
-/// What a proposal takes, T1, and a sample, T2, relative to each other. So M/N = T2/T1 = 3 [Talbot 2005, Eq. 4.4], which is the fixed
-/// ratio of the greatest mean efficiency in the scenes measured (`docs/measurements/efficiency`, "how many proposals").
+/// Relative costs of a proposal, T1, and of a sample, T2. M/N = T2/T1 = 3 [Talbot 2005, Eq. 4.4] is the fixed ratio
+/// with the greatest mean efficiency in the measured scenes (`docs/measurements/efficiency`, "how many proposals").
 pub const COSTS: Costs = Costs { t1: 1.0, t2: 3.0 };
 
 /// Resampled importance sampling [Talbot et al. 2005; Talbot 2005].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RisSettings {
-    /// How many proposals (M).
+    /// Number of proposals (M).
     pub proposals: Proposals,
     /// Resampling of the proposals.
     pub strata: Strata,
@@ -44,7 +44,7 @@ impl RisSettings {
 /// Choice of the number of proposals.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Proposals {
-    /// This many.
+    /// A fixed number.
     Fixed(u32),
     /// Three for each sample ([`COSTS`]).
     Auto,
@@ -58,7 +58,7 @@ pub enum Proposals {
 pub enum Strata {
     /// Independent draws with replacement [Talbot 2005, Eq. 4.1].
     None,
-    /// One draw from each of N strata of equally many proposals [Talbot 2005, §4.5.2.1].
+    /// One draw from each of N strata with equal numbers of proposals [Talbot 2005, §4.5.2.1].
     Proposals,
     /// One draw from each of N strata of nearly equal weight [Talbot 2005, §4.5.2.2].
     Weights,
@@ -66,7 +66,7 @@ pub enum Strata {
     Systematic,
 }
 
-/// How the proposals of light sampling lie on the lights.
+/// The distribution of light proposals over the lights.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, EnumString, IntoStaticStr, VariantNames)]
 #[strum(serialize_all = "kebab-case")]
 pub enum ProposalPoints {
@@ -82,13 +82,13 @@ pub enum ProposalPoints {
 pub enum Target {
     /// Luminance of f·G·L: everything but visibility.
     Fgl,
-    /// G·V: for surfaces and lights that are more expensive to evaluate than a ray is to trace.
+    /// G·V: for surfaces and lights that are more expensive to evaluate than tracing a ray.
     Gv,
-    /// G·V·L: for surfaces that are more expensive to evaluate than a ray is to trace.
+    /// G·V·L: for surfaces that are more expensive to evaluate than tracing a ray.
     Gvl,
     /// Luminance of f·G·L times an estimate of V for each light, from the visibility cache. Proposals are not traced.
     Visibility,
-    /// As `visibility`, with the estimate as a control variate: samples are drawn where it is in doubt.
+    /// As `visibility`, with the estimate as a control variate: samples are drawn where V is uncertain.
     VisibilityControl,
 }
 
@@ -101,7 +101,7 @@ impl Target {
         }
     }
 
-    /// True if the visibility cache takes part.
+    /// True if the target uses the visibility cache.
     pub fn uses_visibility_cache(self) -> bool {
         matches!(self, Target::Visibility | Target::VisibilityControl)
     }

@@ -1,4 +1,4 @@
-//! Random numbers, samples per pixel, and the footprints of textures that follow from them.
+//! Random numbers, samples per pixel, and the texture footprints that follow from them.
 
 use lumiris_numbers::samplers::SamplerKind;
 use strum::{EnumString, IntoStaticStr, VariantNames};
@@ -15,13 +15,13 @@ pub struct SamplingSettings {
     pub spp: u32,
     /// Images of different seeds are independent estimates of the same image.
     pub seed: u32,
-    /// Samples per pixel that texture footprints are computed for; `spp` if `None`.
+    /// Samples per pixel that texture footprints are computed for; `None` for `spp`.
     pub footprint_spp: Option<u32>,
-    /// Samples per pixel that pilots are made for; `spp` if `None`.
+    /// Samples per pixel that pilots are made for; `None` for `spp`.
     pub pilot_spp: Option<u32>,
-    /// How camera samples are distributed over the pixels.
+    /// Distribution of camera samples over the pixels.
     pub allocation: Allocation,
-    /// Relative standard error that every block of the image is to have; `spp` is then the maximum number of samples.
+    /// Target relative standard error of every block of the image; `spp` is then the maximum number of samples.
     pub noise: Option<f32>,
 }
 
@@ -34,8 +34,8 @@ pub enum Allocation {
     Auto,
     /// The same number for every pixel.
     Uniform,
-    /// More where a pilot finds more noise for the time; and for each of them more camera rays that see lights directly, where
-    /// that is most of the noise.
+    /// More samples in pixels where a pilot measures more noise per time. If directly visible lights cause most of the
+    /// noise, also more emission rays per sample.
     Adaptive,
 }
 
@@ -59,7 +59,7 @@ impl SamplingSettings {
         self.footprint_spp.unwrap_or(self.spp).max(1)
     }
 
-    /// Samples per pixel that pilots are made for: a pilot takes a part of their time.
+    /// Samples per pixel that pilots are made for: a pilot takes a fraction of their time.
     pub fn pilot_spp(&self) -> u32 {
         self.pilot_spp.map_or(self.spp, |n| n.min(self.spp)).max(1)
     }

@@ -1,10 +1,10 @@
-//! How an image is rendered, as one line in plain words.
+//! A one-line description of the rendering, in plain words.
 
 use super::{Allocation, EstimatorKind, IntegratorKind, SampleCounts, Settings};
 
 impl Settings {
-    /// How direct light is estimated, what pixels share, and how samples are distributed: one line for people. It is of the settings
-    /// alone, so that an image's metadata give the same line.
+    /// The estimator of direct light, path sharing, and the sample distribution, in one line. It depends only on the
+    /// settings, so that an image's metadata give the same line.
     pub fn summary(&self) -> String {
         let i = &self.integrator;
         let mut parts = vec![format!("direct light: {}", self.direct_light())];

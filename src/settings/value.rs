@@ -1,8 +1,8 @@
-//! Values of settings: their kinds and ranges, and how they are written.
+//! Values of settings: kinds, ranges, and notation.
 
 use std::fmt;
 
-/// What a setting is set to. [`fmt::Display`] writes what [`Kind::parse`] reads.
+/// The value of a setting. [`fmt::Display`] writes the notation that [`Kind::parse`] reads.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Value {
     /// One of a list of names.
@@ -34,7 +34,7 @@ impl Value {
         }
     }
 
-    /// The number; of a graded name its grade.
+    /// The number; for a graded name, its grade.
     pub fn real(&self) -> Option<f32> {
         match self {
             Value::Real(x) | Value::Graded(_, x) => Some(*x),
@@ -95,7 +95,7 @@ impl Interval {
         Interval { min, has_min: false, max, has_max: true }
     }
 
-    /// True if `x` lies in it; no NaN does.
+    /// True if `x` is in the interval; false for NaN.
     pub fn contains(&self, x: f32) -> bool {
         let above = x > self.min || self.has_min && x == self.min;
         above && (x < self.max || self.has_max && x == self.max)
@@ -115,7 +115,7 @@ impl fmt::Display for Interval {
     }
 }
 
-/// Whole numbers between two bounds, both included. The bound of the type itself is not written.
+/// Integers between two bounds, both included. The maximum of the type is not written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Integers {
     /// The lower bound.
@@ -128,7 +128,7 @@ impl Integers {
     /// All numbers of 32 bits.
     pub const ALL: Integers = Integers { min: 0, max: u32::MAX as u64 };
 
-    /// True if the upper bound is that of the numbers that are stored.
+    /// True if the upper bound is the maximum of the type.
     fn is_open(&self) -> bool {
         self.max >= u64::from(u32::MAX)
     }
@@ -146,7 +146,7 @@ impl fmt::Display for Integers {
     }
 }
 
-/// Values that a setting can have.
+/// The kind of values of a setting.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Kind {
     /// One of `names`. Scene files may also use pbrt's synonyms for them.
@@ -198,7 +198,9 @@ pub enum Kind {
 }
 
 impl Kind {
-    /// Reads a value from text. `Err` says what is expected.
+    /// Reads a value from text.
+    ///
+    /// Returns `Err` with the expected values if the text is invalid.
     pub fn parse(&self, text: &str) -> Result<Value, String> {
         let value = match self {
             Kind::Choice { names, .. } => named(names, text),
@@ -225,7 +227,7 @@ impl Kind {
             Kind::Bytes => bytes(text).map(Value::Integer),
         };
         value.ok_or_else(|| match self {
-            // Not said elsewhere, since it is no limit of what is sensible
+            // Only mentioned here, as it is not a sensible limit
             Kind::Integer { range, .. } if range.is_open() && text.parse().is_ok_and(|n: u64| n > range.max) => {
                 format!("expected a whole number from {} to {}", range.min, range.max)
             }
@@ -272,7 +274,7 @@ fn real_in(range: &Interval, text: &str) -> Option<f32> {
     text.trim().parse().ok().filter(|&x| range.contains(x))
 }
 
-/// A positive number, or as many percent.
+/// A positive number, possibly as a percentage.
 fn part(text: &str) -> Option<f32> {
     let percent = text.trim().strip_suffix('%');
     let part = percent.map_or_else(|| text.trim().parse().ok(), |n| Some(n.trim().parse::<f32>().ok()? / 100.0));

@@ -1,4 +1,4 @@
-//! Processor seconds for reading PLY meshes made by code, and the numbers of a pbrt file, on one thread.
+//! Processor time for reading generated PLY meshes, and the numbers of a pbrt file, on one thread.
 //!
 //! `cargo bench --bench ply -- [triangles in millions, default 10]`
 #![allow(clippy::print_stdout, missing_docs)]
@@ -12,14 +12,14 @@ use std::io::Write as _;
 use std::path::Path;
 use std::time::Instant;
 
-/// How a mesh is written.
+/// Layout of a mesh in the file.
 #[derive(Clone, Copy)]
 enum Layout {
     /// Positions, and lists `uchar, int`.
     Plain,
-    /// The same with normals, texture coordinates and a number behind each face.
+    /// The same with normals, texture coordinates, and a number after each face.
     Full,
-    /// As `Plain`, the high bytes first.
+    /// As `Plain`, in big-endian byte order.
     BigEndian,
     /// As `Plain`, with quads instead of pairs of triangles.
     Quads,
@@ -27,7 +27,7 @@ enum Layout {
     Ascii,
 }
 
-/// The header of a grid of so many cells and vertices, whose properties have these names.
+/// The header of a grid with the given numbers of cells and vertices, and the given property names.
 fn header(layout: Layout, [cells, vertices]: [u32; 2], names: &[&str]) -> Result<String, std::fmt::Error> {
     let format = match layout {
         Layout::Plain | Layout::Full | Layout::Quads => "binary_little_endian",
@@ -102,7 +102,7 @@ fn grid(layout: Layout, columns: u32, rows: u32) -> Result<Vec<u8>, std::fmt::Er
     Ok(out)
 }
 
-/// Seconds for which this thread ran, from the scheduler; without one, those of the clock on the wall.
+/// Processor time of this thread (s), from the scheduler; wall-clock time if that is unavailable.
 fn processor_seconds(start: Instant) -> f64 {
     let statistics = fs::read_to_string("/proc/thread-self/schedstat").ok();
     let nanoseconds = statistics.and_then(|s| s.split(' ').next()?.parse::<f64>().ok());
@@ -127,7 +127,7 @@ fn measure(name: &str, path: &Path) -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// Reads a list of `count` numbers as it stands in a pbrt file.
+/// Reads a list of `count` numbers in the notation of a pbrt file.
 fn measure_pbrt(count: u32) -> Result<(), Box<dyn Error>> {
     let mut text = String::from("[");
     for i in 0..count {

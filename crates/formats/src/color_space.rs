@@ -27,7 +27,7 @@ impl ColorSpace {
     /// The names of the format.
     pub const NAMES: [&str; 4] = ["srgb", "dci-p3", "rec2020", "aces2065-1"];
 
-    /// The space of a name.
+    /// The space with a name.
     pub fn from_name(name: &str) -> Option<Self> {
         let all = [ColorSpace::Srgb, ColorSpace::DciP3, ColorSpace::Rec2020, ColorSpace::Aces2065];
         Self::NAMES.iter().position(|n| *n == name).map(|i| all[i])
@@ -42,7 +42,7 @@ impl ColorSpace {
         }
     }
 
-    /// A colour of this space in linear Rec.709.
+    /// Converts a colour of this space to linear Rec.709.
     pub fn to_rec709(self, rgb: [f32; 3], of: Colored) -> Rgb {
         // All spaces have a conversion
         match rec709_from(&self.chromaticities(), of).filter(|_| self != ColorSpace::Srgb) {
@@ -52,17 +52,17 @@ impl ColorSpace {
     }
 }
 
-/// What a colour is of.
+/// The quantity of a colour.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Colored {
-    /// Light: that of the white of a space has its chromaticity.
+    /// Light: the white of a space has the chromaticity of its white point.
     Light,
-    /// A factor of light, such as a reflectance: equal numbers are grey in any space.
+    /// A factor of light, such as a reflectance: equal components are grey in any space.
     Factor,
 }
 
-/// Linear colours of the space of these chromaticities in linear Rec.709, through XYZ; those of factors with the white
-/// adapted by Bradford. `None` if there is no such space.
+/// Conversion from linear colours with these primaries to linear Rec.709, through XYZ. For factors, the white point is
+/// adapted by Bradford. `None` if the chromaticities are degenerate.
 pub fn rec709_from(chromaticities: &Chromaticities, of: Colored) -> Option<Mat3> {
     let xyz_from_rgb = xyz_from_rgb(*chromaticities);
     let xyz_from_rec709 = self::xyz_from_rgb(REC709);
@@ -75,7 +75,7 @@ pub fn rec709_from(chromaticities: &Chromaticities, of: Colored) -> Option<Mat3>
     (matrix.is_finite() && matrix.determinant() != 0.0).then_some(matrix)
 }
 
-/// True if the space of these chromaticities is Rec.709, to the digits that files give.
+/// True if these chromaticities are those of Rec.709, to the precision of files.
 pub fn is_rec709(chromaticities: &Chromaticities) -> bool {
     const ROUNDING: f64 = 1e-3;
     chromaticities.as_flattened().iter().zip(REC709.as_flattened()).all(|(a, b)| (a - b).abs() < ROUNDING)
@@ -83,11 +83,11 @@ pub fn is_rec709(chromaticities: &Chromaticities) -> bool {
 
 /// Cone responses of XYZ by rows [Lam 1985], called Bradford.
 const BRADFORD: [[f64; 3]; 3] = [[0.8951, 0.2664, -0.1614], [-0.7502, 1.7135, 0.0367], [0.0389, -0.0685, 1.0296]];
-/// Temperatures (K) of white that cameras know.
+/// White balance temperatures (K) of cameras.
 const TEMPERATURES: std::ops::RangeInclusive<f32> = 1000.0..=25_000.0;
 
-/// The map of linear Rec.709 that makes daylight of a correlated colour temperature (K) white, by scaling the responses of
-/// Bradford; below 4000 K, that of a black body. `None` below 1000 K and above 25,000 K. As in pbrt-v4.
+/// The map of linear Rec.709 that makes daylight of a correlated colour temperature (K) white, by scaling Bradford's
+/// cone responses; below 4000 K, a black body. `None` below 1000 K and above 25,000 K. As in pbrt-v4.
 pub fn white_balance(kelvin: f32) -> Option<Mat3> {
     if !TEMPERATURES.contains(&kelvin) {
         return None;
@@ -99,7 +99,7 @@ pub fn white_balance(kelvin: f32) -> Option<Mat3> {
     Some((rgb_from_xyz * adapted * xyz_from_rgb).as_mat3())
 }
 
-/// The map of XYZ that turns one white into another by scaling the responses of Bradford.
+/// The map of XYZ that adapts one white to another by scaling Bradford's cone responses.
 fn adaptation(from: DVec3, to: DVec3) -> DMat3 {
     let bradford = DMat3::from_cols_array_2d(&BRADFORD).transpose();
     bradford.inverse() * DMat3::from_diagonal((bradford * to) / (bradford * from)) * bradford
@@ -107,7 +107,7 @@ fn adaptation(from: DVec3, to: DVec3) -> DMat3 {
 
 /// XYZ of daylight with Y = 1 [CIE 15:2004]; `None` below 4000 K.
 fn daylight_xyz(kelvin: f32) -> Option<DVec3> {
-    // The second radiation constant has changed since: D65 is of 6504 K
+    // The second radiation constant has been revised since: D65 has 6504 K
     let t = f64::from(kelvin) * 1.4388 / 1.4380;
     let x = match t {
         ..4000.0 => return None,
@@ -118,7 +118,7 @@ fn daylight_xyz(kelvin: f32) -> Option<DVec3> {
     Some(DVec3::new(x / y, 1.0, (1.0 - x - y) / y))
 }
 
-/// The matrix whose columns are the primaries, scaled so that (1, 1, 1) is the white of Y = 1.
+/// The matrix whose columns are the primaries, scaled so that (1, 1, 1) is white with Y = 1.
 fn xyz_from_rgb(chromaticities: Chromaticities) -> DMat3 {
     let [r, g, b, white] = chromaticities.map(|[x, y]| DVec3::new(x / y, 1.0, (1.0 - x - y) / y));
     let primaries = DMat3::from_cols(r, g, b);
@@ -144,7 +144,7 @@ mod tests {
     fn the_white_of_aces_is_warmer_than_d65() {
         let white = ColorSpace::Aces2065.to_rec709([1.0; 3], Colored::Light);
         assert!(white.r > white.b && (white.luminance() - 1.0).abs() < 1e-3, "{white:?}");
-        // What is white of a surface is that under any light
+        // A white surface is white under any illuminant
         let white = ColorSpace::Aces2065.to_rec709([0.5; 3], Colored::Factor);
         assert!((white - Rgb::splat(0.5)).map(f32::abs).max_component() < 1e-5, "{white:?}");
     }
@@ -173,7 +173,7 @@ mod tests {
             assert!((white - white.y).abs().max_element() < 4e-3, "{kelvin} {white}");
             assert!((white.y - 1.0).abs() < 4e-3, "{kelvin} {white}");
         }
-        // D65 stays as it is, and colours other than white with it
+        // D65 is unchanged, and so are all colours under it
         let same = white_balance(6500.0).unwrap();
         assert!((same - Mat3::IDENTITY).to_cols_array().iter().all(|x| x.abs() < 4e-3), "{same}");
         // The published adaptation of XYZ from D50 to D65 [Lindbloom 2017]

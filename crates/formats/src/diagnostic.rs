@@ -1,7 +1,7 @@
 //! Errors and warnings of importers, with positions in the files they refer to.
 //!
-//! A run collects [`Diagnostic`]s in [`Diagnostics`]; at the end they become a [`Report`], which holds the formatted
-//! text and no longer needs the sources. Files that cannot be opened are gathered into one error.
+//! A run collects [`Diagnostic`]s in [`Diagnostics`]. At the end they become a [`Report`] of formatted text, which no
+//! longer needs the sources. All files that cannot be opened are a single error.
 
 use super::source::{Location, Position, SourceMap, Span};
 use codespan_reporting::diagnostic as codespan;
@@ -12,16 +12,17 @@ use std::fmt;
 use std::ops::Range;
 use std::path::PathBuf;
 
-/// Diagnostics of one severity that a report spells out; the rest is counted.
+/// Maximum number of diagnostics of one severity in a report; the rest is counted.
 const REPORT_LIMIT: usize = 100;
-/// Warnings of one kind that a report spells out.
+/// Maximum number of warnings of one kind in a report.
 const KIND_LIMIT: usize = 5;
-/// Diagnostics that are kept at all.
+/// Maximum number of diagnostics in memory.
 const KEEP_LIMIT: usize = 2000;
-/// Names that all unknown ones of a run are compared with: a scene of 10⁵ materials may miss them all.
+/// Maximum number of comparisons of unknown names with known ones per run, since a scene of 10⁵ materials may have as
+/// many unknown names.
 const COMPARISONS: usize = 200_000;
 
-/// How bad it is.
+/// Severity of a diagnostic.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Severity {
     /// The scene cannot be used.
@@ -30,10 +31,10 @@ pub enum Severity {
     Warning,
 }
 
-/// A remark on a place.
+/// A remark on a source position.
 #[derive(Clone, Debug)]
 pub struct Label {
-    /// The place.
+    /// The position.
     pub span: Span,
     /// The remark; may be empty.
     pub message: String,
@@ -42,13 +43,13 @@ pub struct Label {
 /// One error or warning.
 #[derive(Clone, Debug)]
 pub struct Diagnostic {
-    /// How bad it is.
+    /// Severity.
     pub severity: Severity,
     /// One sentence without a full stop.
     pub message: String,
     /// Positions; the first is the primary one.
     pub labels: Vec<Label>,
-    /// What the author may do about it.
+    /// A suggestion for the author.
     pub help: Option<String>,
 }
 
@@ -58,7 +59,7 @@ impl Diagnostic {
         Diagnostic { severity, message, labels, help: None }
     }
 
-    /// Sets the remark at the primary place.
+    /// Sets the remark at the primary position.
     pub fn remark(&mut self, message: impl Into<String>) -> &mut Self {
         if let Some(label) = self.labels.first_mut() {
             label.message = message.into();
@@ -66,7 +67,7 @@ impl Diagnostic {
         self
     }
 
-    /// Adds a second place.
+    /// Adds a second position.
     pub fn label(&mut self, span: Span, message: impl Into<String>) -> &mut Self {
         self.labels.push(Label { span, message: message.into() });
         self
@@ -79,7 +80,7 @@ impl Diagnostic {
     }
 }
 
-/// A file that could not be opened, and the position that refers to it.
+/// A file that could not be opened, and the source position of its name.
 #[derive(Clone, Debug)]
 struct MissingFile {
     path: PathBuf,
@@ -92,12 +93,12 @@ struct MissingFile {
 pub struct Diagnostics {
     list: Vec<Diagnostic>,
     missing: Vec<MissingFile>,
-    /// Places where a kind of warning was given, and how often it was not spelled out.
+    /// Positions of each kind of warning, and the number of warnings of the kind that were only counted.
     kinds: BTreeMap<String, (BTreeSet<(u32, u32)>, usize)>,
     errors: usize,
     dropped: usize,
     overflow: Option<Box<Diagnostic>>,
-    /// Names that unknown ones were compared with.
+    /// Number of comparisons of names so far.
     compared: usize,
 }
 
@@ -112,7 +113,7 @@ impl Diagnostics {
         self.push(Severity::Error, Some(span), message.into())
     }
 
-    /// Adds an error about a name that is not among the `known`, with the nearest of them as help.
+    /// Adds an error about a name that is not among the `known` ones, with the nearest of them as help.
     pub fn unknown<'a>(
         &mut self,
         span: Span,
@@ -127,12 +128,12 @@ impl Diagnostics {
         diagnostic
     }
 
-    /// Adds an error that has no place in a file, such as that of an option.
+    /// Adds an error without a position in a file, such as an error of an option.
     pub fn error_without_place(&mut self, message: impl Into<String>) -> &mut Diagnostic {
         self.push(Severity::Error, None, message.into())
     }
 
-    /// Adds a warning that has no place in a file.
+    /// Adds a warning without a position in a file.
     pub fn warning_without_place(&mut self, message: impl Into<String>) -> &mut Diagnostic {
         self.push(Severity::Warning, None, message.into())
     }
@@ -142,8 +143,8 @@ impl Diagnostics {
         self.push(Severity::Warning, Some(span), message.into())
     }
 
-    /// Adds a warning unless the same message was given for the same place; a message that comes up at many
-    /// places is spelled out for the first few only. Returns the warning if it is spelled out.
+    /// Adds a warning unless the same message was given for the same position. A message with many positions is only
+    /// recorded for the first few, and then counted. Returns the warning if it is recorded.
     pub fn warning_once(&mut self, span: Span, message: impl Into<String>) -> Option<&mut Diagnostic> {
         let message = message.into();
         let (places, more) = self.kinds.entry(message.clone()).or_default();
@@ -157,7 +158,7 @@ impl Diagnostics {
         Some(self.push(Severity::Warning, Some(span), message))
     }
 
-    /// Adds a warning the first time that its message comes up anywhere.
+    /// Adds a warning if its message is new.
     pub fn warning_first(&mut self, span: Span, message: impl Into<String>) -> Option<&mut Diagnostic> {
         let message = message.into();
         if self.kinds.contains_key(&message) {
@@ -167,7 +168,7 @@ impl Diagnostics {
         Some(self.push(Severity::Warning, Some(span), message))
     }
 
-    /// Notes a file that could not be opened; all of them become one error.
+    /// Records a file that could not be opened; all such files become one error.
     pub fn missing_file(&mut self, path: impl Into<PathBuf>, reason: impl fmt::Display, span: Option<Span>) {
         self.missing.push(MissingFile { path: path.into(), reason: reason.to_string(), span });
     }
@@ -182,7 +183,7 @@ impl Diagnostics {
         self.list.len() + self.dropped + usize::from(!self.missing.is_empty())
     }
 
-    /// True if nothing was said.
+    /// True if there are no diagnostics.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
@@ -245,11 +246,11 @@ impl Diagnostics {
 /// A finished diagnostic.
 #[derive(Clone, Debug)]
 pub struct Entry {
-    /// How bad it is.
+    /// Severity.
     pub severity: Severity,
     /// One sentence without a full stop.
     pub message: String,
-    /// The primary place.
+    /// The primary position.
     pub location: Option<Location>,
     /// The whole text with source lines and help, ending in a newline.
     pub rendered: String,
@@ -260,26 +261,26 @@ pub struct Entry {
 pub struct Report {
     /// Errors, then warnings.
     pub entries: Vec<Entry>,
-    /// Number of errors, with those not spelled out.
+    /// Number of errors, including those not in `entries`.
     pub errors: usize,
-    /// Diagnostics that are not spelled out.
+    /// Number of diagnostics that are not in `entries`.
     pub dropped: usize,
-    /// Warnings that came up at more places than are spelled out: (message, number of further places).
+    /// Warnings with more positions than `entries` has: (message, number of further positions).
     pub repeated: Vec<(String, usize)>,
 }
 
 impl Report {
-    /// The errors that are spelled out.
+    /// The errors in `entries`.
     pub fn errors(&self) -> impl Iterator<Item = &Entry> {
         self.entries.iter().filter(|e| e.severity == Severity::Error)
     }
 
-    /// The warnings that are spelled out.
+    /// The warnings in `entries`.
     pub fn warnings(&self) -> impl Iterator<Item = &Entry> {
         self.entries.iter().filter(|e| e.severity == Severity::Warning)
     }
 
-    /// True if nothing was said.
+    /// True if there are no diagnostics.
     pub fn is_empty(&self) -> bool {
         self.entries.is_empty()
     }
@@ -304,7 +305,7 @@ impl std::error::Error for Report {}
 
 fn entry(diagnostic: &Diagnostic, sources: &SourceMap) -> Entry {
     let mut excerpts = Excerpts::default();
-    // Bytes of a binary file mean nothing to a reader, and something else to a terminal
+    // Bytes of a binary file are not readable, and may control a terminal
     let (binary, text): (Vec<_>, Vec<_>) = diagnostic.labels.iter().partition(|l| sources.is_binary(l.span.file));
     let labels = text.into_iter().enumerate().map(|(i, label)| {
         let style = if i == 0 { codespan::LabelStyle::Primary } else { codespan::LabelStyle::Secondary };
@@ -324,29 +325,29 @@ fn entry(diagnostic: &Diagnostic, sources: &SourceMap) -> Entry {
     let config = term::Config { chars: term::Chars::ascii(), ..term::Config::default() };
     let rendered = term::emit_into_string(&config, &excerpts, &text)
         .unwrap_or_else(|error| format!("{}: cannot be shown: {error}\n", diagnostic.message));
-    // Lines of source end in blanks where nothing is marked.
+    // Remove trailing blanks of source lines.
     let mut rendered: String = rendered.trim_end().lines().flat_map(|line| [line.trim_end(), "\n"]).collect();
     rendered.push('\n');
     let location = diagnostic.labels.first().map(|l| sources.locate(l.span));
     Entry { severity: diagnostic.severity, message: diagnostic.message.clone(), location, rendered }
 }
 
-/// A remark on a place in a binary file.
+/// A remark on a position in a binary file.
 fn remark_on_binary(label: &Label, sources: &SourceMap) -> String {
     let separator = if label.message.is_empty() { "" } else { ": " };
     format!("in {}{separator}{}", sources.locate(label.span), label.message)
 }
 
-/// Characters of a source line that are shown on each side of the marked place.
+/// Maximum number of characters of a source line on each side of the marked range.
 const CONTEXT: usize = 100;
 
-/// The piece of a source line about a label, so that a line of megabytes is not printed.
+/// The part of a source line around a label, so that a line of megabytes is not printed.
 struct Excerpt {
     name: String,
     text: String,
     line: usize,
     first_column: usize,
-    /// Identity: file and start of the shown bytes.
+    /// Identity: file and start of the excerpt.
     key: (u32, usize),
 }
 
@@ -354,7 +355,7 @@ struct Excerpt {
 struct Excerpts(Vec<Excerpt>);
 
 impl Excerpts {
-    /// Makes the excerpt of `span` and returns its id and the marked range in it.
+    /// Adds the excerpt of `span` and returns its id and the marked range in it.
     fn add(&mut self, sources: &SourceMap, span: Span) -> (usize, Range<usize>) {
         let bytes = sources.bytes(span.file);
         let start = (span.start as usize).min(bytes.len());
@@ -382,7 +383,7 @@ impl Excerpts {
     }
 }
 
-/// Text that prints on one line: control characters and broken UTF-8 become visible substitutes.
+/// Single-line text: control characters and invalid UTF-8 become visible substitutes.
 fn clean(bytes: &[u8]) -> String {
     String::from_utf8_lossy(bytes)
         .chars()
@@ -427,17 +428,17 @@ impl<'a> Files<'a> for Excerpts {
     }
 }
 
-/// The known word nearest to `word` if it is near enough to be what was meant.
+/// The nearest known word to `word`, if it is near enough to be a misspelling.
 pub fn did_you_mean<'a>(word: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     let near = |candidate: &&str| edit_distance(&word.to_lowercase(), &candidate.to_lowercase());
     let best = known.into_iter().min_by_key(near)?;
     (near(&best) <= 1 + word.chars().count().min(best.chars().count()) / 4).then_some(best)
 }
 
-/// The known parameter that `name` was meant for: the one that differs by a slip of the pen, else the first whose last
-/// word, such as `roughness` of `specular_roughness`, is that of `name`, else one that is still near.
+/// The known parameter that `name` probably means: one that differs by a typing error; else the first with the same
+/// last word, such as `roughness` of `specular_roughness`; else one that is still near.
 pub fn similar_parameter<'a>(name: &str, known: impl Iterator<Item = &'a str> + Clone) -> Option<&'a str> {
-    /// Letters of the shortest word that says something.
+    /// Minimum length of a significant word.
     const SHORTEST: usize = 3;
     let last_word = |name: &str| name.rsplit(['_', '.', '-']).next().unwrap_or_default().to_lowercase();
     let is_slip = |candidate: &&str| edit_distance(&name.to_lowercase(), &candidate.to_lowercase()) <= 2;
@@ -447,7 +448,7 @@ pub fn similar_parameter<'a>(name: &str, known: impl Iterator<Item = &'a str> + 
     near.filter(is_slip).or_else(|| alike.next()).or(near)
 }
 
-/// Insertions, deletions, replacements and swaps of neighbours from `a` to `b` [Damerau 1964].
+/// Number of insertions, deletions, replacements and transpositions from `a` to `b` [Damerau 1964].
 fn edit_distance(a: &str, b: &str) -> usize {
     let (a, b): (Vec<char>, Vec<char>) = (a.chars().take(64).collect(), b.chars().take(64).collect());
     let mut rows: Vec<Vec<usize>> = vec![(0..=b.len()).collect()];

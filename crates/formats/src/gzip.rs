@@ -1,4 +1,4 @@
-//! gzip files: members one after the other, as `bgzip`, `pigz` and `cat a.gz b.gz` write them.
+//! gzip files: concatenated members, as `bgzip`, `pigz` and `cat a.gz b.gz` write them.
 
 use flate2::bufread::GzDecoder;
 use std::io::{self, BufRead, Read};
@@ -6,7 +6,8 @@ use std::io::{self, BufRead, Read};
 /// The first bytes of a gzip file.
 pub(crate) const MAGIC: [u8; 2] = [0x1f, 0x8b];
 
-/// The content of all members. Zeros behind the last one are padding, as for gzip itself; anything else there is an error.
+/// The content of all members. As in gzip itself, zeros after the last one are padding; anything else there is an
+/// error.
 pub(crate) struct Members<R> {
     /// `None` at the end.
     decoder: Option<GzDecoder<R>>,
@@ -32,7 +33,7 @@ impl<R: BufRead> Read for Members<R> {
     }
 }
 
-/// The reader at the next member, if there is one.
+/// The reader at the next member; `None` at the end.
 fn next_member<R: BufRead>(reader: Option<R>) -> io::Result<Option<R>> {
     let Some(mut reader) = reader else { return Ok(None) };
     loop {
@@ -61,7 +62,7 @@ mod tests {
         encoder.finish().unwrap()
     }
 
-    /// The content, read through a buffer that ends anywhere.
+    /// The content, read through a buffer that ends at arbitrary positions.
     fn content(file: &[u8]) -> io::Result<Vec<u8>> {
         let mut content = Vec::new();
         Members::new(BufReader::with_capacity(7, file)).read_to_end(&mut content).map(|_| content)

@@ -1,16 +1,16 @@
-//! Names that may be written in several Unicode normal forms: `ü` is one character or two. What looks the same is the same.
+//! Names in different Unicode normal forms: `ü` is one character or two. Names that look the same are equal.
 
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 use unicode_normalization::{UnicodeNormalization, is_nfc};
 
-/// A name in normal form C, by which names are compared.
+/// A name in normal form C, in which names are compared.
 pub fn nfc(name: &str) -> Cow<'_, str> {
     if is_nfc(name) { Cow::Borrowed(name) } else { Cow::Owned(name.nfc().collect()) }
 }
 
-/// The file of a name in a folder: as it is written, or else what is there under the same name in another normal form, as files
-/// that come from macOS are.
+/// The path of a named file in a folder: exactly as named, or else an existing file with the same name in another
+/// normal form, as files from macOS have.
 pub fn file_in(folder: &Path, name: &str) -> PathBuf {
     let path = folder.join(name);
     if name.is_ascii() || path.exists() {
@@ -22,7 +22,7 @@ pub fn file_in(folder: &Path, name: &str) -> PathBuf {
     })
 }
 
-/// An entry of a folder by its name in any normal form; the first, if there are several.
+/// An entry of a folder by its name in any normal form; the first one if there are several.
 fn entry_like(folder: &Path, name: &str) -> Option<PathBuf> {
     let folder = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
     let entries = std::fs::read_dir(folder).ok()?.flatten();
@@ -48,10 +48,10 @@ mod tests {
             let name = format!("{asked}/{asked}.png");
             assert_eq!(file_in(root.path(), &name), path);
             assert_eq!(file_in(Path::new("/elsewhere"), root.path().join(&name).to_str().unwrap()), path);
-            // What is not there keeps its name
+            // A missing file keeps its name
             assert_eq!(file_in(root.path(), "gr\u{fc}ner.png"), root.path().join("gr\u{fc}ner.png"));
         }
-        // As it is written goes first
+        // The exact name takes precedence
         let root = tempfile::tempdir().unwrap();
         FORMS.iter().for_each(|name| std::fs::write(root.path().join(name), "").unwrap());
         FORMS.iter().for_each(|name| assert_eq!(file_in(root.path(), name), root.path().join(name)));

@@ -1,12 +1,12 @@
 //! Fast parsing of decimal numbers from bytes.
 //!
-//! A number with at most 19 digits and a power of ten up to 22 is the nearest f64 after one operation [Clinger 1990]; an
-//! f32 is rounded from it, unless it is the midpoint of two f32, where the second rounding could go wrong. All other numbers
-//! take the slow, exact path of the standard library. So every result is the nearest f32 or f64.
+//! A number with at most 19 digits and a power of ten up to 22 is the nearest f64 after one operation [Clinger 1990].
+//! An f32 is rounded from it, except for the midpoint of two f32, where double rounding could be wrong. All other
+//! numbers take the slow, exact path of the standard library. Every result is therefore the nearest f32 or f64.
 
 use std::str::FromStr;
 
-/// Why bytes are no number.
+/// Errors of parsing a number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum NumberError {
     /// Not a number.
@@ -31,7 +31,7 @@ pub fn is_delimiter(byte: u8) -> bool {
 pub fn parse_f32(bytes: &[u8]) -> Result<(f32, usize), NumberError> {
     let (value, length) = scan(bytes)?;
     if let Some(value) = value {
-        // The middle between two f32 has exactly this tail; so do f32 subnormals' middles at other places.
+        // The midpoint of two f32 has exactly this tail; midpoints of f32 subnormals have it at other positions.
         let is_middle = value.to_bits() & 0x1fff_ffff == 0x1000_0000;
         if !is_middle && (value == 0.0 || (1e-37..1e38).contains(&value.abs())) {
             return Ok((value as f32, length));
@@ -40,7 +40,7 @@ pub fn parse_f32(bytes: &[u8]) -> Result<(f32, usize), NumberError> {
     slow::<f32>(&bytes[..length]).map(|value| (value, length))
 }
 
-/// As [`parse_f32`], with the precision of f64, and in the range of f32.
+/// As [`parse_f32`] in f64 precision, within the range of f32.
 #[inline]
 pub fn parse_f64(bytes: &[u8]) -> Result<(f64, usize), NumberError> {
     let (value, length) = scan(bytes)?;
@@ -51,7 +51,7 @@ pub fn parse_f64(bytes: &[u8]) -> Result<(f64, usize), NumberError> {
     if (value as f32).is_finite() { Ok((value, length)) } else { Err(NumberError::Overflow) }
 }
 
-/// The value of the number at the start of `bytes`, if it is the nearest f64 after one operation, and the number's length.
+/// The number at the start of `bytes` and its length; `None` unless it is the nearest f64 after one operation.
 #[inline]
 fn scan(bytes: &[u8]) -> Result<(Option<f64>, usize), NumberError> {
     let mut i = 0;
@@ -120,7 +120,7 @@ fn slow<T: FromStr + Copy + Into<f64>>(text: &[u8]) -> Result<T, NumberError> {
     if value.into().is_finite() { Ok(value) } else { Err(NumberError::Overflow) }
 }
 
-/// Reads the whole number at the start of `bytes`; returns it and its length. It ends at a delimiter.
+/// Reads the integer at the start of `bytes`; returns it and its length. It ends at a delimiter.
 #[inline]
 pub fn parse_i32(bytes: &[u8]) -> Result<(i32, usize), NumberError> {
     let negative = bytes.first() == Some(&b'-');
@@ -138,7 +138,7 @@ pub fn parse_i32(bytes: &[u8]) -> Result<(i32, usize), NumberError> {
     i32::try_from(value).map(|v| (v, i)).map_err(|_| NumberError::Overflow)
 }
 
-/// The numbers of a text file: between blanks or commas, with comments after `#`.
+/// The numbers of a text file, separated by blanks or commas, with comments after `#`.
 pub fn numbers_of_text(text: &str) -> Result<Vec<f32>, String> {
     let words = text.lines().flat_map(|line| line.split('#').next().unwrap_or("").split([' ', '\t', '\r', ',']));
     let number = |word: &str| match parse_f32(word.as_bytes()) {

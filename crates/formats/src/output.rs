@@ -1,8 +1,8 @@
-//! Atomic writing of files: either the whole file appears under its name, or the old one stays.
+//! Atomic writing of files: either the complete file appears under its name, or the old one remains.
 //!
-//! A name that is a symbolic link stands for the link's target, which is what is replaced. The new file has the owner and
-//! the mode of the old one, as far as the user may give them. A file without write permission is not replaced, though the
-//! folder would allow it: it was protected on purpose. What is no file (a pipe, a terminal, `/dev/stdout`) gets the bytes.
+//! A symbolic link stands for its target, which is replaced. The new file has the owner and mode of the old one, as far
+//! as permitted. A file without write permission is not replaced even if the folder would allow it, since it was
+//! protected on purpose. Pipes, terminals and devices such as `/dev/stdout` are written directly.
 
 use std::collections::BTreeSet;
 use std::fs::{File, Metadata};
@@ -11,21 +11,23 @@ use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use tempfile::{Builder, NamedTempFile};
 
-/// Symbolic links that may lead from one to the next, as many as Linux follows.
+/// Maximum number of chained symbolic links, as in Linux.
 const MAX_LINKS: usize = 40;
 
-/// What a name of an output stands for.
+/// The target of an output name.
 #[derive(Debug)]
 pub struct Destination {
     path: PathBuf,
-    /// Of the file that is there already.
+    /// Metadata of the existing file.
     earlier: Option<Metadata>,
-    /// True for what is no file, and is written to as it is.
+    /// True for targets other than files, which are written directly.
     is_stream: bool,
 }
 
 impl Destination {
-    /// Follows symbolic links. Fails for a file without write permission, for a folder, and where there is none to write to.
+    /// Follows symbolic links.
+    ///
+    /// Fails for a file without write permission, for a folder, and if the parent folder does not exist.
     pub fn of(path: &Path) -> io::Result<Destination> {
         let wrong = |kind, text: &str| Err(io::Error::new(kind, text));
         let (target, is_descriptor) = followed(path)?;
@@ -33,7 +35,7 @@ impl Destination {
         match &earlier {
             Some(earlier) if earlier.is_dir() => return wrong(ErrorKind::IsADirectory, "is a folder"),
             Some(earlier) if earlier.is_file() && !is_descriptor => {
-                // The mode counts even for root, whom the system would let write
+                // The mode is respected even for root, whom the system would let write
                 if earlier.permissions().readonly() {
                     return wrong(ErrorKind::PermissionDenied, "is read-only");
                 }
@@ -49,20 +51,20 @@ impl Destination {
         Ok(Destination { path: target, earlier, is_stream })
     }
 
-    /// The file, or what else it is, behind all links.
+    /// The target after all links.
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// True for what is no file: a pipe, a terminal, a device.
+    /// True for targets other than files: a pipe, a terminal, a device.
     pub fn is_stream(&self) -> bool {
         self.is_stream
     }
 
-    /// Makes the file `partial`, whose content is complete, ready to take the place of the earlier one: all of it is on the
-    /// disk, lest a crash leaves an empty file in place of a good one, and it has the owner and the mode of the other.
+    /// Prepares the complete file `partial` to replace the earlier one. Its content is flushed to disk, so that a crash
+    /// cannot leave an empty file, and it gets the owner and mode of the earlier one.
     fn prepare(&self, partial: &Path) -> io::Result<()> {
-        // Opened anew, for whoever wrote it by its name may have made it anew
+        // Reopened, since the writer may have recreated it by name
         File::open(partial)?.sync_all()?;
         let Some(earlier) = &self.earlier else { return Ok(()) };
         #[cfg(unix)]
@@ -70,7 +72,7 @@ impl Destination {
             use std::os::unix::fs::{MetadataExt, chown};
             let now = partial.metadata()?;
             if (now.uid(), now.gid()) != (earlier.uid(), earlier.gid()) {
-                // Only root may give a file away; the group may be another one of the user's
+                // Only root may change the owner; the group may be another one of the user's
                 let _ = chown(partial, Some(earlier.uid()), Some(earlier.gid()))
                     .or_else(|_| chown(partial, None, Some(earlier.gid())));
             }
@@ -78,17 +80,17 @@ impl Destination {
         std::fs::set_permissions(partial, earlier.permissions())
     }
 
-    /// Gives the place to a file beside it when all of that is on the disk, and waits until the disk knows the name, where
-    /// that can be.
+    /// Renames a file in the same folder to the target after its content is on disk, and waits until the folder is on
+    /// disk too, if possible.
     pub fn replace_by(&self, partial: &Path) -> io::Result<()> {
         self.prepare(partial)?;
         std::fs::rename(partial, &self.path)?;
-        // Some file systems refuse that for folders
+        // Some file systems do not support this for folders
         let _ = File::open(folder_of(&self.path)).and_then(|folder| folder.sync_all());
         Ok(())
     }
 
-    /// A file for what is on its way here, with the same extension: beside it, or in the temporary folder for a stream.
+    /// A partial file with the same extension: in the same folder, or in the temporary folder for a stream.
     fn partial(&self) -> io::Result<NamedTempFile> {
         let suffix = self.path.extension().map_or_else(String::new, |e| format!(".{}", e.to_string_lossy()));
         let mut builder = Builder::new();
@@ -104,8 +106,8 @@ fn folder_of(path: &Path) -> &Path {
     path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
 
-/// Where the symbolic links from `path` on end, whether something is there or not; true if that is an open file of a process,
-/// such as `/dev/stdout`: it has no name to rename another one to.
+/// The end of the chain of symbolic links from `path`, whether it exists or not. True for an open file of a process,
+/// such as `/dev/stdout`, which has no name to be replaced.
 fn followed(path: &Path) -> io::Result<(PathBuf, bool)> {
     let mut path = path.to_owned();
     for _ in 0..MAX_LINKS {
@@ -119,34 +121,34 @@ fn followed(path: &Path) -> io::Result<(PathBuf, bool)> {
     Err(io::Error::other("too many symbolic links"))
 }
 
-/// Fails for an output that [`Destination::of`] refuses. The error names the file.
+/// Fails for an output that [`Destination::of`] rejects. The error names the file.
 pub fn check_destination(path: &Path) -> io::Result<Destination> {
     Destination::of(path).map_err(|error| io::Error::new(error.kind(), format!("{}: {error}", path.display())))
 }
 
-/// Fails if an output cannot be written, before time is spent on making it. The error names the file.
+/// Checks that an output can be written, before time is spent on making it. The error names the file.
 pub fn check_writable(path: &Path) -> io::Result<()> {
     let destination = check_destination(path)?;
-    // As the file itself will be written; this one is gone at once
+    // Creates and removes a file in the same way as the output
     destination.partial().map(drop).map_err(|error| {
         let folder = folder_of(&destination.path).display();
         io::Error::new(error.kind(), format!("{}: nothing can be written to {folder}: {error}", path.display()))
     })
 }
 
-/// Temporary files and folders that there are now.
+/// Existing temporary files and folders.
 static TEMPORARY: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
 
 fn temporary() -> MutexGuard<'static, BTreeSet<PathBuf>> {
     TEMPORARY.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Until this is dropped, [`remove_temporary`] removes a file or folder.
+/// While this exists, [`remove_temporary`] removes a file or folder.
 #[derive(Debug)]
 pub struct Temporary(PathBuf);
 
 impl Temporary {
-    /// Of the file or folder with this path.
+    /// For the file or folder at this path.
     pub fn new(path: &Path) -> Self {
         temporary().insert(path.to_owned());
         Temporary(path.to_owned())
@@ -159,27 +161,27 @@ impl Drop for Temporary {
     }
 }
 
-/// Removes the temporary files and folders that there are now, for a program that ends without running destructors.
+/// Removes all existing temporary files and folders, for a program that ends without running destructors.
 pub fn remove_temporary() {
     remove_where(|_| true);
 }
 
 fn remove_where(is_chosen: impl Fn(&Path) -> bool) {
     for path in temporary().iter().filter(|path| is_chosen(path)) {
-        // Whoever made it may have removed it meanwhile
+        // The owner may have removed it meanwhile
         let _ = if path.is_dir() { std::fs::remove_dir_all(path) } else { std::fs::remove_file(path) };
     }
 }
 
-/// Writes a file. `write` gets another one beside it with the same extension, which takes the name when all of it is on
-/// the disk, and is removed if anything fails.
+/// Writes a file. `write` gets a partial file with the same extension in the same folder. It is renamed when its
+/// content is on disk, and removed after an error.
 pub fn write_whole(path: &Path, write: impl FnOnce(&mut NamedTempFile) -> io::Result<()>) -> io::Result<()> {
     let destination = Destination::of(path)?;
     let mut partial = destination.partial()?;
     let _temporary = Temporary::new(partial.path());
     write(&mut partial)?;
     if destination.is_stream {
-        // Opened anew, as below
+        // Reopened, as below
         let mut stream = File::options().append(true).open(&destination.path)?;
         io::copy(&mut File::open(partial.path())?, &mut stream)?;
         return Ok(());
@@ -221,7 +223,7 @@ mod tests {
     fn a_program_that_ends_at_once_leaves_no_temporary_files() {
         let folder = tempfile::tempdir().unwrap();
         let files = |path: &Path| std::fs::read_dir(path).unwrap().count();
-        // Those of other tests are needed
+        // Temporary files of other tests must remain
         let remove = || remove_where(|path| path.starts_with(folder.path()));
         let inner = tempfile::tempdir_in(folder.path()).unwrap().keep();
         std::fs::write(inner.join("image"), "").unwrap();
@@ -258,7 +260,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = |name: &str| folder.path().join(name);
         std::fs::create_dir(path("far")).unwrap();
-        // One after the other, one of them relative, and the last without a file
+        // A chain, one link of it relative, and the last one without a target
         symlink("b.txt", path("a.txt")).unwrap();
         symlink(path("far/c.txt"), path("b.txt")).unwrap();
         for text in ["first", "second"] {
@@ -285,7 +287,7 @@ mod tests {
         let mode = |mode| std::fs::set_permissions(&path, PermissionsExt::from_mode(mode)).unwrap();
         std::fs::write(&path, "first").unwrap();
         mode(0o640);
-        // Root gives files away
+        // Only root can change the owner
         let is_root = chown(&path, Some(1234), Some(1235)).is_ok();
         write_text(&path, "second").unwrap();
         let now = path.metadata().unwrap();
@@ -313,7 +315,7 @@ mod tests {
         check_writable(&full).unwrap();
         assert_eq!(write_text(&full, "text").unwrap_err().kind(), ErrorKind::StorageFull);
 
-        // As `/dev/stdout` is where a shell sends it to a file
+        // Like `/dev/stdout` when a shell redirects it to a file
         let open = File::create(&file).unwrap();
         let descriptor = format!("/dev/fd/{}", open.as_raw_fd());
         write_text(Path::new(&descriptor), "text").unwrap();

@@ -22,19 +22,19 @@ pub struct Span {
 }
 
 impl Span {
-    /// From the start of `self` to the end of `other`, if they are in one file; else `self`.
+    /// From the start of `self` to the end of `other`, if they are in the same file; else `self`.
     #[must_use]
     pub fn to(self, other: Span) -> Span {
         if self.file == other.file { Span { end: other.end.max(self.end), ..self } } else { self }
     }
 }
 
-/// A position as shown to users.
+/// A position for messages.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Location {
     /// Name of the file.
     pub name: String,
-    /// Where in the file.
+    /// Position in the file.
     pub position: Position,
 }
 
@@ -65,15 +65,15 @@ impl fmt::Display for Location {
 struct SourceFile {
     name: String,
     bytes: Arc<Vec<u8>>,
-    /// Line and column, from 0, of every byte at a multiple of [`STEP`]: a run may name places without number in a file
-    /// of one line.
+    /// Line and column, from 0, of every byte at a multiple of [`STEP`], since a file with a single line may have many
+    /// diagnostics.
     positions: OnceLock<Vec<(usize, usize)>>,
 }
 
-/// Bytes between positions that are kept.
+/// Distance of cached positions (bytes).
 const STEP: usize = 4096;
 
-/// Moves a line and a column, from 0, over bytes of text; a column is a character.
+/// Advances a line and a column, from 0, over bytes of text; a column is a character.
 fn advance((line, column): (usize, usize), bytes: &[u8]) -> (usize, usize) {
     let rest = bytes.iter().rposition(|&b| b == b'\n').map_or(bytes, |i| &bytes[i + 1..]);
     let column = if rest.len() == bytes.len() { column } else { 0 };
@@ -103,10 +103,10 @@ pub struct SourceMap {
     files: Vec<SourceFile>,
 }
 
-/// Bytes at the beginning of a file that tell whether it is text.
+/// Number of bytes at the beginning of a file that determine whether it is text.
 const HEAD: usize = 1024;
 
-/// Largest text that is read (bytes, after decompression): spans count in 32 bits.
+/// Maximum size of a text (bytes, after decompression): spans have 32 bits.
 const MAX_BYTES: u64 = u32::MAX as u64 - 1;
 
 impl SourceMap {
@@ -121,7 +121,7 @@ impl SourceMap {
         (self.files.len() - 1) as FileId
     }
 
-    /// Reads a file, decompressing it if it is a gzip file, of one member or several.
+    /// Reads a file, decompressing gzip files of one or several members.
     pub fn read(&mut self, path: &Path) -> io::Result<FileId> {
         let bytes = read_maybe_gzip(path)?;
         Ok(self.add_text(path.display().to_string(), bytes))
@@ -137,7 +137,7 @@ impl SourceMap {
         self.files.get(file as usize).map_or_else(Default::default, |f| Arc::clone(&f.bytes))
     }
 
-    /// The bytes of all files, in the order in which they were added.
+    /// The bytes of all files, in insertion order.
     pub fn texts(&self) -> impl Iterator<Item = &[u8]> {
         self.files.iter().map(|file| file.bytes.as_slice())
     }
@@ -147,14 +147,14 @@ impl SourceMap {
         self.files.get(file as usize).map_or("?", |f| &f.name)
     }
 
-    /// True for a file that is no text, since it begins with control characters, or is a binary container of glTF.
+    /// True for a file that is not text: it begins with control characters, or is a binary glTF container.
     pub fn is_binary(&self, file: FileId) -> bool {
         let bytes = self.bytes(file);
         let is_control = |b: &u8| *b < b' ' && !b.is_ascii_whitespace();
         bytes.starts_with(b"glTF") || bytes[..bytes.len().min(HEAD)].iter().any(is_control)
     }
 
-    /// Where a span starts.
+    /// Position of the start of a span.
     pub fn locate(&self, span: Span) -> Location {
         let name = self.name(span.file).to_owned();
         if self.is_binary(span.file) {
@@ -224,7 +224,7 @@ mod tests {
         assert_eq!(sources.bytes(file), b"WorldBegin\n# \xc3\xa4 b");
         let place = sources.locate(Span { file, start: 16, end: 17 });
         assert_eq!(place.position, Position::Text { line: 2, column: 5 });
-        // Two members, as bgzip and `cat a.gz b.gz` write them; so on the standard input
+        // Two members, as `bgzip` and `cat a.gz b.gz` write them; also from standard input
         let compressed = std::fs::read(&path).unwrap();
         let twice = compressed.repeat(2);
         std::fs::write(&path, &twice).unwrap();

@@ -32,12 +32,12 @@ impl Spectrum {
         Spectrum { lambda: lambda.to_vec(), value: value.to_vec() }
     }
 
-    /// The same value everywhere.
+    /// A constant spectrum.
     pub fn constant(value: f32) -> Self {
         Spectrum { lambda: vec![1.0, 1e5], value: vec![value; 2] }
     }
 
-    /// From the value at each nm of the range of the integrals.
+    /// From the value at each nm of the integration range.
     pub(super) fn per_nm(value: impl Fn(u32) -> f32) -> Self {
         let range = LAMBDA_MIN..=LAMBDA_MAX;
         Spectrum { lambda: range.clone().map(|l| l as f32).collect(), value: range.map(value).collect() }
@@ -69,7 +69,7 @@ impl Spectrum {
         }
     }
 
-    /// The tabulated optical constant of a name such as `metal-Cu-eta`, or the index of a glass.
+    /// The tabulated optical constant with a name such as `metal-Cu-eta`, or the index of a glass.
     pub fn named(name: &str) -> Option<Self> {
         let metal = |value: &[f32]| Spectrum::from_slices(data::METAL_LAMBDA, value);
         Some(match name {
@@ -94,7 +94,7 @@ impl Spectrum {
         })
     }
 
-    /// Names that [`Spectrum::named`] and [`illuminant_rgb`] know.
+    /// Names that [`Spectrum::named`] and [`illuminant_rgb`] accept.
     pub fn names() -> impl Iterator<Item = &'static str> {
         const METALS: [&str; 14] = [
             "metal-Ag-eta",
@@ -123,13 +123,13 @@ impl Spectrum {
                 let t = (lambda - self.lambda[before]) / (next - self.lambda[before]);
                 self.value[before] * (1.0 - t) + self.value[i] * t
             }
-            // The last sample itself belongs to the spectrum.
+            // The last sample is part of the spectrum.
             (Some(last), None) if lambda == self.lambda[last] => self.value[last],
             _ => 0.0,
         }
     }
 
-    /// The value at a wavelength (nm), continued beyond the ends of the table: optical constants do not end there.
+    /// The value at a wavelength (nm), extended by the end values: optical constants do not end at the table.
     pub fn at_clamped(&self, lambda: f32) -> f32 {
         match (self.lambda.first(), self.lambda.last()) {
             (Some(&first), Some(&last)) => self.at(lambda.clamp(first, last)),
@@ -137,7 +137,7 @@ impl Spectrum {
         }
     }
 
-    /// The value at the helium d line: the refractive index of a dielectric in a renderer without dispersion.
+    /// The value at the helium d line: the index of refraction of a dielectric without dispersion.
     pub fn at_d_line(&self) -> f32 {
         self.at(587.6)
     }
@@ -149,8 +149,8 @@ fn sellmeier(b: &[f64; 3], c: &[f64; 3], lambda: f64) -> f64 {
     (1.0 + b.iter().zip(c).map(|(b, c)| b * squared / (squared - c)).sum::<f64>()).sqrt()
 }
 
-/// What the channels of Rec.709 have of white light (D65) at each nm of a range, without negative parts; each channel adds up
-/// to 1.
+/// Responses of the Rec.709 channels to white light (D65) at each nm of a range, without negative parts; each channel
+/// sums to 1.
 pub fn white_responses() -> (std::ops::RangeInclusive<u32>, &'static [Rgb]) {
     static RESPONSES: OnceLock<Vec<Rgb>> = OnceLock::new();
     let responses = RESPONSES.get_or_init(|| {
@@ -161,7 +161,7 @@ pub fn white_responses() -> (std::ops::RangeInclusive<u32>, &'static [Rgb]) {
     (LAMBDA_MIN..=LAMBDA_MAX, responses)
 }
 
-/// Colour matching functions and illuminant at a wavelength of the integrals.
+/// Colour matching functions and illuminant over the integration range.
 struct Observer {
     /// x̄, ȳ, z̄ per nm of the range.
     bars: Vec<[f64; 3]>,
@@ -216,7 +216,7 @@ pub(super) fn rec709_matrix() -> [[f64; 3]; 3] {
     observer().rgb_from_xyz
 }
 
-/// (x̄, ȳ, z̄)·D65 at each nm of the range of the integrals, with ∫ȳ·D65 = 1.
+/// (x̄, ȳ, z̄)·D65 at each nm of the integration range, with ∫ȳ·D65 = 1.
 pub(super) fn d65_observer() -> impl Iterator<Item = [f64; 3]> {
     let o = observer();
     o.bars.iter().zip(&o.d65).map(|(bar, d)| bar.map(|b| b * d))
@@ -245,7 +245,7 @@ fn under_d65(f: impl Fn(f32) -> f64) -> [f64; 3] {
     to_rgb(xyz)
 }
 
-/// The colour that a reflectance shows under D65, in 0..=1.
+/// The colour of a reflectance under D65, clamped to 0..=1.
 pub fn reflectance_rgb(spectrum: &Spectrum) -> Rgb {
     unbounded_rgb(spectrum).clamp(0.0, 1.0)
 }
@@ -255,8 +255,8 @@ pub fn unbounded_rgb(spectrum: &Spectrum) -> Rgb {
     rgb(under_d65(|l| f64::from(spectrum.at(l)))).map(|c| c.max(0.0))
 }
 
-/// What the samples of a reflectance at wavelengths (nm) in increasing order contribute to linear Rec.709 under D65, if it
-/// is linear between them and the same beyond them. The weights of each channel add up to 1.
+/// Weights of the samples of a reflectance at wavelengths (nm) in increasing order, for linear Rec.709 under D65. The
+/// reflectance is linear between them and constant beyond them. The weights of each channel sum to 1.
 pub fn hat_weights(lambda: &[f32]) -> Vec<[f64; 3]> {
     let hat = |i: usize, l: f32| {
         let rise = |from: f32, to: f32| f64::from((l - from) / (to - from)).clamp(0.0, 1.0);
@@ -290,11 +290,11 @@ pub(super) fn blackbody_xyz(kelvin: f64) -> [f64; 3] {
     xyz_of(|l| planck(f64::from(l), kelvin))
 }
 
-/// ∫ȳ over wavelength (nm): luminance of a spectrum that is 1 everywhere, where it is not divided by this.
+/// ∫ȳ over wavelength (nm): the luminance of a spectrum of constant 1, if it is not normalised.
 pub const Y_INTEGRAL: f32 = 106.856_895;
 
-/// The colour of a black body of a temperature (K) scaled to Y = 1 by Planck's law; black for temperatures that are not
-/// positive.
+/// The colour of a black body at a temperature (K), scaled to Y = 1, by Planck's law; black for temperatures that are
+/// not positive.
 pub fn blackbody_rgb(kelvin: f32) -> Rgb {
     if kelvin.is_nan() || kelvin <= 0.0 {
         return Rgb::BLACK;
@@ -302,9 +302,9 @@ pub fn blackbody_rgb(kelvin: f32) -> Rgb {
     emission_of(|l| planck(f64::from(l), f64::from(kelvin)))
 }
 
-/// The colour of a black body whose radiance has its maximum over all wavelengths scaled to 1, so that hotter ones of the
-/// visible range are brighter; Y is [`Y_INTEGRAL`] for a spectrum that is 1 everywhere, as pbrt-v4 has it for what is
-/// not scaled to a luminance. Black for temperatures that are not positive.
+/// The colour of a black body whose spectral radiance has the maximum 1, so that hotter bodies appear brighter. Y is
+/// [`Y_INTEGRAL`] for a spectrum of constant 1, as in pbrt-v4 for emission without luminance normalisation. Black for
+/// temperatures that are not positive.
 pub fn glow_rgb(kelvin: f32) -> Rgb {
     if kelvin.is_nan() || kelvin <= 0.0 {
         return Rgb::BLACK;
@@ -358,12 +358,12 @@ const COS_75: f64 = 0.258_819_045_102_520_76;
 const COSINES: [f64; 6] =
     [1.0, std::f64::consts::FRAC_1_SQRT_2, 0.5, 0.342_020_143_325_668_7, COS_75, 0.087_155_742_747_658_17];
 
-/// Optical constants per channel that make an RGB renderer show the reflectance of the measured spectra.
+/// Optical constants per channel with which an RGB renderer reproduces the reflectance of the measured spectra.
 ///
-/// The reflectance spectrum is integrated to RGB under D65 at 0° and at 75°; for each channel that pair is matched
-/// exactly if a pair (η, k) can do so. The red of copper falls more steeply towards grazing angles than that of any
-/// (η, k): there the largest relative difference between 0° and 85° is made as small as can be. Saturated metals leave
-/// the gamut (the red of gold is 1.02); what is above 1 is clipped.
+/// The reflectance spectrum is integrated to RGB under D65 at 0° and at 75°. For each channel this pair is matched
+/// exactly if a pair (η, k) exists. The red of copper decreases more steeply towards grazing angles than any (η, k)
+/// allows: then the maximum relative difference between 0° and 85° is minimised. Saturated metals leave the gamut (the
+/// red of gold is 1.02); values above 1 are clipped.
 pub fn conductor_rgb(eta: &Spectrum, k: &Spectrum) -> (Rgb, Rgb) {
     let reflectance = |cos: f64| {
         under_d65(|l| fresnel_conductor(cos, f64::from(eta.at_clamped(l)), f64::from(k.at_clamped(l)).max(0.0)))
@@ -377,13 +377,13 @@ pub fn conductor_rgb(eta: &Spectrum, k: &Spectrum) -> (Rgb, Rgb) {
     (rgb(pairs.map(|p| p.0)), rgb(pairs.map(|p| p.1)))
 }
 
-/// The (η, k) whose reflectances at [`COSINES`] have the least largest relative difference to those given.
+/// The (η, k) whose reflectances at [`COSINES`] have the smallest maximum relative difference to the given ones.
 fn nearest_conductor(reflectances: [f64; 6]) -> (f64, f64) {
     const ETAS: i32 = 120;
     const NORMALS: i32 = 80;
     let (mut best, mut min) = ((1.0, 0.0), f64::INFINITY);
     for i in 0..=ETAS {
-        // η from 0.02 to 20, and the reflectance at 0° from 4 % below to 4 % above the one given.
+        // η from 0.02 to 20, and the reflectance at 0° within ±4 % of the given one.
         let eta = 0.02 * 1000f64.powf(f64::from(i) / f64::from(ETAS));
         for j in 0..=NORMALS {
             let normal = reflectances[0] * (1.0 + 0.04 * (2.0 * f64::from(j) / f64::from(NORMALS) - 1.0));
@@ -398,23 +398,23 @@ fn nearest_conductor(reflectances: [f64; 6]) -> (f64, f64) {
     best
 }
 
-/// k that gives the reflectance `normal` at 0° together with `eta`.
+/// The k that gives the reflectance `normal` at 0° together with `eta`.
 fn k_of(normal: f64, eta: f64) -> f64 {
     let (up, down) = (eta + 1.0, eta - 1.0);
     ((normal * up * up - down * down) / (1.0 - normal)).max(0.0).sqrt()
 }
 
-/// The (η, k) nearest to the index `typical` with the reflectances `normal` at 0° and `grazing` at 75°, if there is
-/// one.
+/// The (η, k) nearest to the index `typical` with the reflectances `normal` at 0° and `grazing` at 75°; `None` if there
+/// is none.
 fn fit_conductor(normal: f64, grazing: f64, typical: f64) -> Option<(f64, f64)> {
     const STEPS: i32 = 400;
     let root = normal.sqrt();
-    // k is real between these two.
+    // k is real in this interval.
     let (low, high) = ((1.0 - root) / (1.0 + root), (1.0 + root) / (1.0 - root));
     let eta_at = |i: i32| low * (high / low).powf(f64::from(i) / f64::from(STEPS));
     let error = |eta: f64| fresnel_conductor(COS_75, eta, k_of(normal, eta)) - grazing;
     let distance = |eta: f64| (eta / typical.max(1e-3)).ln().abs();
-    // Several indices may match: the one nearest to the measured index is meant.
+    // If several indices match, take the one nearest to the measured index.
     let mut best: Option<f64> = None;
     for i in 0..STEPS {
         let (mut a, mut b) = (eta_at(i), eta_at(i + 1));
@@ -449,7 +449,7 @@ mod tests {
             let (eta, k) = conductor_rgb(&curve("eta"), &curve("k"));
             assert!(eta.is_finite() && k.is_finite() && eta.r > 0.0, "{metal}: {eta:?} {k:?}");
         }
-        // Magnesium oxide is a clear crystal of index 1.74, in whatever shape its table comes.
+        // Magnesium oxide is a clear crystal of index 1.74, for any form of its table.
         let (eta, k) =
             conductor_rgb(&Spectrum::named("metal-MgO-eta").unwrap(), &Spectrum::named("metal-MgO-k").unwrap());
         let f0 = fresnel_conductor(1.0, f64::from(eta.g), f64::from(k.g));
@@ -468,7 +468,7 @@ mod tests {
         let white = o.bars.iter().zip(&o.d65).fold([0.0; 3], |s, (b, d)| add(s, b.map(|v| v * d)));
         let total: f64 = white.iter().sum();
         assert!((white[0] / total - 0.312_72).abs() < 2e-4 && (white[1] / total - 0.329_03).abs() < 2e-4, "{white:?}");
-        // The matrix is the well-known one of sRGB.
+        // The well-known matrix of sRGB.
         near(xyz_to_rgb([0.950_47, 1.0, 1.088_83]), [1.0; 3], 2e-3);
         near(xyz_to_rgb([0.412_456, 0.212_673, 0.019_334]), [1.0, 0.0, 0.0], 2e-3);
     }
@@ -507,7 +507,7 @@ mod tests {
                     let shown = fresnel_conductor(cos, f64::from(eta[c]), f64::from(k[c]));
                     (shown - reflectance(cos)[c].min(1.0)).abs()
                 };
-                // All channels have their pair but the red of gold, which is brighter than white.
+                // All channels match exactly except the red of gold, which is brighter than white.
                 assert_eq!(exact, !(metal == "Au" && c == 0), "{metal} {c}");
                 let (at_normal, at_grazing) = (error(1.0), error(COS_75));
                 let tolerance = if exact { 2e-4 } else { 0.006 };
@@ -528,7 +528,7 @@ mod tests {
         assert!(Spectrum::from_text("400 1 400 2").unwrap_err().contains("increase"));
         assert!(Spectrum::from_text("400 x").unwrap_err().contains("`x`"));
         assert!(Spectrum::from_text("").is_err());
-        // Of the catalogue
+        // Values of the catalogue
         for (glass, index) in [
             ("BK7", 1.51680),
             ("BAF10", 1.67003),

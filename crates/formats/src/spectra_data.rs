@@ -425,8 +425,8 @@ pub const TIO2_K: &[f32] = &[
     0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0,
 ];
 
-/// Coefficients B and C (µm²) of the index of glasses, n² = 1 + Σ B λ²/(λ² − C) [Sellmeier 1871], of Schott's catalogue
-/// (N- glasses, where there are), by pbrt's names.
+/// Coefficients B and C (µm²) of the index of glasses, n² = 1 + Σ B λ²/(λ² − C) [Sellmeier 1871], from Schott's
+/// catalogue (N- glasses if available), by pbrt's names.
 pub const GLASSES: &[(&str, [f64; 3], [f64; 3])] = &[
     ("glass-BK7", [1.039_612_12, 0.231_792_344, 1.010_469_45], [0.006_000_698_67, 0.020_017_914_4, 103.560_653]),
     ("glass-BAF10", [1.585_149_5, 0.143_559_385, 1.085_212_69], [0.009_266_812_82, 0.042_448_980_5, 105.613_573]),

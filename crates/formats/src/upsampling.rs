@@ -1,37 +1,39 @@
 //! Linear Rec.709 colours to smooth spectra.
 //!
-//! Of the many spectra that have a given colour under D65, pbrt-v4 takes the one of the family [Jakob and Hanika 2019]
+//! Of the many spectra with a given colour under D65, pbrt-v4 uses the one in the family [Jakob and Hanika 2019]
 //!
 //! ```text
 //! s(λ) = S(c0·λ² + c1·λ + c2),   S(x) = 1/2 + x / (2·sqrt(1 + x²)),
 //! ```
 //!
-//! which lies between 0 and 1 and has three coefficients for three channels. They are found by damped Gauss-Newton
-//! steps on the difference in CIELAB, whose cube roots keep dark channels as accurate as bright ones. The path to a
-//! colour starts at the grey of its largest channel, where the solution is known in closed form, and follows the
-//! straight line between the two, so that steep spectra of saturated colours are approached through flatter ones.
+//! which is between 0 and 1 and has three coefficients for three channels. They are computed by damped Gauss-Newton
+//! steps on the difference in CIELAB, whose cube roots keep dark channels as accurate as bright ones. The continuation
+//! path starts at the grey of the largest channel, where the solution has a closed form, and is a straight line to the
+//! colour. Steep spectra of saturated colours are therefore approached through flatter ones.
 
 use super::spectra::{LAMBDA_MAX, LAMBDA_MIN, Spectrum, d65_observer, rec709_matrix};
 use glam::{DMat3, DVec3};
 use lumiris_numbers::math::Rgb;
 
-/// Steps from grey to the colour.
+/// Continuation steps from grey to the colour.
 const CONTINUATION_STEPS: u32 = 16;
-/// Gauss-Newton steps for each of them.
+/// Gauss-Newton steps per continuation step.
 const NEWTON_STEPS: u32 = 30;
-/// Squared difference in CIELAB that ends a search: far below what rounding to f32 changes.
+/// Squared difference in CIELAB that ends the iteration: far below the effect of rounding to f32.
 const TOLERANCE: f64 = 1e-12;
 
-/// The spectrum between 0 and 1 that shows `rgb` (each channel in 0..=1) under D65 (dimensionless)
-/// [Jakob and Hanika 2019].
+/// The spectrum between 0 and 1 with the colour `rgb` (each channel in 0..=1) under D65 (dimensionless) [Jakob and
+/// Hanika 2019].
 ///
-/// Equal channels give a constant. A colour that no such spectrum shows gives the one that differs least in CIELAB.
+/// Equal channels give a constant. If no such spectrum has the colour, the result has the smallest difference in
+/// CIELAB.
 pub fn sigmoid_spectrum(rgb: Rgb) -> Spectrum {
     scaled_sigmoid(rgb, 1.0)
 }
 
 /// The spectrum of a non-negative quantity without upper bound, such as an index of refraction, given as a colour:
-/// m·s(λ), where m is twice the largest channel and s shows `rgb / m` (unit of `rgb`) [Pharr et al. 2023, §4.6].
+/// m·s(λ), where m is twice the largest channel and s has the colour `rgb / m` (unit of `rgb`) [Pharr et al. 2023,
+/// §4.6].
 pub fn unbounded_spectrum(rgb: Rgb) -> Spectrum {
     let scale = 2.0 * rgb.max_component();
     if scale > 0.0 && scale.is_finite() {
@@ -59,20 +61,20 @@ fn sigmoid_derivative(x: f64) -> f64 {
     0.5 / (y * y.sqrt())
 }
 
-/// The x of `sigmoid(x) = value`.
+/// The x for which `sigmoid(x) = value`.
 fn inverse_sigmoid(value: f64) -> f64 {
     (value - 0.5) / (value * (1.0 - value)).sqrt()
 }
 
-/// t², t, 1, where t runs from -1 to 1 over the range of the integrals: the polynomials are the same as those in λ, and
-/// the equations are well conditioned.
+/// t², t, 1, where t is linear from -1 to 1 over the integration range: the polynomials are the same as in λ, and the
+/// equations are well conditioned.
 fn powers(lambda: u32) -> DVec3 {
     let (first, last) = (f64::from(LAMBDA_MIN), f64::from(LAMBDA_MAX));
     let t = (2.0 * f64::from(lambda) - first - last) / (last - first);
     DVec3::new(t * t, t, 1.0)
 }
 
-/// CIE XYZ relative to the white of the colour space, channel by channel, to CIELAB, and the derivative of it.
+/// Converts CIE XYZ relative to the white of the colour space, by component, to CIELAB, with the derivative.
 fn cielab(relative: DVec3) -> (DVec3, DMat3) {
     const DELTA: f64 = 6.0 / 29.0;
     let cube_root = |t: f64| {
@@ -89,7 +91,7 @@ fn cielab(relative: DVec3) -> (DVec3, DMat3) {
     (lab, DMat3::from_cols(columns[0] * x.1, columns[1] * y.1, columns[2] * z.1))
 }
 
-/// What a spectrum shows, and how that changes with the coefficients.
+/// Evaluates the colour of a spectrum and its derivatives by the coefficients.
 struct Fit {
     /// (x̄, ȳ, z̄)·D65 per nm, relative to the white.
     weights: Vec<DVec3>,
@@ -129,7 +131,7 @@ impl Fit {
         cielab(shown).1 * derivative
     }
 
-    /// Levenberg-Marquardt from `c` to the coefficients that show `rgb`.
+    /// Levenberg-Marquardt iteration from `c` to the coefficients with the colour `rgb`.
     fn solve(&self, mut c: DVec3, rgb: DVec3) -> DVec3 {
         let target = cielab(self.relative_from_rgb * rgb).0;
         let mut residual = self.residual(c, target);
@@ -141,7 +143,7 @@ impl Fit {
             let j = self.jacobian(c);
             let (normal, gradient) = (j.transpose() * j, j.transpose() * residual);
             let diagonal = DVec3::new(normal.x_axis.x, normal.y_axis.y, normal.z_axis.z);
-            // Damp until the step makes the difference smaller.
+            // Increase the damping until the step reduces the difference.
             let better = (0..12).find_map(|_| {
                 let damped = normal + DMat3::from_diagonal(diagonal * damping);
                 let next = c - damped.inverse() * gradient;
@@ -176,7 +178,7 @@ mod tests {
     use super::super::spectra::{conductor_rgb, fresnel_conductor, to_rgb};
     use super::*;
 
-    /// What a spectral renderer shows of a product of D65 with `f`.
+    /// The colour of the product of D65 and `f` in a spectral renderer.
     fn shown(f: impl Fn(f32) -> f64) -> [f64; 3] {
         let sum = (LAMBDA_MIN..=LAMBDA_MAX)
             .zip(d65_observer())
@@ -204,7 +206,7 @@ mod tests {
         LEVELS.into_iter().flat_map(move |r| pairs().map(move |(g, b)| Rgb::new(r, g, b)))
     }
 
-    /// Relative difference of an image by channels to one by spectra.
+    /// Relative difference between RGB and spectral rendering.
     fn relative(by_channels: [f64; 3], by_spectra: [f64; 3]) -> [f64; 3] {
         [0, 1, 2].map(|c| by_channels[c] / by_spectra[c] - 1.0)
     }
@@ -253,11 +255,11 @@ mod tests {
         }
     }
 
-    // The numbers of docs/measurements/spectral-differences.md.
+    // Produces the numbers of docs/measurements/spectral-differences.md.
 
     const LIGHT: [f64; 3] = [17.0, 12.0, 4.0];
 
-    /// Relative difference of light by wall, by channels, to that by spectra.
+    /// Relative difference of interreflection between RGB and spectral rendering.
     fn lit_wall(wall: [f64; 3]) -> [f64; 3] {
         let light = unbounded_spectrum(Rgb::from_array(LIGHT.map(|c| c as f32)));
         let s = sigmoid_spectrum(Rgb::from_array(wall.map(|c| c as f32)));
@@ -274,7 +276,7 @@ mod tests {
     #[test]
     fn saturated_colours_differ_once_they_multiply_themselves() {
         const BALL: [f64; 3] = [0.243_117, 0.059_106, 0.000_849];
-        /// Diffuse reflectance of the inside of a dielectric surface of index 1.5.
+        /// Diffuse internal reflectance of a dielectric surface of index 1.5.
         const INSIDE: f64 = 0.596;
         let s = sigmoid_spectrum(Rgb::from_array(BALL.map(|c| c as f32)));
         let both = |f: fn(f64) -> f64| (BALL.map(f), shown(|l| f(f64::from(s.at(l)))));

@@ -1,4 +1,5 @@
-//! The closed form of a coat over a Lambertian base against the random walk, and the walk against an analog simulation.
+//! The closed form of a coat over a Lambertian base, compared with the random walk, and the walk compared with an
+//! analog simulation.
 
 use super::*;
 use crate::bsdfs::dielectric::Transport;
@@ -9,7 +10,7 @@ fn over_lambert(top: Dielectric, rho: f32, max_depth: u32) -> Layered {
     Layered { top, base, thickness: 0.01, albedo: Rgb::BLACK, g: 0.0, max_depth, samples: 1 }
 }
 
-/// Moments of f(wo, wi) over `n` directions that differ by rounding only, so that each seeds another walk.
+/// Moments of f(wo, wi) over `n` directions that differ only by rounding, so that each seeds another walk.
 fn walk_moments(layered: &Layered, wo: Vec3, wi: Vec3, n: u32) -> Welford {
     // Means of 64 walks are nearly normal and cost one evaluation each.
     let batch = Layered { samples: 64, ..*layered };
@@ -60,8 +61,8 @@ fn the_closed_form_is_the_mean_of_the_walk() {
     }
 }
 
-/// The walk as light makes it: enters, has up to `max_depth` events in the layer, and leaves. The weight of the path,
-/// and where it left.
+/// Analog simulation: light enters, has up to `max_depth` events in the layer, and leaves. Returns the exit direction,
+/// the weight of the path, and a flag for the mirror reflection.
 fn analog_walk(l: &Layered, wo: Vec3, s: &mut Pcg32) -> Option<(Vec3, Rgb, bool)> {
     let weight = |x: &BsdfSample| x.f * (x.wi.z.abs() / x.pdf);
     let all = dielectric::Select::All;

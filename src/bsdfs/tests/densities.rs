@@ -4,7 +4,7 @@ use super::*;
 use lumiris_numbers::estimators::stats::{chi_squared_test, sidak};
 use lumiris_test_support::power::by_power;
 
-/// Bins of the polar angle; there are twice as many of the azimuth.
+/// Number of bins of the polar angle; the azimuth has twice as many.
 fn thetas() -> usize {
     by_power(32, 16)
 }
@@ -43,7 +43,7 @@ fn integrate(f: &dyn Fn(f64, f64) -> f64, a: [f64; 2], b: [f64; 2], whole: f64, 
     cells.iter().zip(parts).map(|(&(a, b), part)| integrate(f, a, b, part, depth + 1)).sum()
 }
 
-/// Probability of each bin over the sphere, then that of no sample or a delta.
+/// Probability of each bin over the sphere, and last, of a failed sample or a delta.
 fn expected(pdf: &dyn Fn(Vec3) -> f32) -> Vec<f64> {
     let (thetas, phis) = (thetas(), phis());
     let f = |theta: f64, phi: f64| {
@@ -106,7 +106,7 @@ fn samples_follow_their_density_by_chi_squared() {
 
 #[test]
 fn the_chi_squared_test_finds_a_wrong_density() {
-    // A power: the same sampler against a density 3 % narrower in alpha must fail.
+    // Power of the test: the same sampler must fail against a density that is 3 % narrower in alpha.
     let (a, b) = (Bsdf::Conductor(gold(0.3, 0.3)), Bsdf::Conductor(gold(0.291, 0.291)));
     let wo = warp::direction(0.7, 1.0);
     let expected: Vec<f64> = expected(&|wi| b.pdf(wo, wi)).iter().map(|p| p * samples() as f64).collect();
@@ -115,7 +115,7 @@ fn the_chi_squared_test_finds_a_wrong_density() {
 
 #[test]
 fn the_first_lobe_is_sampled_in_proportion_to_its_part_of_the_density() {
-    // Given the direction, the probability that the first lobe drew it is its part of the density
+    // Given the direction, the probability that the first lobe sampled it is its fraction of the density
     let tables = tables();
     let mut of_two = 0;
     for (i, (name, b)) in zoo(&tables).iter().enumerate() {
@@ -144,7 +144,7 @@ fn the_first_lobe_is_sampled_in_proportion_to_its_part_of_the_density() {
 
 #[test]
 fn wide_lobes_find_every_direction_of_their_side() {
-    // ∫ cos θ/π = 1 by samples whose f may be black, with a bounded quotient
+    // ∫ cos θ/π = 1 by samples that include black f, with a bounded quotient
     let tables = tables();
     let mut all = zoo(&tables);
     let half = |albedo, coat| {

@@ -46,7 +46,7 @@ fn quadrature(bsdf: &Bsdf<'_>, wo: Vec3, l: impl Fn(Vec3) -> Rgb) -> [f64; 3] {
     sum
 }
 
-/// Light of all colours from all sides, brighter in one.
+/// Illumination of all colours from all directions, brighter in one.
 fn light(wi: Vec3) -> Rgb {
     Rgb::new(1.0 + wi.x, 0.3 + sqr(wi.y), 0.5 + 0.4 * wi.z)
 }
@@ -141,8 +141,8 @@ fn albedos_along_the_normal_have_their_closed_forms() {
 
 #[test]
 fn cook_torrance_keeps_what_its_facets_keep() {
-    // V-cavities hide no more than the projected area asks for: with F = 1 the albedo at normal incidence is 1 until
-    // facets are so steep that light strikes twice.
+    // V-cavities shadow only as much as the projected area requires: with F = 1 the albedo at normal incidence is 1,
+    // until facets are so steep that light is reflected twice.
     let albedo = |m, cos| {
         let model = CookTorrance::new(Rgb::BLACK, Rgb::WHITE, m, 1.0);
         quadrature(&evaluated(Model::CookTorrance(model)), warp::direction(cos, 0.0), |_| Rgb::WHITE)[0]
@@ -159,13 +159,13 @@ fn resampling_is_unbiased_for_every_bsdf() {
     let directions = [warp::direction(0.8, 0.6), warp::direction(-0.3, 2.5)];
     let significance = sidak(0.01, zoo.len() * directions.len() * 2 * 3);
     for (name, bsdf) in &zoo {
-        // By the name: what is added changes the numbers of no other
+        // Seeded by name, so that a new model changes no random numbers of others
         let of_name = name.bytes().fold(0, |seed: u32, byte| seed.wrapping_mul(31).wrapping_add(byte.into()));
         for (k, &wo) in directions.iter().enumerate() {
             let seed = of_name.wrapping_mul(64).wrapping_add(k as u32 * 32);
             let reference = match bsdf {
                 Bsdf::Evaluated(_) => None,
-                // Plain sampling, which no choice among proposals enters.
+                // Plain sampling, without a choice among proposals.
                 Bsdf::Diffuse(_)
                 | Bsdf::DiffuseTransmission(_)
                 | Bsdf::Conductor(_)
@@ -228,7 +228,7 @@ fn one_proposal_is_plain_importance_sampling() {
 
 #[test]
 fn resampled_directions_follow_the_target_in_the_limit() {
-    // With many proposals the mean of wi is that of the density f cos θ/∫ f cos θ, not that of the proposals.
+    // With many proposals, the mean of wi is the mean of the density f cos θ/∫ f cos θ, not the mean of the proposals.
     let bsdf = evaluated(Model::CosineLobe(CosineLobe::new(Rgb::BLACK, Rgb::WHITE, 20.0, LobeAxis::Mirror)));
     let wo = warp::direction(0.6, 0.0);
     let norm = quadrature(&bsdf, wo, |_| Rgb::WHITE)[0];

@@ -1,16 +1,16 @@
-//! Measured reflection: tables computed from a known BRDF must give it back.
+//! Measured reflection: tables computed from a known BRDF must reproduce it.
 
 use super::*;
 use lumiris_formats::bsdf_file::MeasuredBsdf;
 use lumiris_numbers::math::{Blend, PiecewiseBilinear2D, Vec2};
 use std::sync::LazyLock;
 
-/// How fine tables are.
+/// Resolution of the tables.
 #[derive(Clone)]
 struct Resolution {
     /// Azimuths of wo (radians).
     phi: Vec<f32>,
-    /// Number of polar angles of wo, which are closer to each other near the horizon.
+    /// Number of polar angles of wo, denser near the horizon.
     theta: usize,
     /// Columns and rows of normals.
     normals: [usize; 2],
@@ -18,7 +18,7 @@ struct Resolution {
     colors: [usize; 2],
 }
 
-/// What is measured: a metal over a Lambertian.
+/// The measured surface: a metal over a Lambertian.
 #[derive(Clone, Copy)]
 struct Sample {
     metal: Conductor,
@@ -41,7 +41,7 @@ impl Sample {
         w.z / self.metal.distribution.g1(w)
     }
 
-    /// The tables of a measurement without noise.
+    /// The tables of a noiseless measurement.
     fn measure(&self, resolution: &Resolution, is_relative: bool) -> MeasuredBsdf {
         let Resolution { phi, theta, normals, colors } = resolution.clone();
         let steps = theta as f32 - 1.0;
@@ -86,7 +86,7 @@ impl Sample {
                     self.f(wo, wi) * wi.z / if is_relative { facets } else { 1.0 }
                 };
                 let color: Vec<Rgb> = points(colors).map(color).collect();
-                // What samples of visible normals weigh
+                // The weight of samples of visible normals
                 let weight = |(u, c): (Vec2, &Rgb)| {
                     let m = turned(normal(warp.sample(&Blend::only(0), u).p));
                     let facets = distribution.d(m) / (4.0 * self.sigma(wo));
@@ -107,7 +107,7 @@ fn points([columns, rows]: [usize; 2]) -> impl Iterator<Item = Vec2> {
     (0..rows).flat_map(move |y| (0..columns).map(move |x| Vec2::new(part(x, columns), part(y, rows))))
 }
 
-/// The direction of a place in the square.
+/// The direction of a point of the square.
 fn normal(p: Vec2) -> Vec3 {
     let (theta, phi) = (p.x * p.x * 0.5 * PI, (2.0 * p.y - 1.0) * PI);
     Vec3::new(theta.sin() * phi.cos(), theta.sin() * phi.sin(), theta.cos())
@@ -145,13 +145,13 @@ static WHOLE: LazyLock<MeasuredTables> = LazyLock::new(|| {
     tables(Sample::new(0.3, 0.6), &coarse)
 });
 
-/// Coarse ones, whose densities have corners everywhere.
+/// Coarse tables, whose densities have discontinuous derivatives everywhere.
 pub(super) fn measured() -> [(&'static str, Measured<'static>); 3] {
     [("isotropic", &ISOTROPIC), ("quadrants", &QUADRANTS), ("whole", &WHOLE)]
         .map(|(name, t)| (name, Measured { tables: t }))
 }
 
-/// Mean and 99th percentile of |f − exact|/exact where neither direction is within 10° of the horizon.
+/// Mean and 99th percentile of |f − exact|/exact over directions that are at least 10° from the horizon.
 fn errors(tables: &MeasuredTables, sample: Sample) -> [f32; 2] {
     let measured = Bsdf::Measured(Measured { tables });
     let mut s = pcg32([8, 1, 6]);
@@ -184,7 +184,7 @@ fn tables_of_a_known_brdf_give_it_back() {
 
 #[test]
 fn finer_tables_are_nearer() {
-    // What is linear between points errs by the square of their distance
+    // Linear interpolation has errors of second order in the spacing
     let sample = Sample::new(0.3, 0.3);
     let coarse = Resolution { theta: 12, normals: [48, 48], colors: [32, 32], ..isotropic() };
     let [coarse, fine] = [coarse, isotropic()].map(|resolution| errors(&tables(sample, &resolution), sample)[0]);
@@ -226,8 +226,7 @@ fn azimuths_that_are_no_part_of_a_turn_are_an_error() {
     }
 }
 
-/// Directions wo and wi, and of the file of the demo f and density as Mitsuba 3.9.1 finds them
-/// (docs/measurements/measured-bsdf.py).
+/// For directions wo and wi: f and density in Mitsuba 3.9.1 of the demo file (docs/measurements/measured-bsdf.py).
 const OF_MITSUBA: [([f32; 3], [f32; 3], [f32; 4]); 8] = [
     ([-0.828386, -0.275919, 0.487489], [0.439946, 0.701722, 0.560388], [0.235547, 0.156173, 0.123015, 0.176165]),
     ([-0.246151, 0.419501, 0.873744], [0.485320, 0.785259, 0.384490], [0.083349, 0.053000, 0.036270, 0.039984]),

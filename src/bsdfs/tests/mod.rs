@@ -80,7 +80,7 @@ pub(super) fn zoo<'a>(tables: &'a [CoatTable]) -> Vec<(String, Bsdf<'a>)> {
     zoo
 }
 
-/// Fibres met at several offsets.
+/// Fibres at several offsets.
 pub(super) fn hair() -> [(&'static str, Hair); 4] {
     let lobes = |beta_m, beta_n, alpha| HairLobes { beta_m, beta_n, alpha };
     let brown = Hair::sigma_a_of_melanin(1.3, 0.2);
@@ -92,7 +92,7 @@ pub(super) fn hair() -> [(&'static str, Hair); 4] {
     ]
 }
 
-/// What the principled BSDF can be.
+/// Variants of the principled BSDF.
 pub(super) fn principled() -> [(&'static str, Principled); 9] {
     let plain = Principled {
         base_color: RED,
@@ -145,7 +145,7 @@ fn nothing_is_ever_nan_negative_or_infinite() {
         for i in 0..20_000 {
             let mut direction = || {
                 let w = warp::sample_uniform_sphere(s.random::<[f32; 2]>());
-                // Every third direction grazes, down to denormal cosines, and some lie on an axis or in the plane.
+                // Every third direction is grazing, down to denormal cosines; some lie on an axis or in the plane.
                 let z = match i % 6 {
                     0 => w.z * 10.0_f32.powi(-(1 + (i / 6) % 44)),
                     1 if i % 5 == 0 => return [Vec3::X, Vec3::Z, -Vec3::Z, Vec3::Y][i as usize / 30 % 4],
@@ -175,7 +175,7 @@ fn nothing_is_ever_nan_negative_or_infinite() {
 fn albedo_estimates_average_to_the_integral_of_f_times_the_cosine() {
     let tables = tables();
     let mut s = pcg32([4, 8, 15]);
-    // Wide lobes only, which directions that are uniform on the sphere meet often
+    // Wide lobes only, which uniform directions on the sphere often hit
     let wide = ["gold 0.4 0.1", "glass 0.3", "glass 0.6 0.2", "layered 5"];
     let is_wide = |name: &str| wide.contains(&name) || name.starts_with("evaluated");
     let tested: Vec<_> = zoo(&tables).into_iter().filter(|(name, _)| is_wide(name)).collect();
@@ -204,7 +204,7 @@ fn scattering_is_reciprocal() {
             continue; // Noisy; its mean is compared with analog walks instead.
         }
         if matches!(b, Bsdf::Hair(_)) {
-            continue; // Its attenuation is a function of θo alone [Chiang et al. 2016].
+            continue; // Its attenuation depends on θo only [Chiang et al. 2016].
         }
         if matches!(b, Bsdf::Measured(_)) {
             continue; // Tables are interpolated in one of both directions.
@@ -224,7 +224,7 @@ fn scattering_is_reciprocal() {
                 _ => 1.0,
             };
             if wo.z * wi.z < 0.0 {
-                // f(wo → wi)·η_i² is symmetric, η being absolute.
+                // f(wo → wi)·η_i² is symmetric, where η is absolute.
                 let eta2 = |w: Vec3| if w.z < 0.0 { sqr(eta) } else { 1.0 };
                 (a, c) = (a * eta2(wi), c * eta2(wo));
             }
@@ -243,7 +243,7 @@ fn no_bsdf_creates_energy() {
             let n = 40_000;
             for _ in 0..n {
                 if let Some(x) = b.sample(wo, s.random::<f32>(), s.random::<[f32; 2]>()) {
-                    // Radiance that is transmitted is scaled by the square of the index.
+                    // Transmitted radiance is scaled by the square of the index.
                     sum += f64::from(x.f.max_component() * x.wi.z.abs() / x.pdf * sqr(x.eta));
                 }
             }
@@ -285,7 +285,7 @@ fn furnaces_have_their_known_albedo() {
         }
         sum / 200_000.0
     };
-    // Smooth glass, thin glass and the absence of an interface lose nothing; a white Lambertian neither.
+    // Smooth glass, thin glass and an absent interface conserve energy, and so does a white Lambertian.
     for b in [
         Bsdf::Dielectric(glass(1.5, 0.0)),
         Bsdf::Dielectric(glass(1.0, 0.5)),
@@ -296,13 +296,13 @@ fn furnaces_have_their_known_albedo() {
         assert!((mean(&b, up) - 1.0).abs() < 1e-4, "{b:?}");
         assert!((mean(&b, -up) - 1.0).abs() < 1e-4, "{b:?}");
     }
-    // Rough glass loses what a second scattering would recover: little at low roughness.
+    // Rough glass loses the light of multiple scattering: little at low roughness.
     let rough = mean(&Bsdf::Dielectric(glass(1.5, 0.1)), up);
     assert!((0.99..1.0005).contains(&rough), "{rough}");
     // Thin sheet at normal incidence: R' = 2R/(1 + R).
     let r = lumiris_lanes::kernels::thin_dielectric::reflectance(1.0, 1.5);
     assert!((r - 2.0 * 0.04 / 1.04).abs() < 1e-6);
-    // A perfect mirror coated with nothing is a perfect mirror.
+    // A perfect mirror under an absent coat is a perfect mirror.
     let (eta, k) = Conductor::eta_k_of_reflectance(Rgb::splat(0.8));
     let mirror = Conductor { distribution: ggx(0.0, 0.0), eta, k };
     assert!((mean(&Bsdf::Conductor(mirror), Vec3::Z) - 0.8).abs() < 1e-3);
@@ -314,7 +314,7 @@ fn a_white_principled_surface_loses_nothing() {
     let white = |b: Principled| Principled { base_color: Rgb::WHITE, coat: 0.0, ..b };
     for (name, b) in principled().map(|(name, b)| (name, Bsdf::Principled(white(b)))) {
         if ["metal", "solid", "cloth", "velvet", "mixed"].contains(&name) {
-            // Anisotropic tables are approximate; refraction has no multiple scattering; sheen leaves less than is left
+            // Anisotropic tables are approximate; refraction has no multiple scattering; sheen does not conserve energy
             continue;
         }
         for cos in [0.1, 0.5, 1.0] {
@@ -330,7 +330,7 @@ fn a_white_principled_surface_loses_nothing() {
 
 #[test]
 fn a_fibre_without_absorption_loses_nothing() {
-    // Σ_p A_p = 1, and the lobes are normalised; the estimate by uniform directions knows nothing of the density
+    // Σ_p A_p = 1, and the lobes are normalised; uniform sampling makes the estimate independent of the density
     let mut s = pcg32([9, 4, 1]);
     for (beta_m, beta_n) in [(0.2, 0.4), (0.3, 0.3), (0.6, 0.9), (1.0, 1.0)] {
         for cos in [0.9, 0.3, -0.7] {

@@ -1,6 +1,7 @@
-//! Animations at a time: what they make of the nodes.
+//! Evaluates animations at a time.
 //!
-//! All animations of a file are played; where two move the same thing, as the clips of a character do, the first one counts.
+//! All animations of a file are played. If two animate the same property, as the clips of a character do, the first one
+//! takes precedence.
 
 use super::Messages;
 use glam::Quat;
@@ -8,7 +9,7 @@ use lumiris_formats::gltf::{Document, GltfError, Place};
 use lumiris_numbers::math::Vec3;
 use std::collections::HashMap;
 
-/// What animations say of a node.
+/// Animated properties of a node.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Change {
     pub(super) translation: Option<[f32; 3]>,
@@ -17,10 +18,10 @@ pub(super) struct Change {
     pub(super) weights: Option<Vec<f32>>,
 }
 
-/// By node.
+/// Changes by node.
 pub(super) type Changes = HashMap<usize, Change>;
 
-/// Between keys.
+/// Interpolation between keys.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Interpolation {
     Step,
@@ -28,7 +29,7 @@ enum Interpolation {
     CubicSpline,
 }
 
-/// Where a time is among the keys.
+/// Position of a time among the keys.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Position {
     key: usize,
@@ -38,7 +39,7 @@ struct Position {
     seconds: f32,
 }
 
-/// What the animations of a file say of its nodes at a time (s).
+/// The changes of the nodes by all animations at a time (s).
 pub(super) fn changes(document: &Document, time: f32, messages: &mut Messages<'_>) -> Result<Changes, GltfError> {
     let animations = document.root().key("animations");
     if animations.is_empty() {
@@ -83,16 +84,16 @@ pub(super) fn changes(document: &Document, time: f32, messages: &mut Messages<'_
     Ok(changes)
 }
 
-/// Numbers of keys and positions of a time among them, by the accessor of the times: many channels may have the same.
+/// Numbers of keys and the position of the time among them, by the accessor of the times, which channels may share.
 type Positions = HashMap<usize, (usize, Position)>;
 
 /// The keys of a sampler around a time.
 struct Track {
     interpolation: Interpolation,
     position: Position,
-    /// Numbers of each key.
+    /// Number of values of each key.
     numbers: usize,
-    /// All numbers of the key before the time, and of the next.
+    /// All values of the key before the time, and of the next.
     values: Vec<f32>,
 }
 
@@ -129,19 +130,19 @@ impl Track {
         Ok(track)
     }
 
-    /// Values of each number at a key: itself, and for splines the tangents before and after it.
+    /// Values per number at a key: one, and for splines also the tangents before and after it.
     fn per_key(&self) -> usize {
         if self.interpolation == Interpolation::CubicSpline { 3 } else { 1 }
     }
 
-    /// The `width` numbers of the key before the time (0) or of the next (1); `part` of a spline: tangent before, value,
-    /// tangent after.
+    /// The `width` numbers of the key before the time (0) or of the next (1). `part` of a spline: tangent before,
+    /// value, tangent after.
     fn key(&self, key: usize, part: usize, width: usize) -> &[f32] {
         let first = key * self.numbers + part * width;
         &self.values[first..first + width]
     }
 
-    /// The `width` numbers at the time.
+    /// The `width` numbers at the time, interpolated.
     fn at(&self, width: usize) -> Vec<f32> {
         let Position { fraction: s, seconds, .. } = self.position;
         let value = usize::from(self.interpolation == Interpolation::CubicSpline);
@@ -165,7 +166,7 @@ impl Track {
         }
     }
 
-    /// True if there are `width` numbers at each key.
+    /// Checks that there are `width` numbers at each key.
     fn has(&self, width: usize, sampler: &Place<'_>) -> Result<(), GltfError> {
         if self.numbers == self.per_key() * width {
             return Ok(());
@@ -179,7 +180,7 @@ fn vector(track: &Track, sampler: &Place<'_>) -> Result<[f32; 3], GltfError> {
     Ok(Vec3::from_slice(&track.at(3)).to_array())
 }
 
-/// Linear ones turn with an even speed on the shorter way.
+/// Linear rotations have a constant angular speed along the shorter arc.
 fn rotation(track: &Track, sampler: &Place<'_>) -> Result<[f32; 4], GltfError> {
     track.has(4, sampler)?;
     let fraction = track.position.fraction;
@@ -190,7 +191,7 @@ fn rotation(track: &Track, sampler: &Place<'_>) -> Result<[f32; 4], GltfError> {
     Ok(a.slerp(b, fraction).to_array())
 }
 
-/// Before the first key and after the last, things are as there.
+/// Before the first key and after the last, the value of that key holds.
 fn position(times: &[f32], time: f32) -> Position {
     let key = times.partition_point(|t| *t <= time).saturating_sub(1);
     match times.get(key + 1) {

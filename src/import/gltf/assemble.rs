@@ -32,7 +32,7 @@ use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// A scene while it is assembled.
+/// A scene during its assembly.
 pub(super) struct Assembly<'a> {
     document: &'a Document,
     options: &'a LoadOptions,
@@ -43,9 +43,9 @@ pub(super) struct Assembly<'a> {
     emission_images: HashMap<EmissionKey, Option<Arc<EmissionImage>>>,
     lights: Vec<Light>,
     media: MediumSet,
-    /// What is inside of materials.
+    /// Media inside of materials.
     interiors: HashMap<MaterialId, MediumId>,
-    /// The point of the world that is the origin of the world which is rendered.
+    /// The point of world space that is the origin of the rendered world.
     origin: DVec3,
 }
 
@@ -67,7 +67,7 @@ impl<'a> Assembly<'a> {
         })
     }
 
-    /// The scene; files that it was read from are added to `others`.
+    /// Builds the scene; its files are appended to `others`.
     pub(super) fn scene(
         mut self,
         files: &FileCache,
@@ -78,7 +78,7 @@ impl<'a> Assembly<'a> {
         others.extend(self.materials.textures.files());
         others.extend(self.options.environment.clone());
         if !self.document.unread.is_empty() {
-            // Nothing can be built, but what else is missing is said at once
+            // Nothing can be built, but other missing files are reported at once
             self.check_images(files, messages);
             return Ok(None);
         }
@@ -88,7 +88,7 @@ impl<'a> Assembly<'a> {
         let (placed, camera_names) = cameras(self.document, &nodes, messages);
         choices.cameras = shown(&camera_names);
         let found = chosen_camera(self.options, (&placed, &camera_names), messages);
-        // Frames of an animation are framed alike
+        // All frames of an animation have the same framing
         let is_framed_as_a_whole = found.is_none() && self.options.time.is_some();
         let framed = if is_framed_as_a_whole { extent::of_animations(self.document, &scene, messages)? } else { None };
         self.origin = match (&found, &framed) {
@@ -136,7 +136,7 @@ impl<'a> Assembly<'a> {
         }))
     }
 
-    /// The scene that is asked for, or that of the file, and what there is to choose from but for cameras.
+    /// The requested scene, or the default of the file, with the choices except for cameras.
     fn chosen_scene(&self, messages: &mut Messages<'_>) -> Option<(Place<'a>, Choices)> {
         let scenes = self.document.root().key("scenes");
         let names: Names<'a> = scenes.items().map(|scene| [name_of(&scene), None]).collect();
@@ -168,7 +168,7 @@ impl<'a> Assembly<'a> {
         self.materials.textures.resources.load(files, messages.diagnostics);
     }
 
-    /// Adds all meshes, each once for every pose.
+    /// Adds all meshes, once for every pose.
     fn add_meshes(&mut self, nodes: &[Node], files: &FileCache, messages: &mut Messages<'_>) -> Result<(), GltfError> {
         let meshes = self.document.root().key("meshes");
         let mut users: Vec<Vec<u32>> = vec![Vec::new(); meshes.len()];
@@ -200,8 +200,8 @@ impl<'a> Assembly<'a> {
         Ok(())
     }
 
-    /// Primitives that stand once, that emit, or that are flattened, are placed in world space; others are a group with
-    /// instances, whose placements have inverses.
+    /// Primitives that are used once, that emit, or that are flattened, are in world space. Others are a group with
+    /// instances, whose transforms have inverses.
     fn add_mesh(
         &mut self,
         place: &Place<'a>,
@@ -315,28 +315,28 @@ impl<'a> Assembly<'a> {
     }
 }
 
-/// Where a node has its mesh in a pose, as far as that is finite. They are computed anew wherever they are needed: a scene
-/// of 10⁶ nodes needs the memory for other things.
+/// Finite transforms of the mesh of a node in a pose. They are recomputed at each use, since a scene may have 10⁶
+/// nodes.
 fn placements<'n>(
     document: &Document,
     node: &'n Node,
     pose: &Pose,
     origin: DVec3,
 ) -> impl Iterator<Item = DAffine3> + use<'n> {
-    // Joints lead to the world that is rendered
+    // Joints lead to rendered world space
     let world_from_node = if pose.is_skinned() { DAffine3::from_translation(origin) } else { node.world_from_node };
-    // What is wrong with them was said before
+    // Errors of the instances were reported before
     let within = instances(document, &node.place(document)).unwrap_or_default();
     within.into_iter().map(move |m| world_from_node * m).filter(|m| m.as_affine3a().is_finite())
 }
 
-/// False for what makes everything flat, or thinner than f32 can invert.
+/// False for transforms that are singular, or nearly singular in f32.
 fn has_inverse(m: &DAffine3) -> bool {
     let m = m.as_affine3a();
     m.matrix3.determinant() != 0.0 && m.inverse().is_finite()
 }
 
-/// All lights, those of surfaces last.
+/// All lights; area lights are the last.
 fn light_set(
     lights: Vec<Light>,
     emitters: Vec<(GeometryId, Emission)>,
@@ -366,8 +366,8 @@ fn emission_image(
     Some(Arc::new(if source.filter == Filter::Point { image.nearest() } else { image }))
 }
 
-/// An environment by an image, whose z becomes the y of the scene. Its middle is in direction +x, and it is seen as it
-/// is stored: maps of pbrt have their columns counter-clockwise about z, so they are mirrored.
+/// An environment map whose z axis becomes the y axis of the scene. Its centre is in direction +x, and it appears as
+/// stored: columns of pbrt's maps are counter-clockwise about z, so the map is mirrored.
 fn environment(path: &Path, files: &FileCache, messages: &mut Messages<'_>) -> Option<Light> {
     let d = &mut *messages.diagnostics;
     let failed = |error: ImageError| match error {

@@ -3,7 +3,7 @@
 use lumiris_formats::gltf::Place;
 use lumiris_formats::names::nfc;
 
-/// What may be chosen, by its name or by other names that count only if none has it as its name.
+/// Names of the alternatives; the second names are used if no first name matches.
 pub(super) type Names<'d> = Vec<[Option<&'d str>; 2]>;
 
 /// The name of something in the file.
@@ -11,13 +11,15 @@ pub(super) fn name_of<'d>(place: &Place<'d>) -> Option<&'d str> {
     place.key("name").text()
 }
 
-/// The names that are shown, of which those without any are empty.
+/// The displayed names; empty strings for unnamed alternatives.
 pub(super) fn shown(names: &Names<'_>) -> Vec<String> {
     names.iter().map(|[name, other]| name.or(*other).unwrap_or_default().to_owned()).collect()
 }
 
-/// The index of what is asked for by a name, or by an index if nothing is called so. `Err` says what there is; `what` is
-/// its name and that of the option.
+/// The index of the alternative with the name `wanted`, or with the index `wanted` if no name matches. `what` and
+/// `option` name the kind of choice and its option.
+///
+/// Returns `Err` with the list of alternatives if there is none.
 pub(super) fn chosen([what, option]: [&str; 2], wanted: &str, names: &Names<'_>) -> Result<usize, String> {
     let is_wanted = |name: &str| nfc(name) == nfc(wanted);
     let called =

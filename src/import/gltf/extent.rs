@@ -1,7 +1,7 @@
-//! The room that an animated scene takes over all of its time: a camera that frames it is the same in all frames.
+//! The bounds of an animated scene over all of its time, so that an automatic camera is the same in all frames.
 //!
-//! Boxes of vertices, one for each joint where there are joints, stand at several times where nodes and joints have them. A
-//! vertex lies between the places where its joints would move it, and so in what these boxes take together.
+//! Boxes of vertices, one per joint of skinned primitives, are transformed by nodes and joints at several times. A
+//! vertex is a weighted mean of its transforms by its joints, so it lies within the union of these boxes.
 
 use super::Messages;
 use super::animation::changes;
@@ -13,19 +13,20 @@ use lumiris_numbers::math::{Affine3A, Bounds3, DVec3, Vec3};
 use std::collections::hash_map::Entry;
 use std::collections::{BTreeMap, HashMap};
 
-/// Times at which bounds are taken, evenly from the first key to the last.
+/// Number of times at which bounds are computed, uniform from the first key to the last.
 const TIMES: u16 = 64;
 
 /// Boxes of the vertices of a primitive, in the space of its mesh.
 #[derive(Debug, Default)]
 struct Boxes {
-    /// Those of each joint; of a primitive without joints, all under 0.
+    /// Boxes by joint; primitives without joints have a single box under 0.
     of_joints: BTreeMap<usize, Bounds3>,
     /// Displacements by each morph target.
     targets: Vec<Bounds3>,
 }
 
-/// The bounds of the scene over all of its animations, relative to a point near their middle; `None` if nothing is animated.
+/// The bounds of the scene over all of its animations, relative to a point near their centre; `None` without
+/// animations.
 pub(super) fn of_animations(
     document: &Document,
     scene: &Place<'_>,
@@ -62,7 +63,7 @@ pub(super) fn of_animations(
     Ok(origin.filter(|_| !bounds.is_empty()).map(|origin| (bounds, origin)))
 }
 
-/// Times of the first and of the last key of all animations, if there are any.
+/// Times of the first and the last key of all animations; `None` without keys.
 fn keys(document: &Document) -> Result<Option<[f32; 2]>, GltfError> {
     let mut ends: Option<[f32; 2]> = None;
     for animation in document.root().key("animations").items() {
@@ -107,7 +108,7 @@ impl Boxes {
         Ok(boxes)
     }
 
-    /// What they take at a node in a pose, relative to `origin`.
+    /// The bounds at a node in a pose, relative to `origin`.
     fn placed(&self, document: &Document, node: &Node, pose: &Pose, origin: DVec3) -> Result<Bounds3, GltfError> {
         let placed = |bounds: &Bounds3, m: &Affine3A| moved(&self.bent(bounds, pose.weights()), m);
         if let Some(joints) = pose.joints() {
@@ -122,7 +123,7 @@ impl Boxes {
         Ok(all)
     }
 
-    /// A box with the displacements of morph targets.
+    /// A box enlarged by the displacements of morph targets.
     fn bent(&self, bounds: &Bounds3, weights: &[f32]) -> Bounds3 {
         let mut bent = *bounds;
         for (target, &weight) in self.targets.iter().zip(weights).filter(|(target, _)| !target.is_empty()) {
@@ -133,7 +134,7 @@ impl Boxes {
     }
 }
 
-/// The bounds of a box that is transformed.
+/// The bounds of a transformed box.
 fn moved(bounds: &Bounds3, m: &Affine3A) -> Bounds3 {
     if bounds.is_empty() {
         return *bounds;

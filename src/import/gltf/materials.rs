@@ -1,4 +1,4 @@
-//! Materials: metallic-roughness, or specular-glossiness, with what extensions add.
+//! Materials: metallic-roughness or specular-glossiness, and extensions.
 
 use super::Messages;
 use super::textures::{EmissionSource, Textures};
@@ -12,25 +12,25 @@ use lumiris_formats::spectra::Spectrum;
 use lumiris_numbers::math::Rgb;
 use std::sync::Arc;
 
-/// What a primitive needs to know of its material.
+/// The properties of a material that primitives need.
 #[derive(Clone)]
 pub(super) struct Look {
     pub material: MaterialId,
     /// Texture of the opacity.
     pub alpha: Option<FloatTextureId>,
-    /// Radiance, with the image that it is a factor of.
+    /// Radiance; a factor of the emission image, if there is one.
     pub emission: Rgb,
     pub emission_image: Option<EmissionSource>,
-    /// True if the colours of the vertices are a factor of it.
+    /// True if the vertex colours are a factor of the emission.
     pub emits_vertex_colors: bool,
     pub is_double_sided: bool,
-    /// True if a normal map has the second texture coordinates, which then have the tangents as well.
+    /// True if a normal map uses the second texture coordinates, which then define the tangents.
     pub tangents_along_second: bool,
-    /// What absorbs light inside.
+    /// The absorbing medium inside.
     pub interior: Option<Homogeneous>,
 }
 
-/// Materials while a scene is read.
+/// Materials during import.
 pub(super) struct Materials<'a> {
     document: &'a Document,
     pub textures: Textures<'a>,
@@ -38,22 +38,22 @@ pub(super) struct Materials<'a> {
     pub looks: Vec<Look>,
 }
 
-/// An index of refraction so great that all light is reflected: colours of reflection are reflectances.
+/// An index of refraction so large that all light is reflected: specular colours are then reflectances.
 const MIRROR_IOR: f32 = 1e6;
 
-/// Below, light passes as if there were no surface.
+/// Below this index, light passes as if there were no surface.
 const LEAST_IOR: f32 = 1.0011;
 
-/// The least component of a colour that light has after some distance in a volume: none at all would need infinite absorption.
+/// Minimum component of the colour of light after some distance in a volume: 0 would need infinite absorption.
 const LEAST_COLOR: f32 = 1e-6;
 
-/// Extensions of materials that are left out.
+/// Extensions of materials that are not supported.
 const LEFT_OUT: &[(&str, &str)] = &[
     ("KHR_materials_iridescence", "thin films are not rendered"),
     ("KHR_materials_diffuse_transmission", "diffuse transmission is not rendered"),
 ];
 
-/// What a material has beside metallic-roughness, which is for readers that do not know it.
+/// The specular-glossiness properties, which take precedence over the metallic-roughness fallback.
 fn glossiness_of<'a>(place: &Place<'a>) -> Option<Place<'a>> {
     Some(place.extension("KHR_materials_pbrSpecularGlossiness")).filter(Place::exists)
 }
@@ -68,7 +68,7 @@ impl<'a> Materials<'a> {
         Ok(Materials { document, textures: Textures::new(document)?, entries: Vec::new(), looks: Vec::new() })
     }
 
-    /// Understands all materials, and the one of primitives without a material as the last.
+    /// Imports all materials; the last is the default material for primitives without one.
     pub(super) fn read(&mut self, messages: &mut Messages<'_>) -> Result<(), GltfError> {
         let root = self.document.root();
         for place in root.key("materials").items().chain([root.key("default material")]) {
@@ -81,7 +81,7 @@ impl<'a> Materials<'a> {
     /// Factor and texture of the base colour.
     fn base(place: &Place<'a>) -> ([f32; 4], Place<'a>) {
         let pbr = place.key("pbrMetallicRoughness");
-        // The colour of unlit surfaces is that of metallic-roughness
+        // Unlit surfaces use the metallic-roughness colour
         let is_unlit = place.extension("KHR_materials_unlit").exists() && pbr.exists();
         if let Some(old) = glossiness_of(place).filter(|_| !is_unlit) {
             return (old.key("diffuseFactor").numbers().unwrap_or([1.0; 4]), old.key("diffuseTexture"));
@@ -137,7 +137,7 @@ impl<'a> Materials<'a> {
     ) -> Result<PrincipledMaterial, GltfError> {
         warn_of_approximations(place, messages);
         let old = glossiness_of(place);
-        // Images of the fallback are not read
+        // Images of the fallback are not loaded
         let pbr = if old.is_some() { Place::default() } else { place.key("pbrMetallicRoughness") };
         let packed = pbr.key("metallicRoughnessTexture");
         let specular = place.extension("KHR_materials_specular");
@@ -228,7 +228,7 @@ impl<'a> Materials<'a> {
         Ok(())
     }
 
-    /// The probability that rays are stopped; `None` for 1.
+    /// The opacity texture, the probability that rays are stopped; `None` for 1.
     fn opacity(
         &mut self,
         place: &Place<'a>,
@@ -251,14 +251,14 @@ impl<'a> Materials<'a> {
     }
 }
 
-/// Radiance that a material emits, but for its texture.
+/// Emitted radiance without the texture.
 fn emitted(place: &Place<'_>) -> Rgb {
     let strength = place.extension("KHR_materials_emissive_strength").key("emissiveStrength").number();
     let color = Rgb::from_array(place.key("emissiveFactor").numbers().unwrap_or([0.0; 3]));
     (color * strength.unwrap_or(1.0)).map(|c| c.max(0.0))
 }
 
-/// `KHR_materials_ior`: 0 stands for an infinite index.
+/// `KHR_materials_ior`: 0 means an infinite index.
 fn ior(place: &Place<'_>) -> f32 {
     match factor(&place.extension("KHR_materials_ior").key("ior"), 1.5) {
         0.0 => MIRROR_IOR,
@@ -266,8 +266,8 @@ fn ior(place: &Place<'_>) -> f32 {
     }
 }
 
-/// `KHR_materials_dispersion` of a solid: 20 over the Abbe number (n − 1)/(n(F) − n(C)), where n is the index at the line d.
-/// Between the lines and beyond them the index goes with the inverse square of the wavelength, which is Cauchy's law.
+/// `KHR_materials_dispersion` of a solid: 20 over the Abbe number (n − 1)/(n(F) − n(C)), where n is the index at the
+/// line d. At all wavelengths the index is linear in the inverse square of the wavelength (Cauchy's law).
 fn dispersion(place: &Place<'_>) -> Option<Arc<Dispersion>> {
     // nm
     let [d, f, c] = [587.56, 486.13, 656.27];
@@ -283,13 +283,13 @@ fn dispersion(place: &Place<'_>) -> Option<Arc<Dispersion>> {
     Dispersion::new(&Spectrum::from_pairs(&pairs).ok()?).map(Arc::new)
 }
 
-/// True for glass that is a solid.
+/// True for solid glass.
 fn is_filled(place: &Place<'_>) -> bool {
     let thickness = place.extension("KHR_materials_volume").key("thicknessFactor");
     place.extension("KHR_materials_transmission").exists() && factor(&thickness, 0.0) > 0.0
 }
 
-/// `KHR_materials_volume`: white light has the colour after the distance, in the units of the world.
+/// `KHR_materials_volume`: white light has the colour after the distance, in world units.
 fn absorption(place: &Place<'_>) -> Option<Homogeneous> {
     let volume = place.extension("KHR_materials_volume");
     let color = Rgb::from_array(volume.key("attenuationColor").numbers()?);
@@ -303,7 +303,7 @@ fn absorption(place: &Place<'_>) -> Option<Homogeneous> {
     })
 }
 
-/// Says what is rendered in another way than the extensions have it.
+/// Warns about properties that are rendered only approximately.
 fn warn_of_approximations(place: &Place<'_>, messages: &mut Messages<'_>) {
     let coat = place.extension("KHR_materials_clearcoat").key("clearcoatNormalTexture");
     if coat.exists() {

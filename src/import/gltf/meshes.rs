@@ -15,8 +15,8 @@ pub(super) struct Primitive {
     pub material: Option<usize>,
 }
 
-/// Triangles of a primitive, bent by a pose; `None` for points and lines. The first primitive of a mesh determines the origin of
-/// all of them, which is near to its vertices.
+/// Triangles of a primitive, deformed by a pose; `None` for points and lines. The first primitive of a mesh determines
+/// the common origin, which is near its vertices.
 pub(super) fn primitive(
     document: &Document,
     place: &Place<'_>,

@@ -1,5 +1,5 @@
-//! glTF 2.0 scenes. Light of 1 cd/m² is taken for a radiance of 1 where surfaces emit; what lights in candela and lux are
-//! beside it, [`LightUnits`] says. Single-sided surfaces are rendered from both sides.
+//! glTF 2.0 scenes. For emissive surfaces, 1 cd/m² is a radiance of 1; [`LightUnits`] defines the units of punctual
+//! lights. Single-sided surfaces are rendered from both sides.
 //!
 //! Reading order: [`choice`], [`textures`], [`materials`], [`animation`], [`nodes`], [`vertices`], [`pose`],
 //! [`meshes`], [`extent`], [`view`],
@@ -31,22 +31,22 @@ use std::ops::Range;
 use std::path::Path;
 use strum::{EnumString, IntoStaticStr, VariantNames};
 
-/// Luminous flux of a watt at 555 nm, by which lights are divided.
+/// Luminous flux of 1 W at 555 nm (lm/W), the divisor of light units.
 pub const LUMENS_PER_WATT: f32 = 683.0;
 
-/// What the candela and lux of lights are, beside an emission of 1.
+/// Units of punctual lights, relative to an emission of 1.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, EnumString, IntoStaticStr, VariantNames)]
 #[strum(serialize_all = "kebab-case")]
 pub enum LightUnits {
-    /// Divided by [`LUMENS_PER_WATT`]: W/sr and W/m², as Blender has them where it writes candela and lux.
+    /// Divided by [`LUMENS_PER_WATT`]: W/sr and W/m², as in Blender's export of candela and lux.
     #[default]
     Watt,
-    /// As they are: emission is in cd/m², as the specification has it, or nothing has units.
+    /// Taken as they are: emission is in cd/m², as in the specification, or nothing has units.
     Candela,
 }
 
 impl LightUnits {
-    /// The intensity of a candela, and the irradiance of a lux.
+    /// The intensity of 1 cd, and the irradiance of 1 lx.
     fn per_candela(self) -> f32 {
         match self {
             LightUnits::Watt => 1.0 / LUMENS_PER_WATT,
@@ -55,7 +55,7 @@ impl LightUnits {
     }
 }
 
-/// Extensions that a file may require. Of materials, these are also those whose lack a warning tells of.
+/// Extensions that a file may require. Missing support of a material extension in this list is also a warning.
 const KNOWN: &[&str] = &[
     "EXT_mesh_gpu_instancing",
     "KHR_lights_punctual",
@@ -83,7 +83,7 @@ struct Messages<'d> {
     diagnostics: &'d mut Diagnostics,
     file: FileId,
     bytes: &'d [u8],
-    /// Where images and buffers are named, once that is asked for.
+    /// Source positions of the names of images and buffers, computed on first use.
     named: HashMap<&'static str, Vec<Span>>,
     warned: BTreeSet<String>,
 }
@@ -94,7 +94,7 @@ impl Messages<'_> {
         Span { file: self.file, start: start as u32, end: end as u32 }
     }
 
-    /// Where the file of an element of `images` or `buffers` is named.
+    /// Source position of the file name of an element of `images` or `buffers`.
     fn file_span(&mut self, array: &'static str, index: usize) -> Span {
         let (file, bytes) = (self.file, self.bytes);
         let span = |Range { start, end }| Span { file, start: start as u32, end: end as u32 };
@@ -107,7 +107,7 @@ impl Messages<'_> {
         self.diagnostics.error(self.span_of(&error.place), error.to_string());
     }
 
-    /// Buffers that could not be read: missing files are one error with those of images.
+    /// Reports unreadable buffers: missing files are one error, together with missing images.
     fn unread(&mut self, buffers: &[Unread]) {
         for buffer in buffers {
             match buffer {
@@ -120,7 +120,7 @@ impl Messages<'_> {
         }
     }
 
-    /// A warning, given for the first place only.
+    /// Reports a warning at its first position only.
     fn warning(&mut self, place: &Place<'_>, message: &str) {
         if self.warned.insert(message.to_owned()) {
             let path = place.path();
@@ -130,7 +130,9 @@ impl Messages<'_> {
     }
 }
 
-/// Loads a .gltf or .glb file. `Err` holds all errors and the warnings.
+/// Loads a .gltf or .glb file.
+///
+/// Returns `Err` with all errors and warnings.
 pub fn load(path: &Path, options: &LoadOptions, files: &FileCache) -> Result<Loaded, Box<Report>> {
     let (mut sources, mut diagnostics) = (SourceMap::new(), Diagnostics::new());
     if options.camera.is_some() && options.camera_auto {

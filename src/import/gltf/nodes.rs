@@ -1,4 +1,4 @@
-//! The tree of nodes: what stands where.
+//! The tree of nodes with their transforms.
 
 use super::animation::{Change, Changes};
 use glam::{DMat4, DQuat};
@@ -6,28 +6,29 @@ use lumiris_formats::gltf::{Document, GltfError, Place};
 use lumiris_numbers::math::{DAffine3, DVec3};
 use std::collections::HashSet;
 
-/// A node of the scene with its placement.
+/// A node of the scene with its transform.
 pub(super) struct Node {
     /// Index of the node.
     pub index: usize,
-    /// Index of its mesh, if it is seen.
+    /// Index of its mesh, if it is visible.
     pub mesh: Option<usize>,
-    /// False if it, or a parent, is hidden by `KHR_node_visibility`: without meshes and lights, but with cameras and joints.
+    /// False if the node or a parent is hidden by `KHR_node_visibility`. Hidden nodes have no meshes and lights, but
+    /// keep cameras and joints.
     pub is_visible: bool,
     pub world_from_node: DAffine3,
-    /// Weights of morph targets, by an animation.
+    /// Animated weights of morph targets.
     pub weights: Option<Vec<f32>>,
 }
 
 impl Node {
-    /// Where the file has it.
+    /// Its position in the file.
     pub(super) fn place<'d>(&self, document: &'d Document) -> Place<'d> {
         document.root().key("nodes").item(self.index)
     }
 }
 
-/// All nodes of a scene, parents first, with what animations change; of all without parents if there is no such scene. A node
-/// that is met twice is an error, so that no tree is endless.
+/// All nodes of a scene, parents first, with their animated properties; without a scene, all root nodes and their
+/// descendants. A node that is reached twice is an error, which also excludes cycles.
 pub(super) fn nodes<'d>(document: &'d Document, scene: &Place<'d>, changes: &Changes) -> Result<Vec<Node>, GltfError> {
     let all = document.root().key("nodes");
     let count = all.len();
@@ -75,13 +76,13 @@ fn transform(place: &Place<'_>, change: &Change) -> DAffine3 {
     DAffine3::from_scale_rotation_translation(scale, rotation, translation)
 }
 
-/// The rotation of a quaternion of any length; of zero, none.
+/// The rotation of a quaternion of any length; the identity for zero.
 fn unit(q: [f64; 4]) -> DQuat {
     let q = DQuat::from_array(q);
     if q.length_squared() > 0.0 { q.normalize() } else { DQuat::IDENTITY }
 }
 
-/// The middle of the meshes of a scene, by the bounds that accessors state.
+/// The centre of the meshes of a scene, by the bounds of their accessors.
 pub(super) fn middle(document: &Document, nodes: &[Node]) -> Result<DVec3, GltfError> {
     let [meshes, accessors] = ["meshes", "accessors"].map(|key| document.root().key(key));
     let (mut min, mut max) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
@@ -100,7 +101,7 @@ pub(super) fn middle(document: &Document, nodes: &[Node]) -> Result<DVec3, GltfE
     Ok((min + max) * 0.5)
 }
 
-/// Placements by `EXT_mesh_gpu_instancing`, relative to the node; one if there are none.
+/// Transforms by `EXT_mesh_gpu_instancing`, relative to the node; a single identity without the extension.
 pub(super) fn instances(document: &Document, place: &Place<'_>) -> Result<Vec<DAffine3>, GltfError> {
     let attributes = place.extension("EXT_mesh_gpu_instancing").key("attributes");
     let numbers = |name: &str| attributes.key(name).index().map(|i| document.accessor(i)).transpose();

@@ -1,5 +1,5 @@
-//! What moves the vertices of a mesh before its node does: morph targets by their weights, and skins by the
-//! joints as they stand.
+//! Deformation of meshes before the transform of their node: morph targets by their weights, and skins by the current
+//! transforms of their joints.
 
 use super::Messages;
 use super::nodes::Node;
@@ -12,38 +12,38 @@ use lumiris_numbers::math::{Affine3A, DAffine3, DVec3, Vec3};
 use std::collections::HashMap;
 use std::sync::Arc;
 
-/// How a mesh is bent.
+/// The deformation of a mesh.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Pose {
     /// Weights of the morph targets.
     weights: Vec<f32>,
-    /// The skin, and the world that is rendered from mesh by each of its joints.
+    /// The skin, and for each of its joints the transform from mesh space to rendered world space.
     skin: Option<(usize, Arc<[Affine3A]>)>,
 }
 
-/// Poses of a mesh with equal keys are the same: bits of the weights, and the skin.
+/// Identifies a pose of a mesh: bits of the weights, and the skin.
 pub(super) type PoseKey = (Vec<u32>, Option<usize>);
 
-/// The joints of skins as they stand, each skin once: many meshes may have the same.
+/// The current transforms of joints, once per skin, which meshes may share.
 pub(super) struct Skins<'a> {
     document: &'a Document,
     nodes: &'a [Node],
-    /// The point of the world that is the origin of the space which is rendered.
+    /// The point of world space that is the origin of rendered space.
     origin: DVec3,
-    /// By index of the node in the file.
+    /// Index in the scene, by index of the node in the file.
     in_scene: HashMap<usize, usize>,
     joints: HashMap<usize, Arc<[Affine3A]>>,
 }
 
 impl<'a> Skins<'a> {
-    /// The skins of a scene of these nodes.
+    /// The skins of a scene with these nodes.
     pub(super) fn new(document: &'a Document, nodes: &'a [Node], origin: DVec3) -> Self {
         let has_skins = !document.root().key("skins").is_empty();
         let in_scene = nodes.iter().enumerate().filter(|_| has_skins).map(|(i, node)| (node.index, i)).collect();
         Skins { document, nodes, origin, in_scene, joints: HashMap::new() }
     }
 
-    /// The world that is rendered from mesh, by each joint.
+    /// For each joint, the transform from mesh space to rendered world space.
     fn joints(&mut self, index: usize) -> Result<Arc<[Affine3A]>, GltfError> {
         if let Some(joints) = self.joints.get(&index) {
             return Ok(Arc::clone(joints));
@@ -84,7 +84,7 @@ fn weights(place: &Place<'_>) -> Option<Vec<f32>> {
 }
 
 impl Pose {
-    /// The pose of a mesh at a node, which is at `of_node` in the file.
+    /// The pose of a mesh at a node, which is `of_node` in the file.
     pub(super) fn of(
         mesh: &Place<'_>,
         node: &Node,
@@ -104,22 +104,22 @@ impl Pose {
         &self.weights
     }
 
-    /// The world that is rendered from mesh by each joint, if there are joints.
+    /// For each joint, the transform from mesh space to rendered world space; `None` without joints.
     pub(super) fn joints(&self) -> Option<&[Affine3A]> {
         self.skin.as_ref().map(|(_, joints)| &**joints)
     }
 
-    /// What tells it from other poses of the mesh.
+    /// Identifies the pose among the poses of the mesh.
     pub(super) fn key(&self) -> PoseKey {
         (self.weights.iter().map(|w| w.to_bits()).collect(), self.skin.as_ref().map(|(skin, _)| *skin))
     }
 
-    /// True if vertices become points of the world that is rendered, whatever the transformation of their node.
+    /// True if vertices are transformed to rendered world space, independent of the transform of their node.
     pub(super) fn is_skinned(&self) -> bool {
         self.skin.is_some()
     }
 
-    /// Bends the vertices of a primitive.
+    /// Deforms the vertices of a primitive.
     pub(super) fn bend(
         &self,
         document: &Document,
@@ -163,7 +163,7 @@ fn add_target(
     Ok(())
 }
 
-/// Moves each vertex by the weighted mean of its joints' transformations.
+/// Transforms each vertex by the weighted mean of its joints' transforms.
 fn skin(
     document: &Document,
     attributes: &Place<'_>,

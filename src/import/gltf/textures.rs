@@ -17,20 +17,20 @@ use lumiris_numbers::math::{Rgb, Vec2};
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
-/// An image that a material emits.
+/// An emission image.
 #[derive(Clone, Debug)]
 pub(super) struct EmissionSource {
     /// Index of the texture, which has an image and a sampler.
     pub texture: usize,
     pub path: PathBuf,
-    /// Where the file names it.
+    /// Source position of its name.
     pub span: Span,
     pub wrap: [AxisWrap; 2],
     pub filter: Filter,
     pub mapping: Option<EmissionMapping>,
 }
 
-/// Images of sources with equal keys are the same: the texture, and the bits of its mapping.
+/// Identifies an emission image: the texture, and the bits of its mapping.
 pub(super) type EmissionKey = (usize, Option<(bool, [u32; 6])>);
 
 impl EmissionSource {
@@ -40,17 +40,17 @@ impl EmissionSource {
     }
 }
 
-/// The file of an image, and where it is named.
+/// The file of an image, and the source position of its name.
 type ImageFile = Option<(PathBuf, Span)>;
 
-/// Textures while a scene is read.
+/// Textures during import.
 pub(super) struct Textures<'a> {
     document: &'a Document,
     pub set: TextureSet,
     pub resources: Resources,
-    /// By index of the image: many textures may have one.
+    /// Files by index of the image, which textures may share.
     image_files: HashMap<usize, ImageFile>,
-    /// Holds images that are in the document.
+    /// Temporary folder for images embedded in the document.
     folder: tempfile::TempDir,
     _temporary: Temporary,
 }
@@ -125,7 +125,7 @@ impl<'a> Textures<'a> {
         Ok(file)
     }
 
-    /// The file of an image; one in the document becomes a file.
+    /// The file of an image; an embedded image is written to a temporary file.
     fn image_file(&self, source: usize, messages: &mut Messages<'_>) -> Result<ImageFile, GltfError> {
         let image = self.document.root().key("images").item(source);
         let bytes = match self.document.content(&image)? {
@@ -139,7 +139,7 @@ impl<'a> Textures<'a> {
         Ok(Some((path, messages.file_span("images", source))))
     }
 
-    /// How an image goes on beyond its edges, along its rows and columns, and how it is filtered.
+    /// Wrap modes along rows and columns, and the filter.
     fn sampler(&self, place: &Place<'a>) -> ([AxisWrap; 2], Filter) {
         let root = self.document.root();
         let sampler = place.key("index").index().and_then(|i| root.key("textures").item(i).key("sampler").index());
@@ -154,7 +154,7 @@ impl<'a> Textures<'a> {
         (wrap, if sampler.key("magFilter").index() == Some(9728) { Filter::Point } else { Filter::Bilinear })
     }
 
-    /// An image that is emitted.
+    /// An emission image.
     pub(super) fn emission(
         &mut self,
         place: &Place<'a>,
@@ -190,15 +190,15 @@ impl<'a> Textures<'a> {
         Ok(Some(ImageTexture { image, mapping, udim: None, scale: 1.0, invert: false }))
     }
 
-    /// Files that are not in the document.
+    /// Files outside of the document.
     pub(super) fn files(&self) -> Vec<PathBuf> {
         let is_own = |path: &Path| path.starts_with(self.folder.path());
         self.resources.paths().filter(|path| !is_own(path)).map(Into::into).collect()
     }
 }
 
-/// True for the second texture coordinates, and those of the image by them. They have v downwards in the file, and
-/// upwards here: v ↦ 1 − v on both sides of the transformation offset + rotation · scale.
+/// True for the second texture coordinates, and the transform to image coordinates. v points down in the file and up
+/// here, so v ↦ 1 − v is applied on both sides of the transform offset + rotation · scale.
 fn mapping(place: &Place<'_>, messages: &mut Messages<'_>) -> (bool, Affine2) {
     let transform = place.extension("KHR_texture_transform");
     let sets = [transform.key("texCoord"), place.key("texCoord")];

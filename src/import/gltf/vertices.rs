@@ -1,21 +1,21 @@
-//! Which vertices of a primitive are read.
+//! Selection of the vertices of a primitive.
 
 use lumiris_formats::gltf::{Document, GltfError, Place};
 
-/// The vertices of a primitive that its triangles use. Many primitives may share the accessors of all their vertices:
-/// each takes its own only.
+/// The vertices of a primitive that its triangles use. Primitives may share accessors with more vertices; each loads
+/// only its own.
 pub(super) struct InUse {
     /// Number of vertices in the file.
     count: usize,
-    /// Those in use, ascending; `None` for all.
+    /// Vertices in use, ascending; `None` for all.
     vertices: Option<Vec<u32>>,
 }
 
-/// Most vertices that a corner of a triangle may stand for before those in use are picked.
+/// Maximum ratio of vertices to triangle corners for loading all vertices.
 const SPARSE: usize = 4;
 
 impl InUse {
-    /// The vertices in use by triangles, which then refer to these.
+    /// Selects the vertices of triangles, whose indices are replaced by indices into the selection.
     pub(super) fn of(count: usize, triangles: &mut [[u32; 3]], place: &Place<'_>) -> Result<Self, GltfError> {
         if let Some((i, t)) = triangles.iter().enumerate().find(|(_, t)| t.iter().any(|&v| v as usize >= count)) {
             let message = format!("triangle {i} refers to vertices {t:?}, but there are {count} vertices");
@@ -33,12 +33,12 @@ impl InUse {
         Ok(InUse { count, vertices: Some(vertices) })
     }
 
-    /// The index in the file of a vertex in use.
+    /// The index in the file of a selected vertex.
     pub(super) fn vertex(&self, index: usize) -> usize {
         self.vertices.as_ref().map_or(index, |vertices| vertices[index] as usize)
     }
 
-    /// Elements of an attribute, one per vertex in use, or none if it is not there.
+    /// Elements of an attribute, one per selected vertex; empty if the attribute is absent.
     pub(super) fn read<const N: usize>(
         &self,
         document: &Document,

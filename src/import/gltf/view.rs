@@ -12,17 +12,18 @@ use lumiris_formats::gltf::{Document, Place};
 use lumiris_numbers::math::origin::rebased;
 use lumiris_numbers::math::{Affine3A, Bounds3, DAffine3, DVec3, Vec3};
 
-/// Height of an image whose size nobody gives.
+/// Default height of the image.
 const HEIGHT: u32 = 720;
-/// Angle of view of the camera that frames a scene (degrees).
+/// Angle of view of the automatic camera (degrees).
 const AUTO_FOV: f32 = 40.0;
-/// Direction from the scene to that camera.
+/// Direction from the scene to the automatic camera.
 const AUTO_DIRECTION: Vec3 = Vec3::new(0.5, 0.35, 0.8);
 
-/// A camera that stands in the scene.
+/// A camera of the scene with its node.
 pub(super) type Placed<'n, 'd> = (&'n Node, Place<'d>);
 
-/// The cameras of the scene, in the order of its nodes, and their names: those of the nodes before their own.
+/// The cameras of the scene, in the order of its nodes, and their names: names of nodes take precedence over names of
+/// cameras.
 pub(super) fn cameras<'n, 'd>(
     document: &'d Document,
     nodes: &'n [Node],
@@ -40,7 +41,7 @@ pub(super) fn cameras<'n, 'd>(
     (placed, names)
 }
 
-/// The camera that is asked for, or the first one; `None` for one that frames the scene.
+/// The requested camera, or the first one; `None` for the automatic camera.
 pub(super) fn chosen_camera<'n, 'd>(
     options: &LoadOptions,
     (placed, names): (&[Placed<'n, 'd>], &Names<'d>),
@@ -67,7 +68,7 @@ pub(super) fn chosen_camera<'n, 'd>(
     }
 }
 
-/// A camera of the scene, or one that frames it, and the film. Bounds and camera are relative to `origin`.
+/// A camera of the scene or the automatic camera, and the film. Bounds and camera are relative to `origin`.
 pub(super) fn camera(
     options: &LoadOptions,
     found: Option<Placed<'_, '_>>,
@@ -92,7 +93,7 @@ pub(super) fn camera(
     (camera, FilmSettings { resolution, bounds, filter, file_name: None, scale: 1.0, balance: None })
 }
 
-/// Width by height of the image that a camera asks for, if it does.
+/// The aspect ratio (width over height) of a camera, if it has one.
 fn aspect_of(camera: &Place<'_>) -> Option<f32> {
     let orthographic = camera.key("orthographic");
     let aspect = if orthographic.exists() {
@@ -103,14 +104,15 @@ fn aspect_of(camera: &Place<'_>) -> Option<f32> {
     aspect.filter(|a| *a > 0.0 && a.is_finite())
 }
 
-/// Half the width and half the height that an orthographic camera asks for.
+/// Half the width and height of an orthographic camera, if it has them.
 fn half_size(orthographic: &Place<'_>) -> Option<[f32; 2]> {
     let [x, y] = ["xmag", "ymag"].map(|key| orthographic.key(key).number().map(f32::abs).filter(|half| *half > 0.0));
     Some([x.or(y)?, y.or(x)?])
 }
 
-/// A camera of the file: it looks along −z; scales of its node do not count. In an image of another aspect ratio, a perspective
-/// camera keeps its angle of view upwards, and an orthographic one sees more, to the sides or upwards.
+/// A camera of the file, which faces −z; scales of its node are ignored. If the aspect ratio of the image differs, a
+/// perspective camera keeps its vertical angle of view, and an orthographic one extends its view horizontally or
+/// vertically.
 fn of_file(world_from_node: &DAffine3, camera: &Place<'_>, aspect: f32, resolution: [u32; 2]) -> Camera {
     let (_, rotation, translation) = world_from_node.to_scale_rotation_translation();
     let flip = DVec3::new(1.0, 1.0, -1.0);
@@ -125,7 +127,7 @@ fn of_file(world_from_node: &DAffine3, camera: &Place<'_>, aspect: f32, resoluti
     Camera::perspective(world_from_camera, fov.to_degrees(), [-aspect, aspect, -1.0, 1.0], resolution, 0.0, 1e6)
 }
 
-/// A camera that sees the whole scene.
+/// The automatic camera, with the whole scene in view.
 fn frame(bounds: &Bounds3, aspect: f32, resolution: [u32; 2]) -> Camera {
     let (center, radius) = bounds.bounding_sphere();
     let radius = if radius > 0.0 && radius.is_finite() { radius } else { 1.0 };

@@ -1,11 +1,11 @@
-//! Checks that the files of all directives share.
+//! Checks shared by the files of all directives.
 
 use lumiris_formats::diagnostic::{Diagnostics, did_you_mean};
 use lumiris_formats::pbrt::params::ParamSet;
 use lumiris_formats::source::Span;
 use std::path::Path;
 
-/// The name of a file; as in pbrt, an empty one is none.
+/// The name of a file; as in pbrt, an empty name counts as absent.
 pub(super) fn file_name<'p>(p: &'p ParamSet, key: &'static str, d: &mut Diagnostics) -> Option<&'p str> {
     p.string(key, d).filter(|name| !name.is_empty())
 }
@@ -22,7 +22,8 @@ pub(super) fn positive(p: &ParamSet, key: &'static str, default: f32, d: &mut Di
     }
 }
 
-/// What was read of files, in their order; others are reported: as missing where `unreadable` has a reason of the system.
+/// The files that could be read, in order. Others are reported: as missing if `unreadable` returns a reason of the
+/// operating system.
 pub(super) fn readable<'a, T, E: ToString>(
     loaded: Vec<Result<T, E>>,
     places: impl Iterator<Item = (&'a Path, Span)>,

@@ -1,4 +1,4 @@
-//! `Shape "curve"`: all bases and degrees become cubic Bézier curves, exactly.
+//! `Shape "curve"`: all bases and degrees are converted to cubic Bézier curves, exactly.
 
 use super::checks::unknown;
 use super::descriptions::{CurveData, ShapeDesc, ShapeSource};
@@ -42,7 +42,7 @@ pub(super) fn curve_data(p: &ParamSet, d: &mut Diagnostics) -> Option<CurveData>
             return None;
         }
     };
-    // Pieces are chosen by shape and width
+    // Pieces are determined by shape and width
     p.ignore("splitdepth");
 
     let (segments, origin) = segments(p, basis, degree, d)?;
@@ -93,7 +93,7 @@ fn cubic(points: &[Vec3], basis: Basis) -> [Vec3; 4] {
         }
         (Basis::Bezier, &[a, b, c]) => elevated(a, b, c),
         (Basis::BSpline, &[a, b, c]) => elevated((a + b) * 0.5, b, (b + c) * 0.5),
-        // The caller cuts segments of three or four points
+        // The caller passes three or four points
         _ => [Vec3::NAN; 4],
     }
 }
@@ -142,11 +142,11 @@ fn normals(p: &ParamSet, kind: CurveKind, segments: usize, d: &mut Diagnostics) 
     Some(given.windows(2).map(|n| [n[0].normalize(), n[1].normalize()]).collect())
 }
 
-/// Greatest distance along an axis between origins of curves that become one geometry.
+/// Maximum distance along an axis between origins of curves that are merged.
 const MERGED: f64 = 1024.0;
 
-/// Adds the curves of `desc` to those of `last`, if nothing but their numbers tells them apart; returns `desc` if they
-/// cannot be one geometry. A head of hair has as many directives as hairs.
+/// Appends the curves of `desc` to `last` if they differ only in their numbers; otherwise returns `desc`. Hair has one
+/// directive per fibre.
 pub(super) fn merged(last: Option<&mut ShapeDesc>, desc: ShapeDesc) -> Option<ShapeDesc> {
     let Some(last) = last else { return Some(desc) };
     let is_alike = last.ctm == desc.ctm
@@ -170,8 +170,7 @@ pub(super) fn merged(last: Option<&mut ShapeDesc>, desc: ShapeDesc) -> Option<Sh
     }
 }
 
-/// Curves in the space of their group. A transformation that scales differently by axis scales the width by the cube
-/// root of its determinant.
+/// Curves in the space of their group. A non-uniform scale multiplies the width by the cube root of its determinant.
 pub(super) fn placed(mut data: CurveData, m: &Affine3A) -> Result<CurveSet, String> {
     let scale = m.matrix3.determinant().abs().cbrt();
     for curve in &mut data.curves {

@@ -1,4 +1,4 @@
-//! Descriptions of what a file asks for, kept until all of it and the files that it names are read.
+//! Descriptions of the scene's content, kept until the text and all files have been read.
 
 use super::transform::Ctm;
 use crate::geometry::{Curve, CurveKind, QuadricKind};
@@ -14,78 +14,78 @@ use lumiris_numbers::math::{Affine3A, DAffine3, DVec3, Rgb, Vec2, Vec3};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// A directive that is evaluated once all of them have been read: the camera needs the film's size.
+/// A directive that is evaluated after all directives have been read: the camera needs the film's size.
 pub(super) struct Pending {
     pub name: Name,
     pub params: ParamSet,
 }
 
-/// What the parameters of textures and materials mean something by.
+/// The state that determines the meaning of texture and material parameters.
 #[derive(Clone, Copy)]
 pub(super) struct ParamState {
     pub ctm: Ctm,
     pub color_space: ColorSpace,
 }
 
-/// A texture that is made once all of them are known.
+/// A texture that is made once all textures are defined.
 pub(super) struct TextureDesc {
     pub name: Name,
-    /// Of floats, or of spectra.
+    /// True for floats, false for spectra.
     pub is_float: bool,
     pub class: Name,
     pub params: ParamSet,
     pub state: ParamState,
 }
 
-/// A material that is made once all textures and the names of all materials are known.
+/// A material that is made once all textures and material names are defined.
 pub(super) struct MaterialDesc {
-    /// Its place among the materials.
+    /// Its index among the materials.
     pub id: MaterialId,
-    /// A name for people.
+    /// A readable name.
     pub name: String,
     pub kind: Name,
     pub params: ParamSet,
     pub state: ParamState,
 }
 
-/// A medium that is made once it is known where the space that is rendered has its origin.
+/// A medium that is made once the origin of rendered space is known.
 pub(super) struct PendingMedium {
-    /// Its place among the media.
+    /// Its index among the media.
     pub index: usize,
     pub params: ParamSet,
     pub state: ParamState,
 }
 
-/// A placement of an object that is not defined yet.
+/// An instance of an object that is not defined yet.
 pub(super) struct LateInstance {
     pub name: Name,
-    /// The object that it is in.
+    /// The object that contains it.
     pub holder: Option<usize>,
     pub ctm: Ctm,
-    /// Of the directive.
+    /// Source position of the directive.
     pub span: Span,
 }
 
-/// The material of a shape: known, or by a name that may be defined later.
+/// The material of a shape: an id, or a name that may be defined later.
 #[derive(Clone, Debug)]
 pub enum MaterialUse {
-    /// Known.
+    /// A material with an id.
     Id(MaterialId),
     /// By name.
     Named(Name),
 }
 
-/// Media on the two sides of a surface; `None` is empty space.
+/// Media on the two sides of a surface; `None` is vacuum.
 #[derive(Clone, Debug, Default)]
 pub struct MediumNames {
     /// Behind the normal.
     pub inside: Option<Name>,
-    /// Where the normal points to.
+    /// On the side of the normal.
     pub outside: Option<Name>,
 }
 
 impl MaterialUse {
-    /// True if both are the same material by the same way.
+    /// True if both refer to the same material in the same way.
     pub(super) fn is_same(&self, other: &MaterialUse) -> bool {
         match (self, other) {
             (MaterialUse::Id(a), MaterialUse::Id(b)) => a == b,
@@ -102,7 +102,7 @@ impl MediumNames {
         text(self) == text(other)
     }
 
-    /// True if they are two.
+    /// True if the two media differ.
     pub fn differ(&self) -> bool {
         let text = |name: &Option<Name>| name.as_ref().map(|name| name.text.clone());
         text(&self.inside) != text(&self.outside)
@@ -112,26 +112,26 @@ impl MediumNames {
 /// A medium by its name.
 #[derive(Clone, Debug)]
 pub struct MediumDesc {
-    /// Its name, and where it stands.
+    /// Its name, and the source position.
     pub name: Name,
-    /// The medium; `None` after an error, and before its file is read.
+    /// The medium; `None` after an error, and until its file is read.
     pub medium: Option<Medium>,
-    /// What waits for a file.
+    /// The description of a medium that needs a file.
     pub(super) volume: Option<VolumeDesc>,
 }
 
-/// A medium that waits for its file.
+/// A medium that needs a file.
 #[derive(Clone, Debug)]
 pub(super) struct VolumeDesc {
     /// The file.
     pub(super) path: PathBuf,
-    /// Where it is named.
+    /// Source position of the file name.
     pub(super) span: Span,
-    /// Name of the grid of densities, and where it stands.
+    /// Name of the density grid, and its source position.
     pub(super) density: (String, Span),
-    /// The same of temperatures; no place if the text does not name it. `None` if nothing is to glow.
+    /// Name of the temperature grid; without a source position if it is the default name. `None` without emission.
     pub(super) temperature: Option<(String, Option<Span>)>,
-    /// What is subtracted from temperatures, and then their factor.
+    /// Subtracted from temperatures, which are then multiplied by the next factor.
     pub(super) offset: f32,
     pub(super) scale: f32,
     /// Coefficients where the density is 1 (1/m).
@@ -140,26 +140,26 @@ pub(super) struct VolumeDesc {
     /// Factor of the emission.
     pub(super) le_scale: f32,
     pub(super) g: f32,
-    /// From the space of the file.
+    /// Transform from the space of the file.
     pub(super) placement: DAffine3,
 }
 
-/// What is behind the surface of a material.
+/// The interior of a material.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Interior {
     pub(super) medium: Homogeneous,
-    /// Light comes in and out by mirror-like refraction only.
+    /// True if light enters and leaves by smooth refraction only.
     pub(super) is_smooth: bool,
     /// The material.
     pub(super) span: Span,
 }
 
-/// An area light as written; shapes that follow emit it.
+/// An area light as written; it applies to the shapes that follow.
 #[derive(Clone, Debug)]
 pub struct AreaLightDesc {
-    /// Radiance with the scale.
+    /// Radiance including the scale.
     pub l: Rgb,
-    /// Both sides.
+    /// True if both sides emit.
     pub two_sided: bool,
     /// Image of the radiance.
     pub image: Option<(PathBuf, Span)>,
@@ -171,28 +171,28 @@ pub struct AreaLightDesc {
     pub span: Span,
 }
 
-/// What the image of a light means.
+/// The use of a light's image.
 #[derive(Clone, Copy, Debug)]
 pub enum ImageUse {
-    /// Radiance from everywhere.
+    /// Radiance from all directions.
     Environment {
-        /// Illuminance that replaces the brightness, if positive.
+        /// Illuminance that replaces the radiance scale, if positive.
         illuminance: f32,
-        /// What the light comes through.
+        /// The portal, if any.
         portal: Option<Portal>,
     },
     /// Factors of an intensity by direction.
     Goniometric {
         /// Radiant intensity.
         intensity: Rgb,
-        /// Power that replaces the brightness, if positive.
+        /// Power that replaces the intensity scale, if positive.
         power: f32,
     },
     /// Intensities in a rectangle.
     Projection {
         /// Angle of view along the shorter side (degrees).
         fov: f32,
-        /// Power that replaces the brightness, if positive.
+        /// Power that replaces the intensity scale, if positive.
         power: f32,
     },
 }
@@ -202,15 +202,15 @@ pub enum ImageUse {
 pub struct EnvironmentDesc {
     /// Image.
     pub path: PathBuf,
-    /// Where it is named.
+    /// Source position of the file name.
     pub span: Span,
-    /// What it means.
+    /// Use of the image.
     pub image_use: ImageUse,
-    /// Place and orientation.
+    /// Position and orientation.
     pub world_from_light: Affine3A,
     /// Factor of the radiance, or of the intensity.
     pub scale: f32,
-    /// Place among the lights.
+    /// Index among the lights.
     pub index: usize,
 }
 
@@ -219,24 +219,24 @@ pub struct EnvironmentDesc {
 pub struct ObjectDesc {
     /// Name.
     pub name: String,
-    /// Where it is named.
+    /// Source position of the name.
     pub span: Span,
-    /// Objects that it holds, placed in its space.
+    /// Instances of objects within, in its space.
     pub instances: Vec<InstanceDesc>,
 }
 
-/// A placement of an object.
+/// An instance of an object.
 #[derive(Clone, Debug)]
 pub struct InstanceDesc {
     /// Index of the object.
     pub object: usize,
     /// Its transformation.
     pub ctm: Ctm,
-    /// Where it is placed.
+    /// Source position of the instance.
     pub span: Span,
 }
 
-/// Where the numbers of a shape come from.
+/// The source of a shape's numbers.
 #[derive(Clone, Debug)]
 pub enum ShapeSource {
     /// Triangles in the file itself.
@@ -295,31 +295,31 @@ pub struct CurveData {
     /// The origin of the points.
     pub(super) origin: DVec3,
     pub(super) curves: Vec<Curve>,
-    /// Of ribbons, two for each curve.
+    /// Normals of ribbons, two for each curve.
     pub(super) normals: Vec<[Vec3; 2]>,
 }
 
 /// Displacement of a mesh along its normals.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DisplacementDesc {
-    /// A float texture: how far, in the units of the mesh.
+    /// A float texture: the displacement, in units of the mesh.
     pub texture: FloatTextureId,
-    /// Longest edge of a triangle of the displaced mesh, in the units of the scene.
+    /// Maximum edge of a triangle of the displaced mesh, in units of the scene.
     pub edge_length: f32,
 }
 
-/// A shape with all that the graphics state gives it.
+/// A shape with its graphics state.
 #[derive(Clone, Debug)]
 pub struct ShapeDesc {
     /// Its numbers.
     pub source: ShapeSource,
-    /// A name for people.
+    /// A readable name.
     pub name: String,
-    /// Where it stands.
+    /// Source position.
     pub span: Span,
-    /// Transformation from its own space to that of the world, or of its object.
+    /// Transform from object space to world space, or to the space of its object.
     pub ctm: Ctm,
-    /// The point of the world that is the origin of the space which is rendered.
+    /// The point of world space that is the origin of rendered space.
     pub origin: DVec3,
     /// `ReverseOrientation`.
     pub reverse_orientation: bool,
@@ -327,9 +327,9 @@ pub struct ShapeDesc {
     pub material: MaterialUse,
     /// Emission.
     pub area_light: Option<AreaLightDesc>,
-    /// Cut-outs.
+    /// Alpha texture.
     pub alpha: Option<u32>,
-    /// By how much the surface moves.
+    /// Displacement of the surface.
     pub displacement: Option<DisplacementDesc>,
     /// The object that it belongs to.
     pub object: Option<usize>,

@@ -52,7 +52,7 @@ impl Visitor for Builder<'_> {
             D::Sampler(name) => self.options.sampler(name, params),
             D::Integrator(name) => self.options.integrator(name, params),
             D::PixelFilter(name) => self.options.pixel_filter(name, params),
-            // How the ray tracer is built is not the scene's business here.
+            // The ray tracer is not configured by the scene.
             D::Accelerator(_) => {}
             D::MakeNamedMedium(name) => {
                 self.with_defaults(AttributeTarget::Medium, &mut params);
@@ -177,7 +177,7 @@ impl Builder<'_> {
     }
 
     fn pop(&mut self) {
-        // The parser checks that blocks nest; an `End` that it let through has its `Begin` on the stack.
+        // The parser checks the nesting of blocks, so each `End` has its `Begin` on the stack.
         if let Some(state) = self.stack.pop() {
             self.state = state;
         }

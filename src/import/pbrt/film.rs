@@ -13,9 +13,9 @@ use lumiris_formats::pbrt::params::{ParamSet, ParamType, Values};
 use lumiris_formats::source::Span;
 use lumiris_numbers::math::Mat3;
 
-/// The sensor whose responses are colour matching functions, which is the default.
+/// The default sensor, whose responses are the colour matching functions.
 const OBSERVER: &str = "cie1931";
-/// Sensors of cameras that pbrt-v4 has measured responses of.
+/// Camera sensors with measured responses in pbrt-v4.
 const CAMERAS: [&str; 17] = [
     "canon_eos_100d",
     "canon_eos_1dx_mkii",
@@ -36,15 +36,15 @@ const CAMERAS: [&str; 17] = [
     "sony_ilce_9",
 ];
 
-/// What a film's sensor says of its exposure.
+/// The film's sensor.
 pub(super) struct Sensor {
-    /// Factor by its ISO and scale.
+    /// Exposure factor by its ISO and scale.
     pub(super) scale: f32,
-    /// Diagonal, which matters to realistic cameras (mm).
+    /// Diagonal, for realistic cameras (mm).
     pub(super) diagonal: f32,
 }
 
-/// Understands `Film` and `PixelFilter`.
+/// Imports `Film` and `PixelFilter`.
 pub(super) fn finish_film(
     pending: Option<&Pending>,
     filter: Option<&Pending>,
@@ -79,7 +79,7 @@ pub(super) fn finish_film(
         pixel_bounds = read_pixel_bounds(p, d);
         if let Some(v) = p.floats("cropwindow", d) {
             match *v {
-                // As in pbrt-v4: what lies outside is cut off, ends in any order
+                // As in pbrt-v4, windows are clamped, and ends may have any order
                 [x0, x1, y0, y1] if v.iter().all(|x| x.is_finite()) => {
                     let ends = |a: f32, b: f32| [a.min(b), a.max(b)].map(|x| x.clamp(0.0, 1.0));
                     let ([x0, x1], [y0, y1]) = (ends(x0, x1), ends(y0, y1));
@@ -95,7 +95,7 @@ pub(super) fn finish_film(
         }
         (sensor.scale, film.balance) = exposure(p, d);
         sensor.diagonal = positive(p, "diagonal", sensor.diagonal, d);
-        // Half-floats and splits of the file do not matter to us
+        // Parameters of half-floats and file splitting have no effect here
         for key in ["savefp16", "maxcomponentvalue", "coordinatesystem", "nbuckets", "lambdamin", "lambdamax"] {
             if p.ignore(key) && key == "maxcomponentvalue" {
                 d.warning_once(p.span_of(key), "maxcomponentvalue is ignored: clamping would darken the image");
@@ -174,9 +174,9 @@ fn film_kind(name: &Name, d: &mut Diagnostics) {
     }
 }
 
-/// The factor that a sensor's ISO gives, and its white balance; exposure time is the camera's. Sensors of cameras are
-/// balanced for daylight of 6500 K unless another temperature is given. pbrt-v4 scales what they respond to that white to the
-/// luminance that it has, so that the factor is the same for all.
+/// The factor of a sensor's ISO, and its white balance; exposure time belongs to the camera. Camera sensors are
+/// balanced for daylight of 6500 K unless another temperature is given. pbrt-v4 scales their response to that white to
+/// its luminance, so the factor is the same for all sensors.
 fn exposure(p: &ParamSet, d: &mut Diagnostics) -> (f32, Option<Mat3>) {
     let is_camera = sensor_is_of_camera(p, d);
     let kelvin = match p.float("whitebalance", d).unwrap_or(0.0) {
@@ -191,7 +191,7 @@ fn exposure(p: &ParamSet, d: &mut Diagnostics) -> (f32, Option<Mat3>) {
     (scale * positive(p, "iso", 100.0, d) / 100.0, balance)
 }
 
-/// True if the film has the sensor of a camera.
+/// True if the film has a camera sensor.
 fn sensor_is_of_camera(p: &ParamSet, d: &mut Diagnostics) -> bool {
     let Some(name) = p.string("sensor", d).filter(|name| *name != OBSERVER) else { return false };
     let name = name.to_owned();

@@ -1,4 +1,4 @@
-//! The end of an import: reads all files in parallel, and assembles the scene in the order of its text.
+//! The end of an import: reads all files in parallel, and assembles the scene in text order.
 
 use super::descriptions::{AreaLightDesc, ShapeDesc};
 use super::instances::{Objects, flattened, rendered};
@@ -31,26 +31,26 @@ use std::collections::{BTreeSet, HashMap};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// Geometry while it is assembled.
+/// Geometry during assembly.
 #[derive(Default)]
 struct Assembly {
     set: GeometrySet,
     surfaces: Vec<Surface>,
-    /// Emitters, with the descriptions of their lights and their groups.
+    /// Emitters, with their emission and light groups.
     emitters: Vec<(GeometryId, Emission, Option<Arc<str>>)>,
     /// Opening and closing of the shutter as fractions of the motion.
     shutter: [f32; 2],
     /// Images that area lights emit.
     images: HashMap<PathBuf, Arc<EmissionImage>>,
     media: MediaInUse,
-    /// By object, what moves within, or is far from its origin: groups with their placements.
+    /// By object, groups that move within it or are far from its origin, with their transforms.
     moving: Vec<Vec<(GroupId, Vec<DAffine3>)>>,
-    /// Groups of what is far from the origin of its object, by the index of this and their own origin.
+    /// Groups far from the origin of their object, by the index of the object and their own origin.
     far: HashMap<(usize, [u64; 3]), GroupId>,
 }
 
 impl Assembly {
-    /// The group of what stands still in an object and has this origin.
+    /// The group of static shapes in an object that have this origin.
     fn in_object(&mut self, object: usize, origin: DVec3) -> &mut Group {
         if origin == DVec3::ZERO {
             return &mut self.set.groups[object];
@@ -66,7 +66,7 @@ impl Assembly {
 }
 
 impl Assembly {
-    /// Adds the shapes of an instance without an inverse to the root.
+    /// Adds the shapes of a singular instance to the root.
     fn add_flat(&mut self, instance: &Instance, span: Span, d: &mut Diagnostics) {
         let [world_from_group] = instance.world_from_group[..] else {
             d.error(span, "an object cannot be flattened while it moves");
@@ -93,16 +93,16 @@ impl Assembly {
 }
 
 impl Builder<'_> {
-    /// Reads the files that the text names and builds the scene; `None` after an error. Also returns its settings, and which of
-    /// them the text gives.
+    /// Reads the files that the text names and builds the scene; `None` after an error. Also returns its settings, and
+    /// the settings that the text gives.
     pub fn finish(mut self, files: &FileCache, d: &mut Diagnostics) -> Option<(Scene, Settings, Placed)> {
         let options = self.options.finish(self.load_options, d);
 
-        // Read all files, whatever went wrong before: all missing ones are named in one run
+        // Read all files even after errors, so that one run reports all missing ones
         let mut shapes = std::mem::take(&mut self.shapes);
         let environment_paths: Vec<PathBuf> = self.environments.iter().map(|e| e.path.clone()).collect();
         let emission_paths = self.emission_image_paths();
-        // Images first: while one thread loads the library that reads them, the others have meshes and coats to work on
+        // Images first: while one thread loads the image library, the others process meshes and coats
         let ((images, emission_images, texture_images, face_maps, measured), (made, materials)) = rayon::join(
             || {
                 let emission_images = load_emission_images(&emission_paths, files);
@@ -172,7 +172,7 @@ impl Builder<'_> {
         }
         let (geometry, textures) = (Arc::new(assembly.set), Arc::new(self.textures));
         for (id, emission, group) in assembly.emitters {
-            // As in pbrt-v4, what has an alpha of 0 everywhere is a light that cannot be seen
+            // As in pbrt-v4, an emitter with an alpha of 0 everywhere is an invisible light
             let is_unseen = |cover: &Arc<Cover>| textures.constant_float(cover.texture) == Some(0.0);
             let cover = Cover::of(&geometry, id, Arc::clone(&textures) as _).filter(|cover| !is_unseen(cover));
             let shape = &geometry.geometries[id as usize].shape;
@@ -203,7 +203,7 @@ impl Builder<'_> {
         Some((scene, settings, given))
     }
 
-    /// Adds the shapes of one description to their group, or to the root, or to an instance of their own if they move.
+    /// Adds the shapes of one description to their group, to the root, or to an instance of their own if they move.
     fn place(&self, assembly: &mut Assembly, desc: &ShapeDesc, made: Made, material: MaterialId, d: &mut Diagnostics) {
         let moving = desc.ctm.is_moving();
         let sides = assembly.media.sides(&desc.media, material);
@@ -230,7 +230,7 @@ impl Builder<'_> {
                 (None, false) => Some((emission_of(light, &shape, &assembly.images), light.group.clone())),
             });
             if passes && emission.is_none() && sides.is_none() {
-                // Nothing scatters here, and the medium stays the same: rays need not stop.
+                // No scattering, and the same medium on both sides: rays need not stop.
                 continue;
             }
             assembly.emitters.extend(emission.map(|(emission, group)| (id, emission, group)));
@@ -287,7 +287,7 @@ impl Builder<'_> {
         d: &mut Diagnostics,
     ) -> HashMap<PathBuf, Arc<EmissionImage>> {
         let mut found = HashMap::new();
-        // Where each is named first
+        // The first source position of each file
         let users = shapes.iter().rev().filter_map(|s| s.area_light.as_ref()?.image.as_ref());
         let spans: HashMap<&PathBuf, Span> = users.map(|(path, span)| (path, *span)).collect();
         for (path, image) in images {
@@ -312,9 +312,8 @@ fn load_images(paths: &[PathBuf], files: &FileCache) -> Vec<LoadedImage> {
     paths.par_iter().map(|path| files.rgb(path)).collect()
 }
 
-/// Makes all shapes. Where meshes are kept for other scenes, each file is read once; elsewhere a mesh is placed as soon
-/// as it has been read, so that there is one copy of it.
-/// All shapes: those that need the images of textures are made at last.
+/// Makes all shapes. If meshes are cached for other scenes, each file is read once. Otherwise a mesh is transformed as
+/// soon as it has been read, so that there is one copy. Shapes that need texture images are made last.
 fn with_displaced(
     made: Vec<Option<Result<Made, ShapeError>>>,
     shapes: &mut [ShapeDesc],
@@ -325,7 +324,7 @@ fn with_displaced(
     made.into_iter().zip(displaced).map(|(made, displaced)| made.or(displaced)).collect()
 }
 
-/// The shapes that are displaced by textures, which are given then, or the others.
+/// Makes either the shapes displaced by `textures`, or, without these, all other shapes.
 fn make_shapes(
     shapes: &mut [ShapeDesc],
     files: &FileCache,
@@ -337,7 +336,7 @@ fn make_shapes(
     let paths: BTreeSet<&Path> =
         shapes.iter().filter(|s| files.keeps() && is_meant(s)).filter_map(|s| s.source.file()).collect();
     let paths: Vec<PathBuf> = paths.into_iter().map(Path::to_path_buf).collect();
-    // What cannot be read is reported by the shapes that need it
+    // Shapes report their unreadable files
     let meshes = paths.into_par_iter().filter_map(|path| files.mesh(&path).ok().map(|mesh| (path, mesh)));
     let meshes: HashMap<PathBuf, Arc<PlyMesh>> = meshes.collect();
     let mesh = |path: &Path| meshes.get(path).map_or_else(|| files.mesh(path), |mesh| Ok(Arc::clone(mesh)));
@@ -363,7 +362,7 @@ fn emission_of(light: &AreaLightDesc, shape: &Shape, images: &HashMap<PathBuf, A
     let mut emission = Emission { two_sided: light.two_sided, image, ..Emission::constant(light.l) };
     if light.power > 0.0 {
         let area = area_lights_of(shape, &emission).lights.iter().map(|l| l.area()).sum();
-        // The image counts, and the colour does not: pbrt-v4 takes the colour for white here.
+        // The image replaces the colour: pbrt-v4 uses white here.
         let white = Emission { l: Rgb::WHITE, ..emission.clone() };
         emission.l *= power_factor(light, area, white.mean_luminance());
     }

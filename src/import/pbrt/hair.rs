@@ -8,8 +8,8 @@ use lumiris_formats::pbrt::params::ParamSet;
 use lumiris_numbers::math::Rgb;
 
 impl Builder<'_> {
-    /// The first that is given of `sigma_a`, `reflectance` or `color`, and the melanins colours the fibres; without any,
-    /// it is a concentration of eumelanin of 1.3, as in pbrt-v4.
+    /// The first parameter given among `sigma_a`, `reflectance`, `color`, and the melanins determines the colour of the
+    /// fibres. The default is a eumelanin concentration of 1.3, as in pbrt-v4.
     pub(super) fn hair(&mut self, p: &ParamSet, d: &mut Diagnostics) -> Material {
         const COLORS: [&str; 5] = ["sigma_a", "reflectance", "color", "eumelanin", "pheomelanin"];
         let given: Vec<&'static str> = COLORS.into_iter().filter(|name| p.type_of(name).is_some()).collect();

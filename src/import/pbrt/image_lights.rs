@@ -1,4 +1,4 @@
-//! Lights that have waited for their images.
+//! Lights that need images.
 
 use super::descriptions::{EnvironmentDesc, ImageUse};
 use crate::lights::environment::orthogonal;
@@ -11,7 +11,7 @@ use std::f32::consts::PI;
 use std::sync::Arc;
 
 impl EnvironmentDesc {
-    /// The light, when its image (rows from the top) is there.
+    /// Builds the light from its image (rows from the top).
     pub fn light(&self, texels: Vec<Rgb>, size: [usize; 2], d: &mut Diagnostics) -> Option<Light> {
         let made = match self.image_use {
             ImageUse::Environment { illuminance, portal } => self.environment((texels, size), illuminance, portal, d),
@@ -53,7 +53,7 @@ impl EnvironmentDesc {
         (self.world_from_light.translation.into(), orthogonal(&self.world_from_light))
     }
 
-    /// As in pbrt-v4, the image is grey: the mean of its channels. `power` is that of a white intensity.
+    /// As in pbrt-v4, the image is grey: the mean of its channels. `power` is the power of a white intensity.
     fn goniometric(&self, texels: Vec<Rgb>, size: [usize; 2], (intensity, power): (Rgb, f32)) -> Result<Light, String> {
         if size[0] != size[1] {
             return Err(format!("a goniometric diagram is square (an equal-area map), not {}×{}", size[0], size[1]));
@@ -64,7 +64,7 @@ impl EnvironmentDesc {
         Ok(Light::Image(Arc::new(self.scaled(light, intensity, power))))
     }
 
-    /// The light with a factor of its intensity, and with `power` instead of its own if that is positive.
+    /// Scales the light's intensity, or sets its power if `power` is positive.
     fn scaled(&self, light: ImageLight, factor: Rgb, power: f32) -> ImageLight {
         let brightness = if power > 0.0 && light.phi() > 0.0 { power / light.phi() } else { 1.0 };
         light.scaled(factor * (self.scale * brightness))

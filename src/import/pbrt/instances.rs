@@ -1,4 +1,4 @@
-//! Placements of objects, and of what moves or is placed inside of them.
+//! Instances of objects, and of moving or nested parts within them.
 
 use super::descriptions::{InstanceDesc, ObjectDesc};
 use super::shapes::placed_quadric;
@@ -8,31 +8,32 @@ use lumiris_numbers::math::origin::rebased;
 use lumiris_numbers::math::transform::{compose_placements, swaps_handedness};
 use lumiris_numbers::math::{Affine3A, DAffine3, DVec3};
 
-/// Most placements of groups in a scene.
+/// Maximum number of instances of groups in a scene.
 pub(super) const MAX_INSTANCES: u64 = 100_000_000;
 
-/// The objects of a scene. What stands still in one is a group with the object's index.
+/// The objects of a scene. The static part of an object is a group with the object's index.
 pub(super) struct Objects<'a> {
-    /// Objects; each holds only those before it.
+    /// Objects; each contains only earlier ones.
     pub objects: &'a [ObjectDesc],
-    /// By object, what moves within, or is far from its origin: groups with their placements.
+    /// By object, groups that move within it or are far from its origin, with their transforms.
     pub moving: &'a [Vec<(GroupId, Vec<DAffine3>)>],
-    /// Opening and closing of the shutter as fractions of the motion.
+    /// Opening and closing of the shutter, as fractions of the motion.
     pub shutter: [f32; 2],
-    /// The point of the world that is the origin of the space which is rendered.
+    /// The point of world space that is the origin of rendered space.
     pub origin: DVec3,
 }
 
-/// Placements in the space that is rendered, of a group whose space has its origin at a point of its own.
+/// Transforms to rendered space, for a group whose space has its own origin.
 pub(super) fn rendered(placements: &[DAffine3], origin: DVec3, of_group: DVec3) -> Vec<Affine3A> {
     placements.iter().map(|m| rebased(m, origin, of_group).as_affine3a()).collect()
 }
 
-/// Placements of groups.
+/// Instances of groups.
 #[derive(Default)]
 pub(super) struct Placed {
     pub instances: Vec<Instance>,
-    /// Those without an inverse, which ray tracers need: what they place is flat. And where each is asked for.
+    /// Singular instances, which ray tracers do not support: they flatten their group. With the source position of
+    /// each.
     pub flat: Vec<(Instance, Span)>,
 }
 
@@ -47,7 +48,7 @@ impl Placed {
     }
 }
 
-/// The shape in world space that a placement without an inverse makes; `None` if it cannot be flat.
+/// The shape in world space flattened by a singular transform; `None` if it cannot be flat.
 pub(super) fn flattened(shape: &Shape, world_from_group: &Affine3A) -> Option<Shape> {
     match shape {
         Shape::Mesh(mesh) => Some(Shape::Mesh(mesh.transformed(world_from_group))),
@@ -62,7 +63,9 @@ pub(super) fn flattened(shape: &Shape, world_from_group: &Affine3A) -> Option<Sh
 }
 
 impl Objects<'_> {
-    /// The placements of groups that these of objects make; `Err` if they are too many.
+    /// The instances of groups that these instances of objects expand to.
+    ///
+    /// Returns `Err` with a message if they are too many.
     pub(super) fn place(&self, instances: &[InstanceDesc]) -> Result<Placed, String> {
         let mut sizes: Vec<u64> = Vec::new();
         for (object, moving) in self.objects.iter().zip(self.moving) {
@@ -75,7 +78,7 @@ impl Objects<'_> {
         }
         let mut placed = Placed { instances: Vec::with_capacity(all as usize), flat: Vec::new() };
         for asked in instances {
-            // Not by recursion: nothing limits how deep objects nest
+            // Iterative, since the nesting depth of objects is unlimited
             let mut open = vec![(asked.object, asked.ctm.samples(self.shutter))];
             while let Some((object, placement)) = open.pop() {
                 let instance = |group: GroupId, placement: &[DAffine3]| Instance {

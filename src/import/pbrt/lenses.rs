@@ -9,18 +9,18 @@ use lumiris_formats::number::numbers_of_text;
 use lumiris_formats::pbrt::params::ParamSet;
 use std::path::{Path, PathBuf};
 
-/// Diameter of the stop unless one is given, as in pbrt-v4 (mm).
+/// Default diameter of the stop, as in pbrt-v4 (mm).
 const APERTURE: f32 = 1.0;
 
 /// The files that a camera names.
 pub(super) fn files(p: &ParamSet, folder: &Path) -> Vec<PathBuf> {
-    // What is wrong with the parameters has been said
+    // Parameter errors were reported before
     let d = &mut Diagnostics::new();
     let aperture = p.string("aperture", d).filter(|name| Aperture::named(name).is_none());
     p.string("lensfile", d).into_iter().chain(aperture).map(|name| file_in(folder, name)).collect()
 }
 
-/// The lenses in front of a film of a diagonal (m), in focus.
+/// The lenses, in focus, for a film with the given diagonal (m).
 pub(super) fn realistic(p: &ParamSet, folder: &Path, diagonal: f32, d: &mut Diagnostics) -> Option<LensSystem> {
     let Some(name) = p.string("lensfile", d) else {
         d.error(p.span, "camera `realistic` needs `string lensfile`");

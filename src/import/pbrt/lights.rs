@@ -50,7 +50,7 @@ impl Builder<'_> {
         self.light_groups.resize(self.lights.len(), group);
     }
 
-    /// What emits no given colour: the illuminant of the current colour space.
+    /// The default colour of emission: the illuminant of the current colour space.
     fn white(&self) -> Rgb {
         self.state.color_space.to_rec709([1.0; 3], Colored::Light)
     }
@@ -98,7 +98,8 @@ impl Builder<'_> {
             d.error(p.span_of("to"), "`from` and `to` are the same point");
             return None;
         };
-        // pbrt-v4 replaces the scale, with what the colour's white is, and so the colour's luminance stays in.
+        // pbrt-v4 replaces the scale, including the normalisation of the white point, so the colour's luminance remains
+        // a factor.
         let l = if illuminance > 0.0 { l * illuminance } else { l };
         Some(Light::Distant { wi_world, l })
     }
@@ -128,7 +129,7 @@ impl Builder<'_> {
         ))
     }
 
-    /// `portal`: corners in world space, whatever the current transformation is.
+    /// `portal`: corners in world space, independent of the current transform.
     fn portal(&self, p: &ParamSet, d: &mut Diagnostics) -> Option<Portal> {
         let param = p.get("portal", &[ParamType::Point3], d)?;
         let corners = param.doubles().unwrap_or_default().chunks_exact(3).map(DVec3::from_slice);
@@ -138,7 +139,7 @@ impl Builder<'_> {
         portal.map_err(|reason| d.error(param.value_span, reason)).ok()
     }
 
-    /// A light that keeps the place of another one until the image of that is there.
+    /// Reserves the index of a light until its image is read.
     fn wait_for_image(
         &mut self,
         (name, span): (&str, Span),
@@ -166,7 +167,7 @@ impl Builder<'_> {
         Some(self.wait_for_image((&name, p.span_of("filename")), image_use, (&(*world_from_light * swap), scale)))
     }
 
-    /// `LightSource "projection"`: along z, with the first row of the image at the greatest y.
+    /// `LightSource "projection"`: along z, with the first row of the image at the maximum y.
     fn projection(
         &mut self,
         p: &ParamSet,
@@ -211,14 +212,14 @@ impl Builder<'_> {
     }
 }
 
-/// The same radiance from everywhere beyond a portal.
+/// Constant radiance through a portal.
 fn constant_portal(l: Rgb, portal: Portal) -> Light {
     let map = EnvironmentMap::new(vec![l], [1, 1], EnvironmentMapping::EqualArea, EnvironmentFilter::Nearest)
         .expect("one texel is square");
     Light::Portal(Arc::new(PortalLight::new(Arc::new(map), Mat3::IDENTITY, 1.0, portal)))
 }
 
-/// `filename`, which a light needs.
+/// `filename`, which the light requires.
 fn image_of(p: &ParamSet, kind: &str, d: &mut Diagnostics) -> Option<String> {
     let name = file_name(p, "filename", d).map(str::to_owned);
     if name.is_none() {
@@ -227,7 +228,7 @@ fn image_of(p: &ParamSet, kind: &str, d: &mut Diagnostics) -> Option<String> {
     name
 }
 
-/// `lightgroup`: the layer of the image that the light has.
+/// `lightgroup`: the image layer of the light.
 fn light_group(p: &ParamSet, d: &mut Diagnostics) -> Option<Arc<str>> {
     let name = nfc(p.string("lightgroup", d)?).into_owned();
     match fault_of_name(&name) {
@@ -258,7 +259,7 @@ fn light_scale(p: &ParamSet, d: &mut Diagnostics) -> f32 {
     0.0
 }
 
-/// The factor that gives a surface of `area` (m²) the power that is asked for; `mean` is the mean of its image.
+/// The factor that gives a surface of `area` (m²) the requested power; `mean` is the mean of its image.
 pub fn power_factor(desc: &AreaLightDesc, area: f32, mean: f32) -> f32 {
     let sides = if desc.two_sided { 2.0 } else { 1.0 };
     let emitted = mean * sides * area * PI;

@@ -45,7 +45,7 @@ const KINDS: &[&str] = &[
 const MODELS: &[&str] = &["diffuse", "orennayar", "cooktorrance", "phong", "retroreflective", "ashikhminshirley"];
 
 impl Builder<'_> {
-    /// `Material "kind"`, which is made when all names are known.
+    /// `Material "kind"`, which is made after all names are defined.
     pub fn material(&mut self, kind: Name, params: ParamSet) {
         let id = self.add_material(kind.text.clone(), kind, params);
         self.state.material = MaterialUse::Id(id);
@@ -67,7 +67,7 @@ impl Builder<'_> {
         self.named_materials.insert(name.text, (id, name.span));
     }
 
-    /// Keeps a place for the material.
+    /// Reserves an index for the material.
     fn add_material(&mut self, name: String, kind: Name, params: ParamSet) -> MaterialId {
         let (id, state) = (self.materials.len() as MaterialId, self.param_state());
         let material = Material::Interface;
@@ -78,7 +78,7 @@ impl Builder<'_> {
         id
     }
 
-    /// Makes a material, when all textures are there.
+    /// Makes a material after all textures are made.
     pub(super) fn material_entry(&mut self, desc: &MaterialDesc, d: &mut Diagnostics) -> MaterialEntry {
         let (kind, p) = (desc.kind.text.as_str(), &desc.params);
         let material = match kind {
@@ -142,8 +142,8 @@ impl Builder<'_> {
         }
     }
 
-    /// `Material "evaluated" "string model" "…"`, whose value alone is used: directions are proposed by a density that
-    /// is the same for all, and resampled. Parameters of the models, all of them textures too:
+    /// `Material "evaluated" "string model" "…"`, of which only the value is used. Directions are proposed by a density
+    /// that is the same for all models, and resampled. Parameters of the models, which may all be textures:
     ///
     /// | model | parameters |
     /// |---|---|
@@ -191,7 +191,7 @@ impl Builder<'_> {
         })
     }
 
-    /// v3's `matte`: Lambertian, or Oren-Nayar where `sigma` may be other than 0.
+    /// pbrt-v3's `matte`: Lambertian, or Oren-Nayar if `sigma` may be other than 0.
     fn matte(&mut self, p: &ParamSet, d: &mut Diagnostics) -> Material {
         let reflectance = self.albedo(p, "Kd", Rgb::splat(0.5), d);
         let sigma = self.float_param(p, "sigma", 0.0, d);
@@ -201,7 +201,7 @@ impl Builder<'_> {
         }
     }
 
-    /// Materials of pbrt-v3, and those that are not rendered yet.
+    /// Materials of pbrt-v3, and unsupported ones.
     fn other_material(&mut self, place: &Name, p: &ParamSet, d: &mut Diagnostics) -> Material {
         let kind = place.text.as_str();
         match kind {
@@ -305,7 +305,7 @@ impl Builder<'_> {
         Roughness { u, v, remap: p.boolean("remaproughness", d).unwrap_or(true) }
     }
 
-    /// Dispersion by a spectrum `eta`; what is wrong with it has been said.
+    /// Dispersion by a spectrum `eta`; its errors were reported before.
     fn dispersion(&mut self, p: &ParamSet) -> Option<Arc<Dispersion>> {
         let mut known = Diagnostics::default();
         let is_spectrum = p.type_of("eta") == Some(ParamType::Spectrum);
@@ -316,7 +316,7 @@ impl Builder<'_> {
         }
     }
 
-    /// An index of refraction: a number, or a spectrum of which the helium d line counts.
+    /// An index of refraction: a number, or the value of a spectrum at the helium d line.
     pub(super) fn ior(&mut self, p: &ParamSet, name: &'static str, d: &mut Diagnostics) -> f32 {
         let eta = match p.type_of(name) {
             None => {
@@ -370,8 +370,8 @@ impl Builder<'_> {
         let eta = input(self, eta_name, "metal-Cu-eta");
         let k = input(self, k_name, "metal-Cu-k");
         if let (Some(eta), Some(k)) = (eta, k) {
-            // Both curves together make the colour that a spectral renderer shows; the Fresnel equations per channel of
-            // a colour do not.
+            // A spectral renderer shows the colour of both curves together. The Fresnel equations per colour channel do
+            // not give this colour.
             let (eta, k) = spectra::conductor_rgb(&eta.unbounded_curve(), &k.unbounded_curve());
             let (eta, k) =
                 (self.textures.add_rgb(RgbTexture::Constant(eta)), self.textures.add_rgb(RgbTexture::Constant(k)));
@@ -397,7 +397,7 @@ impl Builder<'_> {
         }
     }
 
-    /// The material of a name, when all names are known.
+    /// The material with a name, after all names are defined.
     fn named_material(&self, name: &str, span: Span, d: &mut Diagnostics) -> Option<MaterialId> {
         let found = self.named_materials.get(&*nfc(name)).map(|(id, _)| *id);
         if found.is_none() {
@@ -406,7 +406,7 @@ impl Builder<'_> {
         found
     }
 
-    /// The material of a shape, when all names are known.
+    /// The material of a shape, after all names are defined.
     pub fn material_of(&self, material: &MaterialUse, d: &mut Diagnostics) -> Option<MaterialId> {
         match material {
             MaterialUse::Id(id) => Some(*id),

@@ -17,7 +17,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 impl Builder<'_> {
-    /// `string filename`, of which each is read once, with the meshes.
+    /// `string filename`; each file is read once, together with the meshes.
     pub(super) fn measured(&mut self, place: &Name, p: &ParamSet, d: &mut Diagnostics) -> Material {
         let Some(name) = file_name(p, "filename", d) else {
             d.error(place.span, "material `measured` needs a `string filename`")
@@ -29,7 +29,7 @@ impl Builder<'_> {
     }
 }
 
-/// The content of a file, or what is wrong with it.
+/// The content of a file, or its error.
 pub(super) type Loaded = Result<Arc<MeasuredTables>, MeasuredError>;
 
 /// Reads all files.
@@ -37,7 +37,7 @@ pub(super) fn load(wanted: &[(PathBuf, Span)], files: &FileCache) -> Vec<Loaded>
     wanted.par_iter().map(|(path, _)| files.measured(path)).collect()
 }
 
-/// The tables in the order of their files; what could not be read is reported.
+/// The tables in the order of their files; reports unreadable ones.
 pub(super) fn check(loaded: Vec<Loaded>, wanted: &[(PathBuf, Span)], d: &mut Diagnostics) -> Vec<Arc<MeasuredTables>> {
     let places = wanted.iter().map(|(path, span)| (path.as_path(), *span));
     readable(loaded, places, d, |error| match error {

@@ -19,7 +19,7 @@ use lumiris_numbers::math::{DAffine3, DVec3, Rgb};
 use std::collections::HashMap;
 use std::sync::Arc;
 
-/// Temperatures whose radiance is tabulated.
+/// Number of temperatures whose radiance is tabulated.
 const TEMPERATURES: usize = 1024;
 
 /// The media that surfaces and the camera refer to.
@@ -48,7 +48,7 @@ impl MediaInUse {
 }
 
 impl Builder<'_> {
-    /// `MakeNamedMedium "name"`, of which media are made at the end of the text.
+    /// `MakeNamedMedium "name"`; media are made after all directives are read.
     pub fn make_named_medium(&mut self, name: Name, params: ParamSet, d: &mut Diagnostics) {
         if name.text.is_empty() {
             d.error(name.span, "a medium needs a name");
@@ -62,7 +62,7 @@ impl Builder<'_> {
         self.media.push(MediumDesc { name, medium: None, volume: None });
     }
 
-    /// Makes a medium, when it is known where the space that is rendered has its origin.
+    /// Makes a medium after the origin of rendered space is known.
     pub(super) fn make_medium(&mut self, index: usize, p: &mut ParamSet, d: &mut Diagnostics) {
         let span = self.media[index].name.span;
         let world_from_medium = self.still_transform("media", span, d);
@@ -92,7 +92,7 @@ impl Builder<'_> {
         (self.media[index].medium, self.media[index].volume) = (medium, volume);
     }
 
-    /// σ_a and σ_s with the scale; 1 where the file says nothing.
+    /// σ_a and σ_s including the scale; 1 by default.
     pub(super) fn coefficients(&self, p: &ParamSet, scale: f32, d: &mut Diagnostics) -> Option<[Rgb; 2]> {
         let mut of = [Rgb::WHITE; 2];
         let preset = p.string("preset", d).map(str::to_owned);
@@ -172,7 +172,7 @@ impl Builder<'_> {
             d.error(p.span_of("Le"), "an rgbgrid that emits needs `rgb sigma_a`");
             return None;
         }
-        // pbrt-v4 does not scale this emission to a luminance
+        // pbrt-v4 does not normalise this emission to a luminance
         let le = le.filter(|_| le_scale > 0.0).map(|samples| samples.map(|le| le * (le_scale * Y_INTEGRAL)));
         let grid = RgbGrid { sigma_a, sigma_s, scale, le };
         Some(Medium::Heterogeneous(Arc::new(Heterogeneous::new(Field::Rgb(grid), bounds?, placement, g))))
@@ -206,7 +206,7 @@ impl Builder<'_> {
             d.error(param.value_span, format!("{key} must be finite and not negative"));
             return None;
         }
-        // A colour of another space may lie beyond Rec.709
+        // A colour of another space may be outside Rec.709
         let samples = Samples::new(resolution, colors.map(|c| c.map(|c| c.max(0.0))).collect());
         if samples.is_none() {
             d.error(param.value_span, wrong_count(key, resolution, values.len() / 3));
@@ -251,7 +251,7 @@ impl Builder<'_> {
     }
 }
 
-/// A finite number that is not negative, or the default after an error.
+/// A finite non-negative number, or the default after an error.
 pub(super) fn not_negative(p: &ParamSet, key: &'static str, default: f32, d: &mut Diagnostics) -> f32 {
     match p.float(key, d) {
         Some(x) if x >= 0.0 && x.is_finite() => x,
@@ -271,7 +271,7 @@ pub(super) fn asymmetry(p: &ParamSet, d: &mut Diagnostics) -> f32 {
     g
 }
 
-/// The box between `p0` and `p1`, in the space of the medium: its least and its greatest corner.
+/// The box between `p0` and `p1`, in the space of the medium: its minimum and maximum corner.
 fn bounds(p: &ParamSet, d: &mut Diagnostics) -> Option<[DVec3; 2]> {
     let mut corner = |key, default| p.point(key, d).unwrap_or(default);
     let (a, b) = (corner("p0", DVec3::ZERO), corner("p1", DVec3::ONE));
@@ -320,7 +320,7 @@ fn wrong_count(key: &str, [nx, ny, nz]: [usize; 3], count: usize) -> String {
     format!("{key} has {count} values, and nx × ny × nz = {nx} × {ny} × {nz}")
 }
 
-/// The radiance of black bodies up to the highest temperature of the samples.
+/// Black-body radiance up to the maximum temperature of the samples.
 pub(super) fn glowing(samples: Scalars, offset: f32, scale: f32) -> Temperature {
     let hottest = samples.extremes().into_iter().map(|t| (t - offset) * scale).fold(0.0, f32::max);
     let step = (hottest / (TEMPERATURES - 1) as f32).max(f32::MIN_POSITIVE);

@@ -6,7 +6,8 @@ const fn of(name: &'static str, sigma_s: [f32; 3], sigma_a: [f32; 3]) -> (&'stat
     (name, [Rgb::from_array(sigma_a), Rgb::from_array(sigma_s)])
 }
 
-/// σ_a and σ_s by name: solids and milk of [Jensen et al. 2001, Fig. 5], other liquids of [Narasimhan et al. 2006, Tables 3 and 4].
+/// σ_a and σ_s by name: solids and milk from [Jensen et al. 2001, Fig. 5], other liquids from [Narasimhan et al. 2006,
+/// Tables 3 and 4].
 const PRESETS: &[(&str, [Rgb; 2])] = &[
     of("Apple", [2.29, 2.39, 1.97], [0.0030, 0.0034, 0.046]),
     of("Chicken1", [0.15, 0.21, 0.38], [0.015, 0.077, 0.19]),

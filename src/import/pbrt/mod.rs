@@ -1,10 +1,10 @@
 //! The pbrt-v4 scene format.
 //!
-//! Reading order: [`descriptions`] (what a file asks for), [`state`] (the scene while its file is read), [`checks`];
-//! a file for each kind of directive: [`transform`], [`options`], [`settings`], [`film`], [`spectrum`], `texture_names`, [`textures`], `ptex`,
-//! [`materials`], `hair`, `measured`, [`lights`], `image_lights`, [`media`] with `media_presets` and `volumes`, `curves`, [`shapes`]; [`directives`] (the state machine over `lumiris_formats::pbrt`'s directives);
-//! `resolve` (what has a name, which may be used before it is defined);
-//! and [`finish`] (reads files and assembles the scene).
+//! Reading order: [`descriptions`] (the scene's content), [`state`] (the scene during parsing), [`checks`]; a file for
+//! each kind of directive: [`transform`], [`options`], [`settings`], [`film`], [`spectrum`], `texture_names`,
+//! [`textures`], `ptex`, [`materials`], `hair`, `measured`, [`lights`], `image_lights`, [`media`] with `media_presets`
+//! and `volumes`, `curves`, [`shapes`]; [`directives`] (the state machine over `lumiris_formats::pbrt`'s directives);
+//! `resolve` (names that may be used before their definition); and [`finish`] (reads files and assembles the scene).
 
 pub mod checks;
 mod curves;

@@ -1,5 +1,5 @@
-//! Directives before `WorldBegin`: the camera; integrator and sampler are in [`super::settings`], film and filter in
-//! [`super::film`].
+//! Directives before `WorldBegin`: the camera and general options. Integrator and sampler are in [`super::settings`],
+//! film and filter in [`super::film`].
 
 use super::checks::{positive, unknown};
 use super::descriptions::Pending;
@@ -19,12 +19,12 @@ use lumiris_numbers::math::origin::{near_origin, rebased};
 use lumiris_numbers::math::{Affine3A, DAffine3, DVec3};
 use std::path::{Path, PathBuf};
 
-/// The options as far as they were read.
+/// The options read so far.
 #[derive(Default)]
 pub struct Options {
     camera: Option<(Pending, Ctm)>,
     camera_medium: Option<Name>,
-    /// Where the files of the camera are.
+    /// Folder of the camera's files.
     folder: PathBuf,
     film: Option<Pending>,
     filter: Option<Pending>,
@@ -43,13 +43,13 @@ pub struct ParsedOptions {
     pub film: FilmSettings,
     /// Integrator and sampler.
     pub settings: Settings,
-    /// The settings that the file gives.
+    /// The settings given in the file.
     pub given: Placed,
-    /// Opening and closing of the shutter as fractions of the motion.
+    /// Opening and closing of the shutter, as fractions of the motion.
     pub shutter: [f32; 2],
 }
 
-/// The camera, the film and the rest of an image's size.
+/// The camera, the film and other options of the image's size.
 struct CameraFrame {
     resolution: [u32; 2],
     shutter: [f32; 2],
@@ -65,14 +65,14 @@ impl Options {
         }
     }
 
-    /// `Camera`; a second one replaces the first, as do the others.
+    /// `Camera`; a second one replaces the first. The same holds for the other directives.
     pub fn camera(&mut self, name: Name, params: ParamSet, (ctm, folder): (Ctm, &Path), medium: Option<Name>) {
         self.camera = Some((Pending { name, params }, ctm));
         self.folder = folder.to_owned();
         self.camera_medium = medium;
     }
 
-    /// The origin of the space that is rendered: near to the camera, where its motion starts.
+    /// The origin of rendered space: near the camera, at the start of its motion.
     pub fn origin(&self) -> DVec3 {
         self.camera.as_ref().map_or(DVec3::ZERO, |(_, ctm)| near_origin(affine(&ctm.start.inverse()).translation))
     }
@@ -83,7 +83,7 @@ impl Options {
         camera.map_or_else(Vec::new, |(pending, _)| lenses::files(&pending.params, &self.folder))
     }
 
-    /// Factor of the edges of displaced meshes.
+    /// Factor of the edge lengths of displaced meshes.
     pub fn edge_scale(&self) -> f32 {
         self.edge_scale.unwrap_or(1.0)
     }
@@ -93,7 +93,7 @@ impl Options {
         self.camera_medium.as_ref()
     }
 
-    /// Where the integrator `path` is asked for, which leaves media out in pbrt-v4.
+    /// Source position of the integrator `path`, which ignores media in pbrt-v4.
     pub fn integrator_without_media(&self) -> Option<Span> {
         self.integrator.as_ref().map(|pending| &pending.name).filter(|name| name.text == "path").map(|name| name.span)
     }
@@ -118,7 +118,7 @@ impl Options {
         self.filter = Some(Pending { name, params });
     }
 
-    /// `Option "name" value`: case, `-` and `_` of the name do not count.
+    /// `Option "name" value`; case, `-` and `_` of the name are ignored.
     pub fn option(&mut self, name: &Name, value: &Name, d: &mut Diagnostics) {
         let letters = name.text.chars().filter(|c| !matches!(c, '-' | '_'));
         let key = letters.collect::<String>().to_ascii_lowercase();
@@ -127,7 +127,7 @@ impl Options {
         };
         let text = value.text.as_str();
         match key.as_str() {
-            // Negative numbers stand for the bits of large ones
+            // Negative numbers are large ones with the same bits
             "seed" => match text.parse::<i32>().map(|n| n as u32).or_else(|_| text.parse()) {
                 Ok(seed) => self.seed = Some(seed),
                 Err(_) => wrong(d, "a whole number of 32 bits"),
@@ -142,14 +142,14 @@ impl Options {
             | "forcediffuse"
             | "pixelstats"
             | "wavefront" => match text {
-                // How pbrt computes an image is not the image
+                // Options of the execution in pbrt have no effect on the image
                 "true" if key == "wavefront" => {}
                 "true" => warn_without_effect(name, d),
                 "false" => {}
                 _ => wrong(d, "true or false"),
             },
             "msereferenceimage" | "msereferenceout" => warn_without_effect(name, d),
-            // The space that pbrt computes in: the image is the same
+            // Computation space of pbrt, without effect on the image
             "rendercoordsys" if ["camera", "cameraworld", "world"].contains(&text) => {}
             "rendercoordsys" => wrong(d, "camera, cameraworld or world"),
             _ => unknown(&name.text, name.span, "option", OPTIONS, d),
@@ -274,7 +274,7 @@ fn lens(p: &ParamSet, d: &mut Diagnostics) -> Option<(f32, f32)> {
     Some((radius, positive(p, "focaldistance", 1e6, d)))
 }
 
-/// The part of the image plane that the film sees, x0 x1 y0 y1; the shorter axis spans −1..1 by default.
+/// The part of the image plane covered by the film, x0 x1 y0 y1; the shorter axis spans −1..1 by default.
 fn screen_window(p: &ParamSet, [w, h]: [u32; 2], d: &mut Diagnostics) -> Option<[f32; 4]> {
     let aspect = p.float("frameaspectratio", d).unwrap_or(w as f32 / h as f32);
     if !(aspect > 0.0 && aspect.is_finite()) {

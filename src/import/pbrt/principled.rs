@@ -1,4 +1,4 @@
-//! `Material "principled"`: a part of OpenPBR, by its names. All but the last three may be textures.
+//! `Material "principled"`: a subset of OpenPBR, with its names. All parameters but the last three may be textures.
 //!
 //! | parameter | default | range |
 //! |---|---|---|
@@ -13,12 +13,12 @@
 //! | `float specular_roughness_anisotropy` | 0 | 0 to 1 |
 //! | `bool geometry_thin_walled` | false | |
 //!
-//! Values outside of their ranges are errors; those of textures are clamped. Parameters have the names that Blender and
-//! Disney's material give them as well ([`SPELLINGS`]); of both,
+//! Values outside of their ranges are errors; texture values are clamped. Parameters may also have their names in
+//! Blender and in Disney's material ([`SPELLINGS`]), with these differences:
 //!
-//! * `specular_ior_level` and `specular` (numbers, default 0.5) are half the factor of the reflectance;
-//! * `anisotropic` keeps the product of both alphas, their ratio being 1 − 0.9 times it [Burley 2012];
-//! * `anisotropic_rotation` turns the direction of the greater alpha from ∂p/∂u towards ∂p/∂v, 1 being a whole turn;
+//! * `specular_ior_level` and `specular` (numbers, default 0.5) are half of the reflectance factor;
+//! * `anisotropic` keeps the product of both alphas; their ratio is 1 − 0.9 times the value [Burley 2012];
+//! * `anisotropic_rotation` rotates the direction of the greater alpha from ∂p/∂u towards ∂p/∂v; 1 is a full turn;
 //! * `clearcoatgloss` (a number) is a coat whose alpha is 0.1 to 0.001.
 
 use super::state::Builder;
@@ -30,7 +30,7 @@ use lumiris_formats::pbrt::params::{ParamSet, ParamType, SpectrumValue};
 use lumiris_numbers::math::Rgb;
 use std::f32::consts::TAU;
 
-/// Names of OpenPBR, and others of the same meaning.
+/// Names of OpenPBR, and synonyms.
 const SPELLINGS: &[(&str, &[&str])] = &[
     ("base_color", &["basecolor"]),
     ("base_metalness", &["metallic"]),
@@ -46,7 +46,7 @@ const SPELLINGS: &[(&str, &[&str])] = &[
 ];
 
 impl Builder<'_> {
-    /// The material that the parameters describe.
+    /// The material described by the parameters.
     pub(super) fn principled(&mut self, p: &ParamSet, d: &mut Diagnostics) -> Material {
         let mut name = |name: &'static str| spelled(p, name, d);
         let [color, metalness, roughness, ior] =
@@ -74,7 +74,7 @@ impl Builder<'_> {
         })
     }
 
-    /// The colour, times twice the level of Blender and Disney.
+    /// The specular colour, multiplied by twice the level of Blender and Disney.
     fn specular_color(&mut self, p: &ParamSet, name: &'static str, d: &mut Diagnostics) -> RgbTextureId {
         let color = self.color_up_to(f32::INFINITY, p, (name, Rgb::WHITE), d);
         let Some((name, level)) = number_of(p, ["specular_ior_level", "specular"], d) else { return color };
@@ -83,7 +83,7 @@ impl Builder<'_> {
         self.textures.add_rgb(RgbTexture::Product { tex1: color, tex2: level })
     }
 
-    /// The roughness of the coat, or Disney's gloss.
+    /// The roughness of the coat, or the equivalent of Disney's gloss.
     fn coat_roughness(&mut self, p: &ParamSet, d: &mut Diagnostics) -> FloatTextureId {
         let Some((name, gloss)) = number_of(p, ["clearcoatgloss"], d) else {
             return self.unit(p, "coat_roughness", 0.0, d);
@@ -102,7 +102,7 @@ impl Builder<'_> {
         id
     }
 
-    /// A colour whose numbers, as they are written, are from 0 to `most`; or another spectrum, or a texture.
+    /// A colour whose literal components are from 0 to `most`; or another spectrum, or a texture.
     fn color_up_to(
         &mut self,
         most: f32,
@@ -122,7 +122,7 @@ impl Builder<'_> {
     }
 }
 
-/// The name by which a parameter of OpenPBR is given, of which there may be one.
+/// The synonym under which a parameter of OpenPBR is given; more than one is an error.
 fn spelled(p: &ParamSet, name: &'static str, d: &mut Diagnostics) -> &'static str {
     let others = SPELLINGS.iter().find(|(of, _)| *of == name).map_or(&[][..], |(_, others)| others);
     let mut given = std::iter::once(name).chain(others.iter().copied()).filter(|n| p.type_of(n).is_some());
@@ -134,7 +134,7 @@ fn spelled(p: &ParamSet, name: &'static str, d: &mut Diagnostics) -> &'static st
     first
 }
 
-/// The number that is given by the first of these names that is.
+/// The number of the first of these names that is given.
 fn number_of<const N: usize>(
     p: &ParamSet,
     names: [&'static str; N],

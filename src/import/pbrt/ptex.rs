@@ -15,11 +15,11 @@ use lumiris_formats::source::Span;
 use rayon::prelude::*;
 use std::sync::Arc;
 
-/// What pbrt-v4 takes numbers for where `encoding` says nothing, of whatever type they are.
+/// Default encoding, as in pbrt-v4, for all types of values.
 const USUAL: ColorEncoding = ColorEncoding::Gamma(2.2);
 
 impl Builder<'_> {
-    /// `string filename`, of which each is read once, with the meshes.
+    /// `string filename`; each file is read once, together with the meshes.
     pub(super) fn face_texture(&mut self, p: &ParamSet, d: &mut Diagnostics) -> Option<FaceTexture> {
         let encoding = match self.encoding(p, d) {
             ImageEncoding::Auto => USUAL,
@@ -38,7 +38,7 @@ impl Builder<'_> {
     }
 }
 
-/// The content of a file, or what is wrong with it.
+/// The content of a file, or its error.
 pub(super) type Loaded = Result<Arc<FaceMap>, PtexError>;
 
 /// Reads all files.
@@ -46,7 +46,7 @@ pub(super) fn load(wanted: &[(FaceMapRequest, Span)], files: &FileCache) -> Vec<
     wanted.par_iter().map(|(request, _)| files.face_map(request)).collect()
 }
 
-/// The textures in the order of their files; what could not be read is reported.
+/// The textures in the order of their files; reports unreadable ones.
 pub(super) fn check(loaded: Vec<Loaded>, wanted: &[(FaceMapRequest, Span)], d: &mut Diagnostics) -> Vec<Arc<FaceMap>> {
     let places = wanted.iter().map(|(request, span)| (request.path.as_path(), *span));
     readable(loaded, places, d, |error| match error {

@@ -1,8 +1,8 @@
-//! Names that may be used before they are defined, as in pbrt: when all directives have been read, textures and materials
-//! are made, and objects and the textures of shapes are found.
+//! Names that may be used before their definition, as in pbrt. After all directives have been read, textures and
+//! materials are made, and references to objects and shape textures are resolved.
 //!
-//! pbrt-v4 makes textures of images first, then the others of floats and those of spectra, each in the order of the
-//! text: a texture refers to those that are made before it, so that none can contain itself.
+//! pbrt-v4 makes image textures first, then the other float textures and the other spectrum textures, each in text
+//! order. A texture refers to textures made before it, so none can contain itself.
 
 use super::descriptions::{InstanceDesc, LateInstance, ParamState, PendingMedium};
 use super::state::Builder;
@@ -13,7 +13,7 @@ use lumiris_formats::source::Span;
 use std::collections::HashMap;
 
 impl Builder<'_> {
-    /// What the parameters of a texture, a material or a medium mean something by, here.
+    /// The current state that determines the meaning of texture, material and medium parameters.
     pub(super) fn param_state(&self) -> ParamState {
         ParamState { ctm: self.state.ctm, color_space: self.state.color_space }
     }
@@ -22,7 +22,7 @@ impl Builder<'_> {
         (self.state.ctm, self.state.color_space) = (state.ctm, state.color_space);
     }
 
-    /// Makes and finds all that has a name.
+    /// Makes and resolves everything with a name.
     pub fn resolve(&mut self, d: &mut Diagnostics) {
         self.make_media(d);
         self.make_textures(d);
@@ -60,7 +60,7 @@ impl Builder<'_> {
             desc.params.report_unused(d);
         }
 
-        // Mixtures, when all materials are known
+        // Mixtures, after all materials are known
         let mut mixtures: Vec<(MaterialId, [MaterialId; 2], Span)> = Vec::new();
         for desc in &materials {
             if let Material::Mix { materials, .. } = self.materials[desc.id as usize].material {
@@ -76,9 +76,10 @@ impl Builder<'_> {
         self.check_mixtures(mixtures, d);
     }
 
-    /// Mixtures that hold themselves are errors.
+    /// Mixtures that contain themselves are errors.
     fn check_mixtures(&self, mixtures: Vec<(MaterialId, [MaterialId; 2], Span)>, d: &mut Diagnostics) {
-        // Mixtures that hold a mixture, by that; and how many each of them holds that are not known to be sound
+        // Mixtures by a mixture that they contain, and for each the number of contained mixtures not yet known to be
+        // valid
         let mut holders: HashMap<MaterialId, Vec<MaterialId>> =
             mixtures.iter().map(|(id, ..)| (*id, Vec::new())).collect();
         let mut open: HashMap<MaterialId, usize> = HashMap::new();
@@ -94,14 +95,14 @@ impl Builder<'_> {
                 sound.extend((*parts == 0).then_some(*holder));
             }
         }
-        // Those that are left are in a ring, or hold one that is
+        // The remaining mixtures are in a cycle, or contain one that is
         for (id, _, span) in mixtures.into_iter().filter(|(id, ..)| open[id] > 0) {
             let name = &self.materials[id as usize].name;
             d.error(span, format!("the mixture `{name}` holds itself, or one that does"));
         }
     }
 
-    /// The float texture of a name for a shape, whether it is defined already or not.
+    /// The float texture with this name for a shape, which may be defined later.
     pub(super) fn late_float_texture(&mut self, name: &str, span: Span) -> FloatTextureId {
         if let Some((_, id)) = self.late_textures.get(name) {
             return *id;
@@ -125,7 +126,7 @@ impl Builder<'_> {
         for LateInstance { name, holder, ctm, span } in std::mem::take(&mut self.late_instances) {
             match (self.object_names.get(&name.text), holder) {
                 (Some(&object), None) => self.instances.push(InstanceDesc { object, ctm, span }),
-                // Objects hold earlier ones only, so that none can contain itself
+                // Objects contain only earlier ones, so none can contain itself
                 (Some(&object), Some(_)) => {
                     let message = format!("object `{}` is defined after the one that holds it", name.text);
                     d.error(name.span, message).label(self.objects[object].span, "defined here");

@@ -1,4 +1,4 @@
-//! What whole scenes mean: their directives in other orders, and what pbrt repairs.
+//! Semantics of whole scenes: unusual orders of directives, and errors that pbrt repairs.
 
 use crate::geometry::Shape;
 use crate::import::cache::FileCache;
@@ -7,7 +7,7 @@ use crate::materials::Material;
 use lumiris_numbers::math::Rgb;
 use std::path::Path;
 
-/// A small image of what follows `WorldBegin`; `head` is before it.
+/// Loads a small scene: `world` follows `WorldBegin`, `head` precedes it.
 fn load_with(head: &str, world: &str) -> Result<Loaded, String> {
     let film = "Film \"rgb\" \"integer xresolution\" 4 \"integer yresolution\" 4";
     let text = format!("{film}\n{head}\nWorldBegin\nLightSource \"infinite\"\n{world}\n");
@@ -98,7 +98,7 @@ fn transform_end_restores_all_as_attribute_end_does() {
     assert!(warnings.contains("TransformBegin is AttributeBegin in pbrt-v4"), "{warnings}");
 }
 
-/// The reflectance of a diffuse surface that is the same everywhere.
+/// The reflectance of a diffuse surface with a constant reflectance.
 fn reflectance(loaded: &Loaded, surface: usize) -> Rgb {
     let Material::Diffuse { reflectance } = *material(loaded, surface) else { panic!("it is diffuse") };
     loaded.scene.textures.constant_rgb(reflectance).unwrap()
@@ -151,7 +151,7 @@ fn textures_are_made_in_the_order_of_pbrt() {
         Texture "i" "float" "imagemap" "string filename" "gone.png""#;
     let error = load_with("", world).unwrap_err();
     assert!(error.contains("1 file cannot be read") && !error.contains("texture `i`"), "{error}");
-    // Others of their type come in the order of the text, so there are no rings
+    // Others of their type are made in text order, so there are no cycles
     for (world, place) in [
         (r#"Texture "a" "float" "scale" "texture tex" "b" Texture "b" "float" "constant""#, "scene.pbrt:5:29"),
         (r#"Texture "a" "spectrum" "mix" "texture tex1" "a""#, "scene.pbrt:5:30"),

@@ -1,4 +1,4 @@
-//! `Integrator` and `Sampler`: the settings of [`crate::settings::table`], and pbrt's other names for them.
+//! `Integrator` and `Sampler`: the settings of [`crate::settings::table`], and pbrt's synonyms.
 
 use super::checks::unknown;
 use super::descriptions::Pending;
@@ -30,7 +30,7 @@ const IGNORED: [&str; 16] = [
     "seed",
 ];
 
-/// Settings of a file, with their values and where these are.
+/// Settings of a file, with their values and source positions.
 pub type Placed = Vec<(&'static Setting, Value, Span)>;
 
 /// Reads `Integrator`, and returns its settings.
@@ -59,7 +59,7 @@ pub(super) fn finish_integrator(pending: Option<&Pending>, s: &mut Settings, d: 
     }
     set_name("integrator", kind.into(), s);
     let placed = parameters(Directive::Integrator, s, p, d);
-    // pbrt counts photon paths, the setting stored photons; −1 leaves the choice to the renderer
+    // pbrt counts photon paths, the setting counts stored photons; −1 leaves the choice to the renderer
     if let Some(n @ 1..) = p.integer("photonsperiteration", d) {
         s.integrator.photons.photons = n as u32;
     }
@@ -78,10 +78,10 @@ pub(super) fn finish_sampler(pending: Option<&Pending>, s: &mut Settings, d: &mu
     let Some(Pending { name, params: p }) = pending else { return Placed::new() };
     match name.text.as_str() {
         "independent" | "random" => {
-            // Of all samplers it alone has this default
+            // The only sampler with this default
             (s.sampling.sampler, s.sampling.spp) = (SamplerKind::Independent, 4);
         }
-        // pbrt's stratified samples cover a pixel together, as those of a sequence do
+        // pbrt's stratified samples cover a pixel jointly, like the samples of a sequence
         "sobol" | "paddedsobol" | "halton" | "pmj02bn" | "stratified" | "lowdiscrepancy" | "02sequence"
         | "maxmindist" => {
             s.sampling.sampler = SamplerKind::Sobol;
@@ -104,14 +104,14 @@ pub(super) fn finish_sampler(pending: Option<&Pending>, s: &mut Settings, d: &mu
     placed
 }
 
-/// Sets a setting of the table to a known name.
+/// Sets a setting of the table to one of its names.
 fn set_name(flag: &str, name: &'static str, s: &mut Settings) {
     rows().filter(|row| row.flag == flag).for_each(|row| {
         (row.set)(s, Value::Name(name));
     });
 }
 
-/// Reads all settings that are parameters of a directive.
+/// Reads all settings among the parameters of a directive.
 fn parameters(directive: Directive, s: &mut Settings, p: &ParamSet, d: &mut Diagnostics) -> Placed {
     let mut placed = Placed::new();
     for row in rows().filter(|row| row.directive == directive) {
@@ -129,14 +129,14 @@ fn parameters(directive: Directive, s: &mut Settings, p: &ParamSet, d: &mut Diag
     placed
 }
 
-/// The name under which a file has parameter `i` of a setting: an old one if the present one is absent.
+/// The name of parameter `i` of a setting in the file: a former name if the present one is absent.
 fn spelling(row: &Setting, i: usize, p: &ParamSet) -> Option<&'static str> {
     let &name = row.parameters.get(i)?;
     let is_old = |&&(new, old): &&(&str, &str)| new == name && p.type_of(name).is_none() && p.type_of(old).is_some();
     Some(row.old_parameters.iter().find(is_old).map_or(name, |&(_, old)| old))
 }
 
-/// The value of a setting from its parameters; what they leave out is taken from `current`.
+/// The value of a setting from its parameters; missing components are taken from `current`.
 fn read(row: &Setting, current: &Settings, p: &ParamSet, d: &mut Diagnostics) -> Option<Value> {
     let key = spelling(row, 0, p)?;
     let is_text = p.type_of(key) == Some(ParamType::String);
@@ -151,7 +151,7 @@ fn read(row: &Setting, current: &Settings, p: &ParamSet, d: &mut Diagnostics) ->
         {
             named(key, words, p, d).map(Value::Name)
         }
-        // Negative numbers stand for the bits of large ones
+        // Negative numbers are large ones with the same bits
         Kind::Integer { range, .. } if range == Integers::ALL => {
             p.integer(key, d).map(|n| Value::Integer(u64::from(n as u32)))
         }

@@ -1,4 +1,4 @@
-//! `Shape`: checked when it is parsed, created once all files have been read.
+//! `Shape`: checked during parsing, made after all files have been read.
 
 use super::checks::{file_name, positive, unknown};
 use super::curves::{curve_data, merged, placed};
@@ -21,23 +21,23 @@ use lumiris_numbers::math::{Affine3A, DAffine3, DVec3, Vec2, Vec3};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// What making a shape has to say.
+/// The result of making a shape.
 #[derive(Debug, Default)]
 pub struct Made {
     /// The shapes: a PLY file may hold triangles and patches.
     pub shapes: Vec<Shape>,
-    /// Their origin: that of the space which is rendered, but in objects and for what moves one near to the shapes.
+    /// Their origin: the origin of rendered space; in objects and for moving shapes, a point near the shapes.
     pub origin: DVec3,
     /// Warnings.
     pub warnings: Vec<String>,
 }
 
-/// Why a shape cannot be made.
+/// Errors of shapes.
 #[derive(Debug)]
 pub enum ShapeError {
     /// Its file is missing.
     Missing(PathBuf, String),
-    /// It is wrong.
+    /// It is invalid.
     Wrong(String),
 }
 
@@ -122,7 +122,8 @@ impl Builder<'_> {
         }
     }
 
-    /// Whether the current transformation can place a shape; an error if it flattens what cannot be flat.
+    /// Checks that the current transform is valid for a shape; reports an error if it flattens a shape that cannot be
+    /// flat.
     fn can_be_placed(&self, source: &ShapeSource, kind: &str, span: Span, d: &mut Diagnostics) -> bool {
         match source {
             _ if self.state.ctm.is_moving() => self.has_inverse(&format!("a moving {kind}"), span, d),
@@ -147,7 +148,7 @@ impl Builder<'_> {
         Some(DisplacementDesc { texture, edge_length: edge_length * self.options.edge_scale() })
     }
 
-    /// Cut-outs; fully opaque ones are left out.
+    /// The alpha texture; `None` for opaque shapes.
     fn alpha(&mut self, p: &ParamSet, d: &mut Diagnostics) -> Option<u32> {
         if p.ignore("shadowalpha") {
             d.warning_once(p.span_of("shadowalpha"), "`shadowalpha` is pbrt-v3: `alpha` holds for shadows as well");
@@ -211,7 +212,7 @@ fn vec3s(p: &mut ParamSet, name: &'static str, types: &[ParamType], d: &mut Diag
     Some(floats.chunks_exact(3).map(Vec3::from_slice).collect())
 }
 
-/// The vertices of a mesh, and their origin; without them the rest of it is nothing to speak of.
+/// The vertices of a mesh, and their origin; `None` if they are missing, which makes other errors irrelevant.
 fn positions(p: &mut ParamSet, d: &mut Diagnostics) -> Option<(Vec<Vec3>, DVec3)> {
     let positions = p.points("P", d).map(relative);
     if positions.is_none() {
@@ -221,13 +222,13 @@ fn positions(p: &mut ParamSet, d: &mut Diagnostics) -> Option<(Vec<Vec3>, DVec3)
     positions
 }
 
-/// Texture coordinates under any of their names.
+/// Texture coordinates, with any of their names.
 fn uvs(p: &mut ParamSet, d: &mut Diagnostics) -> Vec<Vec2> {
     let floats = p.take_floats("uv", UVS, d).or_else(|| p.take_floats("st", UVS, d)).unwrap_or_default();
     floats.chunks_exact(2).map(Vec2::from_slice).collect()
 }
 
-/// An array that must be as long as the positions, or absent: any other is left out, as pbrt does.
+/// An array that must have the length of the positions or be absent; others are ignored, as in pbrt.
 fn per_vertex<T>(values: Vec<T>, count: usize, name: &'static str, p: &ParamSet, d: &mut Diagnostics) -> Vec<T> {
     if values.is_empty() || values.len() == count {
         return values;
@@ -237,7 +238,7 @@ fn per_vertex<T>(values: Vec<T>, count: usize, name: &'static str, p: &ParamSet,
     Vec::new()
 }
 
-/// Vertices of the faces; as in pbrt, surplus indices are left out.
+/// Vertices of the faces; as in pbrt, surplus indices are ignored.
 fn indices<const N: usize>(p: &mut ParamSet, count: usize, d: &mut Diagnostics) -> Option<Vec<[u32; N]>> {
     let Some(mut values) = p.take_integers("indices", d).filter(|values| !values.is_empty()) else {
         if count == N {
@@ -261,7 +262,7 @@ fn indices<const N: usize>(p: &mut ParamSet, count: usize, d: &mut Diagnostics) 
     Some(values.chunks_exact(N).map(|c| std::array::from_fn(|i| c[i] as u32)).collect())
 }
 
-/// Numbers of faces, which textures of faces go by; as in pbrt, wrong ones are left out.
+/// Face numbers, for textures of faces; as in pbrt, invalid ones are ignored.
 fn face_numbers(p: &mut ParamSet, count: usize, d: &mut Diagnostics) -> Vec<u32> {
     let numbers = p.take_integers("faceIndices", d).unwrap_or_default();
     if !(numbers.is_empty() || numbers.len() == count) || numbers.iter().any(|&n| n < 0) {
@@ -294,13 +295,14 @@ fn face_data<const N: usize>(p: &mut ParamSet, d: &mut Diagnostics) -> Option<Fa
 }
 
 impl ShapeDesc {
-    /// How numbers relative to `origin` come into the group: by the transformation, unless an instance moves the shape.
+    /// The transform from coordinates relative to `origin` to the group: the current transform, unless an instance
+    /// moves the shape.
     fn placement(&self, origin: DVec3) -> Placement {
         let is_moving = self.ctm.is_moving();
         let m = if is_moving { DAffine3::IDENTITY } else { affine(&self.ctm.start) };
         let is_still = self.object.is_none() && !is_moving;
         let group_origin = if is_still { self.origin } else { near_origin(m.transform_point3(origin)) };
-        // pbrt flips where the transformation of the shape mirrors, moving or not.
+        // pbrt flips the orientation if the transform of the shape reflects, moving or not.
         let flip = self.reverse_orientation ^ swaps_handedness(&affine(&self.ctm.start).as_affine3a());
         Placement {
             group_from_object: rebased(&m, group_origin, origin).as_affine3a(),
@@ -311,7 +313,8 @@ impl ShapeDesc {
         }
     }
 
-    /// Makes the shapes in the space of their group; `mesh` reads a PLY file, `textures` displace. Takes the arrays out of `self`.
+    /// Makes the shapes in the space of their group; `mesh` reads a PLY file, `textures` evaluate displacements. Moves
+    /// the arrays out of `self`.
     pub fn make(
         &mut self,
         mesh: &dyn Fn(&Path) -> Result<Arc<PlyMesh>, PlyError>,
@@ -378,7 +381,7 @@ impl ShapeDesc {
                 if !ply.quads.is_empty() {
                     let data = PatchData {
                         positions: ply.positions.clone(),
-                        // A patch has its corners row by row, a face around.
+                        // A patch has its corners row by row, a face in circular order.
                         indices: ply.quads.iter().map(|&[a, b, c, d]| [a, b, d, c]).collect(),
                         normals: ply.normals.clone(),
                         uvs: ply.uvs.clone(),
@@ -406,7 +409,7 @@ impl ShapeDesc {
     }
 }
 
-/// A quadric that a transformation places; `None` if that flattens anything but a disk along its axis.
+/// A transformed quadric; `None` if the transform flattens it, except for a disk along its axis.
 pub(super) fn placed_quadric(kind: QuadricKind, m: &Affine3A) -> Option<Quadric> {
     let with = |kind, m: Affine3A| {
         let local_from_group = m.inverse();
@@ -416,7 +419,7 @@ pub(super) fn placed_quadric(kind: QuadricKind, m: &Affine3A) -> Option<Quadric>
     };
     let flat_disk = || {
         let QuadricKind::Disk { height, radius, inner_radius, phi_max } = kind else { return None };
-        // The disk has no thickness of its own: any third axis will do
+        // The disk has no thickness: any third axis is valid
         let mut upright = *m;
         upright.matrix3.z_axis = m.matrix3.x_axis.cross(m.matrix3.y_axis).normalize_or_zero();
         upright.translation += m.matrix3.z_axis * height;
@@ -431,26 +434,26 @@ fn place(points: &mut [Vec3], m: &Affine3A) {
     }
 }
 
-/// Normals in group space; pbrt turns them where it turns the orientation by `ReverseOrientation`.
+/// Transforms normals to group space; pbrt reverses them if `ReverseOrientation` is set.
 fn place_normals(normals: &mut [Vec3], m: &Affine3A, reverse: bool) {
     let sign = if reverse { -1.0 } else { 1.0 };
     normals.iter_mut().for_each(|n| *n = transform_normal(m, *n) * sign);
 }
 
-/// How a shape comes into its group.
+/// The transforms of a shape.
 struct Placement {
     group_from_object: Affine3A,
     group_origin: DVec3,
-    /// Into the space that textures of places go by: that which is rendered, as if what moves or is in an object stood where
-    /// it is defined.
+    /// To the space of position-dependent textures: rendered space, with moving shapes and shapes in objects at the
+    /// position of their definition.
     textured_from_object: DAffine3,
-    /// The geometric normal is reversed.
+    /// True if the geometric normal is reversed.
     flip: bool,
     /// `ReverseOrientation`, which reverses given normals as well.
     reverse: bool,
 }
 
-/// A mesh that is refined and displaced in its own space.
+/// A mesh refined and displaced in its own space.
 fn displaced(
     data: MeshData,
     displacement: &DisplacementDesc,
@@ -480,11 +483,11 @@ fn triangles(mut data: MeshData, placement: &Placement) -> Result<TriangleMesh, 
     Ok(mesh)
 }
 
-/// Largest distance of a corner of a parallelogram from where the other three put it, relative to its edges.
+/// Maximum distance of a corner of a parallelogram from its position by the other three, relative to its edges.
 const PARALLELOGRAM: f32 = 1e-6;
 
-/// Two triangles for each patch, if all patches are parallelograms without normals: the same surface and the same
-/// texture coordinates, which ray tracers meet much faster.
+/// Two triangles for each patch, if all patches are parallelograms without normals. The surface and texture coordinates
+/// are the same, and ray tracing is much faster.
 fn parallelograms(data: &PatchData) -> Option<MeshData> {
     let corners = |c: &[u32; 4]| c.map(|i| data.positions[i as usize]);
     let is_flat = |c: &[u32; 4]| {

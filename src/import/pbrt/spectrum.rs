@@ -10,7 +10,7 @@ use lumiris_formats::spectra::{self, Spectrum};
 use lumiris_formats::upsampling::unbounded_spectrum;
 use lumiris_numbers::math::Rgb;
 
-/// What a spectrum is of; the same samples mean different colours.
+/// The quantity of a spectrum, which determines the colour of its samples.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SpectrumUse {
     /// A factor between 0 and 1, seen under white light.
@@ -22,7 +22,7 @@ pub enum SpectrumUse {
 }
 
 impl SpectrumUse {
-    /// What its colours are of.
+    /// The quantity of its colours.
     pub fn colored(self) -> Colored {
         match self {
             SpectrumUse::Illuminant => Colored::Light,
@@ -41,7 +41,7 @@ pub enum Resolved {
 }
 
 impl Resolved {
-    /// A non-negative quantity over wavelength: the curve, or the smooth one that shows the colour.
+    /// A non-negative quantity over wavelength: the curve, or a smooth one for the colour.
     pub fn unbounded_curve(self) -> Spectrum {
         match self {
             Resolved::Rgb(rgb) => unbounded_spectrum(rgb),
@@ -51,7 +51,7 @@ impl Resolved {
 }
 
 impl Builder<'_> {
-    /// Finds out what a spectrum parameter is; `None` after an error.
+    /// Resolves a spectrum parameter; `None` after an error.
     pub fn resolve_spectrum(
         &self,
         value: SpectrumValue<'_>,
@@ -60,7 +60,7 @@ impl Builder<'_> {
         d: &mut Diagnostics,
     ) -> Option<Resolved> {
         match value {
-            // What is beyond 0 to 1 of an albedo is warned of where it is used
+            // Albedo values outside 0 to 1 are a warning at their use
             SpectrumValue::Rgb(rgb, _) if usage != SpectrumUse::Albedo && rgb.iter().any(|c| *c < 0.0) => {
                 d.error(span, "a colour must not be negative");
                 None

@@ -1,4 +1,4 @@
-//! What the directives so far have made: the graphics state, and the scene while its file is read.
+//! The state after the directives so far: the graphics state, and the scene during parsing.
 
 use super::descriptions::{
     AreaLightDesc, EnvironmentDesc, InstanceDesc, Interior, LateInstance, MaterialDesc, MaterialUse, MediumDesc,
@@ -26,10 +26,10 @@ use std::path::{Path, PathBuf};
 use std::rc::Rc;
 use std::sync::Arc;
 
-/// What a block saves and restores.
+/// The state that blocks save and restore.
 #[derive(Clone)]
 pub struct GraphicsState {
-    /// Current transformation.
+    /// Current transform.
     pub ctm: Ctm,
     /// Times that transform directives change.
     pub(super) active: ActiveTimes,
@@ -41,13 +41,13 @@ pub struct GraphicsState {
     pub area_light: Option<AreaLightDesc>,
     /// Colour space of `rgb` parameters.
     pub color_space: ColorSpace,
-    /// Media on the sides of shapes; the camera is in the one outside.
+    /// Media on the sides of shapes; the camera is in the outside one.
     pub media: MediumNames,
     /// Default parameters by `Attribute`.
     pub(super) defaults: Defaults,
 }
 
-/// Default parameters by what they are for, each name once; blocks share them until one changes them.
+/// Default parameters by target, each name once; blocks share them copy-on-write.
 #[derive(Clone, Default)]
 pub(super) struct Defaults([Rc<Vec<Param>>; 5]);
 
@@ -62,12 +62,12 @@ impl Defaults {
         }
     }
 
-    /// Those of a target.
+    /// The defaults of a target.
     pub(super) fn of(&self, target: AttributeTarget) -> &[Param] {
         &self.0[Self::index(target)]
     }
 
-    /// Adds defaults for a target, which replace those of their names.
+    /// Adds defaults for a target, replacing those with the same names.
     pub(super) fn add(&mut self, target: AttributeTarget, params: impl Iterator<Item = Param>) {
         let all = Rc::make_mut(&mut self.0[Self::index(target)]);
         for param in params {
@@ -77,22 +77,21 @@ impl Defaults {
     }
 }
 
-/// The scene while its file is read.
+/// The scene during parsing.
 pub struct Builder<'a> {
-    /// Folder that file names are relative to.
+    /// Folder of relative file names.
     pub folder: PathBuf,
-    /// What the caller overrides.
+    /// Options that override the file.
     pub load_options: &'a LoadOptions,
     /// Current state.
     pub state: GraphicsState,
-    /// States that the ends of open blocks restore.
+    /// Saved states of open blocks.
     pub(super) stack: Vec<GraphicsState>,
     /// Transformations by name.
     pub(super) coordinate_systems: HashMap<String, Ctm>,
     /// Camera, film, sampler, integrator.
     pub options: Options,
-    /// The point of the world that is the origin of the space which is rendered: near to the camera, and known where the
-    /// world begins.
+    /// The point of world space that is the origin of rendered space: near the camera, determined at `WorldBegin`.
     pub origin: DVec3,
     /// Textures so far.
     pub textures: TextureSet,
@@ -100,35 +99,35 @@ pub struct Builder<'a> {
     pub(super) float_textures: TextureNames<FloatTextureId>,
     /// Names of textures of spectra.
     pub(super) rgb_textures: TextureNames<RgbTextureId>,
-    /// Textures that wait for the end of the text.
+    /// Textures made at the end of the text.
     pub(super) pending_textures: Vec<TextureDesc>,
-    /// Textures of shapes by name, with their first use: reserved until all are made.
+    /// Textures of shapes by name, with the source position of their first use: reserved until all are made.
     pub(super) late_textures: BTreeMap<String, (Span, FloatTextureId)>,
-    /// Materials; each stands for nothing until it is made.
+    /// Materials; placeholders until they are made.
     pub materials: Vec<MaterialEntry>,
-    /// Materials that wait for the end of the text.
+    /// Materials made at the end of the text.
     pub(super) pending_materials: Vec<MaterialDesc>,
-    /// Named materials, and where they are defined.
+    /// Named materials, with the source positions of their definitions.
     pub named_materials: HashMap<String, (MaterialId, Span)>,
-    /// Interiors of materials of the kind `subsurface`.
+    /// Interiors of `subsurface` materials.
     pub(super) interiors: HashMap<MaterialId, Interior>,
     /// Media.
     pub media: Vec<MediumDesc>,
     /// Indices of media by name.
     pub(super) medium_names: HashMap<String, usize>,
-    /// Media that wait for the end of the text: they may be defined before the camera.
+    /// Media made at the end of the text, since they may be defined before the camera.
     pub(super) pending_media: Vec<PendingMedium>,
-    /// Lights that are no surfaces.
+    /// Lights other than area lights.
     pub lights: Vec<Light>,
     /// Their groups.
     pub light_groups: Vec<Option<Arc<str>>>,
-    /// Environment maps that wait for their image.
+    /// Lights that need an image.
     pub environments: Vec<EnvironmentDesc>,
-    /// Portals, and where they stand.
+    /// Portals, with their source positions.
     pub portals: Vec<(Portal, Span)>,
-    /// Images that area lights emit.
+    /// Emission images of area lights.
     pub emission_images: Vec<PathBuf>,
-    /// Shapes that wait for their files.
+    /// Shapes, made after their files are read.
     pub shapes: Vec<ShapeDesc>,
     /// Objects by name.
     pub objects: Vec<ObjectDesc>,
@@ -136,17 +135,17 @@ pub struct Builder<'a> {
     pub(super) object_names: HashMap<String, usize>,
     /// The object being defined.
     pub current_object: Option<usize>,
-    /// Placements of objects.
+    /// Instances of objects.
     pub instances: Vec<InstanceDesc>,
-    /// Those of objects that are not defined yet.
+    /// Instances of objects that are not defined yet.
     pub(super) late_instances: Vec<LateInstance>,
-    /// Images to be read.
+    /// Image requests.
     pub resources: Resources,
-    /// Textures of faces that wait to be read.
+    /// Requests for textures of faces.
     pub(super) face_maps: Requests<FaceMapRequest>,
-    /// Files of measured materials that wait to be read.
+    /// Requests for files of measured materials.
     pub(super) measured_files: Requests<PathBuf>,
-    /// Files of spectra that were read.
+    /// Files of spectra, already read.
     pub(super) spectrum_files: RefCell<Vec<PathBuf>>,
 }
 
@@ -203,7 +202,7 @@ impl<'a> Builder<'a> {
         }
     }
 
-    /// The files that the text names: spectra, measured materials, textures of faces, meshes, volumes and images.
+    /// The files named in the text: spectra, measured materials, textures of faces, meshes, volumes and images.
     pub fn files(&self) -> Vec<PathBuf> {
         let mesh = |shape: &ShapeDesc| match &shape.source {
             ShapeSource::Ply(path) => Some(path.clone()),
@@ -221,7 +220,7 @@ impl<'a> Builder<'a> {
         files
     }
 
-    /// Whether the current transformation has an inverse, which `what` needs; an error if it has none.
+    /// True if the current transform has an inverse, which `what` requires; reports an error otherwise.
     pub fn has_inverse(&self, what: &str, span: Span, diagnostics: &mut Diagnostics) -> bool {
         let has = self.state.ctm.is_invertible();
         if !has {
@@ -231,8 +230,7 @@ impl<'a> Builder<'a> {
         has
     }
 
-    /// The current transformation, to the space that is rendered, of something that cannot move; a motion is reported and
-    /// left out.
+    /// The current transform to rendered space, for something that cannot move; a motion is reported and ignored.
     pub fn still_transform(&self, what: &str, span: Span, diagnostics: &mut Diagnostics) -> DAffine3 {
         if self.state.ctm.is_moving() {
             diagnostics.warning_once(span, format!("moving {what} are not rendered: it stays where it starts"));
@@ -241,7 +239,7 @@ impl<'a> Builder<'a> {
     }
 }
 
-/// What shapes are made of where no material is given: pbrt's diffuse of reflectance 0.5.
+/// The default material of shapes: pbrt's diffuse with reflectance 0.5.
 fn default_material(materials: &mut Vec<MaterialEntry>, textures: &mut TextureSet) -> MaterialId {
     let reflectance = textures.add_rgb(RgbTexture::Constant(Rgb::splat(0.5)));
     let material = Material::Diffuse { reflectance };

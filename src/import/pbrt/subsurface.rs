@@ -13,15 +13,15 @@ use lumiris_formats::diagnostic::Diagnostics;
 use lumiris_formats::pbrt::params::{ParamSet, ParamType};
 use lumiris_numbers::math::Rgb;
 
-/// Parameters that are the same everywhere in an interior.
+/// Parameters that must be constant in an interior.
 const COLORS: [&str; 4] = ["sigma_a", "sigma_s", "reflectance", "mfp"];
-/// Index of refraction where none is given.
+/// Default index of refraction.
 const ETA: f32 = 1.33;
-/// σ_a and σ_s of pbrt-v4 where nothing is given (1/mm), those of milk.
+/// Default σ_a and σ_s, as in pbrt-v4 (1/mm): those of milk.
 const DEFAULT: [Rgb; 2] = [Rgb::new(0.0011, 0.0024, 0.014), Rgb::new(2.55, 3.21, 3.77)];
 
 impl Builder<'_> {
-    /// The boundary; the interior is kept beside it.
+    /// The material of the boundary; the interior is stored separately.
     pub(super) fn subsurface(&mut self, desc: &MaterialDesc, d: &mut Diagnostics) -> Material {
         let p = &desc.params;
         if let Some(key) = COLORS.into_iter().find(|key| p.type_of(key) == Some(ParamType::Texture)) {
@@ -41,7 +41,7 @@ impl Builder<'_> {
         Material::Dielectric { eta, roughness }
     }
 
-    /// What is inside; `None` after an error.
+    /// The interior; `None` after an error.
     fn interior(&self, p: &ParamSet, eta: f32, d: &mut Diagnostics) -> Option<Homogeneous> {
         let g = p.float("g", d).unwrap_or(0.0);
         if !(-1.0..=1.0).contains(&g) {
@@ -72,7 +72,7 @@ impl Builder<'_> {
         Some(Homogeneous { sigma_a, sigma_s, le: Rgb::BLACK, g })
     }
 
-    /// σ_a and σ_s as they are given: both or none.
+    /// σ_a and σ_s as given: both or none.
     fn sigma(&self, p: &ParamSet, d: &mut Diagnostics) -> Option<[Rgb; 2]> {
         let keys = ["sigma_a", "sigma_s"];
         let [a, s] = keys.map(|key| self.color_param(p, key, SpectrumUse::Unbounded, d));
@@ -92,7 +92,8 @@ impl Builder<'_> {
         Some(sigma)
     }
 
-    /// σ_a and σ_s of an interior whose half-space gives back `reflectance`, with mean free paths of `scale` × `mfp`.
+    /// σ_a and σ_s of an interior whose half-space has the given `reflectance`, with mean free paths of `scale` ×
+    /// `mfp`.
     fn sigma_of_reflectance(
         &self,
         p: &ParamSet,

@@ -1,4 +1,4 @@
-//! The files of `tests/pbrt`: each is parsed, and the parser's output is compared with the `.txt` beside it.
+//! The files of `tests/pbrt`: each is parsed, and the result is compared with the `.txt` beside it.
 //!
 //! A missing `.txt` is written by a run with `LUMIRIS_BLESS=1` in the environment.
 
@@ -29,7 +29,7 @@ fn describe(directives: &[Directive]) -> String {
             writeln!(text, "    {} {} = {:?}", p.ty.name(), p.name, p.values).unwrap();
         }
     }
-    // Places are covered by the diagnostics.
+    // Source positions are covered by the diagnostics.
     let mut plain = String::new();
     let mut rest = text.as_str();
     while let Some((before, after)) = rest.split_once(", span: Span {") {

@@ -1,16 +1,16 @@
-//! Textures of one type by their names, which may be used before they are defined.
+//! Textures of one type by name, which may be used before their definition.
 
 use lumiris_formats::diagnostic::Diagnostics;
 use lumiris_formats::pbrt::directive::Name;
 use lumiris_formats::source::Span;
 use std::collections::HashMap;
 
-/// Textures of one type by their names.
+/// Textures of one type by name.
 #[derive(Debug)]
 pub(super) struct TextureNames<I> {
     /// `float` or `spectrum`.
     kind: &'static str,
-    /// Where each is defined, and the texture once it is made.
+    /// Source position of each definition, and the texture once it is made.
     by_name: HashMap<String, (Span, Option<I>)>,
 }
 
@@ -20,7 +20,7 @@ impl<I: Copy> TextureNames<I> {
         TextureNames { kind, by_name: HashMap::new() }
     }
 
-    /// Notes that a name is defined; false after an error.
+    /// Registers the definition of a name; returns false after an error.
     pub(super) fn define(&mut self, name: &Name, d: &mut Diagnostics) -> bool {
         if let Some((first, _)) = self.by_name.get(&name.text) {
             let message = format!("{} texture `{}` is defined twice", self.kind, name.text);
@@ -31,12 +31,12 @@ impl<I: Copy> TextureNames<I> {
         true
     }
 
-    /// Gives a name its texture.
+    /// Sets the texture of a name.
     pub(super) fn set(&mut self, name: &Name, texture: I) {
         self.by_name.insert(name.text.clone(), (name.span, Some(texture)));
     }
 
-    /// The texture of a name; an error if there is none so far. `other` are those of the other type.
+    /// The texture of a name; reports an error if it is not made yet. `other` are the names of the other type.
     pub(super) fn find<J>(&self, name: &str, span: Span, other: &TextureNames<J>, d: &mut Diagnostics) -> Option<I> {
         let kind = self.kind;
         match self.by_name.get(name) {

@@ -18,11 +18,11 @@ use lumiris_formats::source::Span;
 use lumiris_numbers::math::origin::rebased;
 use lumiris_numbers::math::{DAffine3, DVec3, Rgb, Vec2, Vec3};
 
-/// Textures that may refer to each other in a chain.
+/// Maximum depth of references between textures.
 const MAX_DEPTH: u32 = 500;
 
 impl Builder<'_> {
-    /// `Texture "name" "float|spectrum" "class"`, of which textures are made at the end of the text.
+    /// `Texture "name" "float|spectrum" "class"`; textures are made at the end of the text.
     pub fn texture(&mut self, name: Name, value: &Name, class: Name, params: ParamSet, d: &mut Diagnostics) {
         let is_float = match value.text.as_str() {
             "float" => true,
@@ -40,7 +40,7 @@ impl Builder<'_> {
         }
     }
 
-    /// Makes a texture, when those that it may refer to are there.
+    /// Makes a texture after the textures that it may refer to.
     pub(super) fn make_texture(&mut self, desc: &TextureDesc, d: &mut Diagnostics) {
         let (class, p) = (&desc.class, &desc.params);
         let depth = if desc.is_float {
@@ -191,7 +191,7 @@ impl Builder<'_> {
         }
     }
 
-    /// For textures that depend on the point, which cannot be flattened.
+    /// For textures that depend on the point; the transform must not be singular.
     fn texture_from_world(&self, p: &ParamSet, d: &mut Diagnostics) -> DAffine3 {
         match self.has_inverse("a texture in space", p.span, d) {
             true => rebased(&affine(&self.state.ctm.start.inverse()), DVec3::ZERO, self.origin),
@@ -248,7 +248,7 @@ impl Builder<'_> {
         if p.boolean("trilinear", d).is_some() {
             d.warning_once(p.span_of("trilinear"), "`trilinear` is pbrt-v3; pbrt-v4 writes `filter`");
         }
-        // It bounds a kernel of `ewa` that the samples of the pixel take the place of
+        // Bounds the kernel of `ewa`, which the samples of the pixel replace
         p.float("maxanisotropy", d);
         if let Some(gamma) = p.boolean("gamma", d) {
             d.warning_once(p.span_of("gamma"), "`gamma` is pbrt-v3; pbrt-v4 writes `encoding`");
@@ -270,7 +270,8 @@ impl Builder<'_> {
         Some(ImageTexture { image, udim, mapping, scale, invert })
     }
 
-    /// The tiles of a name with [`UDIM`] that are in its folder, and the first one. Beyond its edges a tile has what is at them.
+    /// The tiles of a name with [`UDIM`] in its folder, and the first one. Beyond its edges a tile repeats its edge
+    /// values.
     fn udim(&mut self, request: &ImageRequest, span: Span, d: &mut Diagnostics) -> Option<(ImageId, UdimId)> {
         let mut udim = Udim::default();
         let mut first = None;
@@ -287,7 +288,7 @@ impl Builder<'_> {
         Some((first, (self.textures.udims.len() - 1) as UdimId))
     }
 
-    /// `encoding`; an unknown one is an error, and as none.
+    /// `encoding`; an unknown one is an error and ignored.
     pub(super) fn encoding(&self, p: &ParamSet, d: &mut Diagnostics) -> ImageEncoding {
         let Some(text) = p.string("encoding", d) else { return ImageEncoding::Auto };
         let gamma = text.strip_prefix("gamma ").and_then(|g| g.trim().parse::<f32>().ok()).filter(|g| *g > 0.0);
@@ -322,7 +323,7 @@ impl Builder<'_> {
         self.textures.add_float(FloatTexture::Constant(value))
     }
 
-    /// The float texture of a name, when all are made or it is before the one that is being made.
+    /// The float texture with this name, if it is already made.
     pub fn float_texture_named(&self, name: &str, span: Span, d: &mut Diagnostics) -> Option<FloatTextureId> {
         self.float_textures.find(name, span, &self.rgb_textures, d)
     }
@@ -366,7 +367,7 @@ impl Builder<'_> {
 
 /// The corners of a bilinear texture, and their default values.
 const CORNERS: [(&str, f32); 4] = [("v00", 0.0), ("v10", 0.0), ("v01", 1.0), ("v11", 1.0)];
-/// Most octaves of noise: the frequency of the last is 10⁹.
+/// Maximum number of noise octaves: the frequency of the last is 10⁹.
 const MAX_OCTAVES: i32 = 30;
 const FLOAT_CLASSES: &[&str] = &[
     "constant",

@@ -1,10 +1,10 @@
-//! The current transformation matrix, at the start and at the end of the motion. It is f64, from the text to the space that
-//! is rendered, so that transformations may lead far away and back.
+//! The current transformation matrix, at the start and at the end of the motion. It is in f64, from the text to
+//! rendered space, so that transforms may cancel large translations.
 
 use lumiris_formats::pbrt::directive::{ActiveTimes, DirectiveKind};
 use lumiris_numbers::math::{DAffine3, DMat3, DMat4, DQuat, DVec3};
 
-/// Placements between start and end that a turning motion is sampled at; between samples it is linear.
+/// Number of samples of a rotating motion, which is linear between them.
 const ROTATION_SAMPLES: usize = 17;
 
 /// The current transformation matrix at both ends of the motion.
@@ -40,12 +40,12 @@ impl Ctm {
         Ctm { start: self.start.inverse(), end: self.end.inverse() }
     }
 
-    /// True if all its numbers are in the range of f32.
+    /// True if all its elements are in the range of f32.
     pub fn is_finite(&self) -> bool {
         [self.start, self.end].iter().all(|m| m.as_mat4().is_finite())
     }
 
-    /// True if it can be inverted and all its numbers are finite. What it places is flat otherwise: meshes are rendered so.
+    /// True if it is invertible and finite. Singular transforms flatten; meshes are rendered flat.
     pub fn is_invertible(&self) -> bool {
         [self.start, self.end].iter().all(|m| {
             let scale = m.x_axis.length() * m.y_axis.length() * m.z_axis.length();
@@ -55,8 +55,8 @@ impl Ctm {
         })
     }
 
-    /// The placements at equidistant times 0..=1 of the shutter, which opens and closes at the given fractions of
-    /// the motion: one if nothing moves, two if nothing turns, else enough to follow the turn.
+    /// The transforms at equidistant times 0..=1 of the shutter, which opens and closes at the given fractions of the
+    /// motion: one without motion, two without rotation, otherwise enough for the rotation.
     pub fn samples(&self, shutter: [f32; 2]) -> Vec<DAffine3> {
         if !self.is_moving() {
             return vec![affine(&self.start)];
@@ -92,7 +92,7 @@ impl Parts {
                 break;
             }
         }
-        // A mirror goes into the stretch: quaternions only turn.
+        // A reflection goes into the stretch, as quaternions only rotate.
         if r.determinant() < 0.0 {
             r *= -1.0;
         }
@@ -111,8 +111,9 @@ pub fn affine(m: &DMat4) -> DAffine3 {
     DAffine3::from_mat4(*m)
 }
 
-/// The matrix that a transform directive multiplies or sets; `None` for other directives, `Err` with a reason if its
-/// numbers make no transform.
+/// The matrix that a transform directive multiplies or sets; `None` for other directives.
+///
+/// Returns `Err` with a reason if its numbers are not a transform.
 pub fn matrix_of(kind: &DirectiveKind) -> Option<Result<DMat4, &'static str>> {
     Some(match kind {
         DirectiveKind::Identity => Ok(DMat4::IDENTITY),
@@ -148,7 +149,7 @@ mod tests {
         let m = look_at(&[1.0, 2.0, 3.0, 4.0, 2.0, 3.0, 0.0, 0.0, 1.0]).unwrap();
         assert!((m.transform_point3(DVec3::new(4.0, 2.0, 3.0)) - DVec3::new(0.0, 0.0, 3.0)).length() < 1e-5);
         assert!((m.transform_vector3(DVec3::Z) - DVec3::Y).length() < 1e-6);
-        // Left-handed: looking along +x with z up, the image's right is +y.
+        // Left-handed: facing +x with z up, the image's right is +y.
         assert!((m.transform_vector3(DVec3::Y) - DVec3::X).length() < 1e-6);
         assert!(look_at(&[0.0; 9]).is_err());
     }

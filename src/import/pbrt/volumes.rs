@@ -1,4 +1,4 @@
-//! `MakeNamedMedium` of the type `nanovdb`: what its parameters say, and the medium once its file has been read.
+//! `MakeNamedMedium` of type `nanovdb`: its parameters, and the medium after its file has been read.
 
 use super::checks::file_name;
 use super::descriptions::VolumeDesc;
@@ -18,7 +18,7 @@ use std::collections::{HashMap, HashSet};
 use std::path::Path;
 use std::sync::Arc;
 
-/// Requests of all media, and what came of them.
+/// Requests of all media, and their results.
 type Volumes = HashMap<VolumeRequest, Result<Arc<Volume>, NanoError>>;
 
 fn request(path: &Path, grid: &str, usage: VolumeUse) -> VolumeRequest {
@@ -26,7 +26,7 @@ fn request(path: &Path, grid: &str, usage: VolumeUse) -> VolumeRequest {
 }
 
 impl Builder<'_> {
-    /// What the parameters say; `None` after an error.
+    /// The description from the parameters; `None` after an error.
     pub(super) fn nanovdb(&self, p: &ParamSet, placement: DAffine3, d: &mut Diagnostics) -> Option<VolumeDesc> {
         let scale = not_negative(p, "scale", 1.0, d);
         let le_scale = not_negative(p, "Lescale", 1.0, d);
@@ -64,7 +64,7 @@ impl Builder<'_> {
         })
     }
 
-    /// Reads the files of all media that wait for one.
+    /// Reads the files of all media.
     pub(super) fn load_volumes(&mut self, files: &FileCache, d: &mut Diagnostics) {
         let mut requests = HashSet::new();
         for desc in self.media.iter().filter_map(|m| m.volume.as_ref()) {
@@ -84,7 +84,7 @@ impl Builder<'_> {
     }
 }
 
-/// The grid, if it could be read and is a volume; errors go to `d`.
+/// The grid, if it was read and is a volume; errors go to `d`.
 fn checked(
     desc: &VolumeDesc,
     (name, span): (&str, Span),
@@ -129,7 +129,7 @@ fn medium_of(desc: &VolumeDesc, volumes: &Volumes, d: &mut Diagnostics) -> Optio
     if let Some((name, span)) = &desc.temperature {
         let read = volumes.get(&request(&desc.path, name, VolumeUse::Temperature));
         match (read, span) {
-            // As in pbrt-v4, nothing glows then
+            // As in pbrt-v4, there is no emission then
             (Some(Err(NanoError::NoGrid { .. })), None) => {}
             (Some(Err(error @ NanoError::NoGrid { .. })), Some(span)) => {
                 d.warning_once(*span, format!("{} {error}: nothing glows", desc.path.display()));
@@ -138,7 +138,7 @@ fn medium_of(desc: &VolumeDesc, volumes: &Volumes, d: &mut Diagnostics) -> Optio
         }
     }
 
-    // The box of both
+    // The union of both boxes
     let boxes = [density.bounds, hot.as_ref().and_then(|hot| hot.bounds)].into_iter().flatten();
     let joined = boxes.map(|b| b.map(DVec3::from_array)).reduce(|[a, b], [c, e]| [a.min(c), b.max(e)]);
     let bounds @ [min, max] = joined.unwrap_or([DVec3::ZERO, DVec3::ONE]);

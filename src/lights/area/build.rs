@@ -80,7 +80,7 @@ fn corner_colors(mesh: &TriangleMesh, i: usize) -> Option<[Rgb; 3]> {
     Some([color(a)?, color(b)?, color(c)?])
 }
 
-/// Triangle `i`. Its emitting side is that of the vertex normals if there are any, as in pbrt-v4.
+/// Triangle `i`. Vertex normals, if there are any, decide the emitting side, as in pbrt-v4.
 fn triangle(mesh: &TriangleMesh, i: usize, mapping: Option<&EmissionMapping>) -> TriangleLight {
     let vertices = mesh.indices[i].map(|v| v as usize);
     let all = if mapping.is_some_and(|m| m.second) { &mesh.uvs1 } else { &mesh.uvs };
@@ -97,13 +97,13 @@ fn triangle(mesh: &TriangleMesh, i: usize, mapping: Option<&EmissionMapping>) ->
     light
 }
 
-/// The rectangle that two triangles form about their common edge, if they do.
+/// The rectangle formed by two triangles with a common edge; `None` if they form none.
 fn rectangle_of_pair(a: &TriangleLight, b: &TriangleLight, textured: bool) -> Option<RectangleLight> {
     if a.area <= 0.0 || b.area <= 0.0 || a.n.dot(b.n) < 1.0 - RECTANGLE_TOLERANCE {
         return None;
     }
 
-    // The corner is the vertex of `a` that `b` lacks; the diagonal is what they share.
+    // The corner is the vertex of `a` that `b` lacks; the diagonal is the shared edge.
     let lacks = |t: &TriangleLight, p: Vec3| !t.p.contains(&p);
     let apex_a = (0..3).find(|&i| lacks(b, a.p[i]))?;
     let apex_b = (0..3).find(|&i| lacks(a, b.p[i]))?;
@@ -118,7 +118,7 @@ fn rectangle_of_pair(a: &TriangleLight, b: &TriangleLight, textured: bool) -> Op
     (uvs_fit || !textured).then_some(rectangle)
 }
 
-/// The rectangle of corners `[p, p + x, p + y, p + x + y]`, if they are one.
+/// The rectangle with the corners `[p, p + x, p + y, p + x + y]`; `None` if they form none.
 fn rectangle(corners: [Vec3; 4], n: Vec3, uvs: [Vec2; 3]) -> Option<RectangleLight> {
     let [p, px, py, pxy] = corners.map(|p| p.as_dvec3());
     let (x, y) = (px - p, py - p);
@@ -129,6 +129,8 @@ fn rectangle(corners: [Vec3; 4], n: Vec3, uvs: [Vec2; 3]) -> Option<RectangleLig
         && height > 0.0
         && x.dot(y).abs() <= tolerance * width * height
         && flatness_error <= tolerance * width.min(height);
+
+    // The edges are perpendicular and the fourth corner is in the plane, within the tolerance
     is_rectangle.then(|| RectangleLight {
         corner: corners[0],
         ex: (x / width).as_vec3(),
@@ -152,7 +154,7 @@ fn patch(mesh: &BilinearMesh, i: usize, textured: bool) -> AreaShape {
     flat.map_or_else(|| AreaShape::Patch(Box::new(light)), AreaShape::Rectangle)
 }
 
-/// Whether patch `i` emits on the reverse of ∂p/∂u × ∂p/∂v: vertex normals decide if there are any.
+/// True if patch `i` emits on the reverse of ∂p/∂u × ∂p/∂v. Vertex normals decide, if there are any.
 fn orientation(mesh: &BilinearMesh, i: usize) -> bool {
     if mesh.normals.is_empty() {
         return mesh.flip_normal;

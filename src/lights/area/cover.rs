@@ -1,21 +1,22 @@
-//! The part of an emitting surface that an alpha texture leaves.
+//! Alpha textures of emitting surfaces.
 
 use crate::geometry::{AlphaSource, GeometryId, GeometrySet, Shape, TriangleMesh};
 use lumiris_numbers::math::{Vec2, Vec3};
 use std::fmt;
 use std::sync::Arc;
 
-/// The alpha texture of an emitting geometry. A ray hits the surface with probability alpha and sees all of its radiance,
-/// so the radiance of a point that is sampled is multiplied by alpha: both techniques find the same light.
+/// The alpha texture of an emitting geometry. A ray hits the surface with probability alpha and then receives all of
+/// its radiance. Light samples therefore multiply the radiance by alpha, so that both techniques have the same
+/// expectation.
 #[derive(Clone)]
 pub struct Cover {
     /// All shapes.
     pub geometry: Arc<GeometrySet>,
-    /// That which emits, in world space.
+    /// The emitting geometry, in world space.
     pub id: GeometryId,
-    /// Its alpha texture, and what evaluates that.
+    /// Its alpha texture.
     pub texture: u32,
-    /// All textures.
+    /// Evaluates alpha textures.
     pub source: Arc<dyn AlphaSource>,
 }
 
@@ -26,14 +27,14 @@ impl fmt::Debug for Cover {
 }
 
 impl Cover {
-    /// That of a geometry; `None` if it has no alpha texture.
+    /// The alpha texture of a geometry; `None` if it has none.
     pub fn of(geometry: &Arc<GeometrySet>, id: GeometryId, source: Arc<dyn AlphaSource>) -> Option<Arc<Cover>> {
         let texture = geometry.geometries[id as usize].alpha?;
         Some(Arc::new(Cover { geometry: Arc::clone(geometry), id, texture, source }))
     }
 
-    /// Alpha, from 0 to 1, at the point `p` of a light, which is `count` primitives from `first` on; `uv` is its texture
-    /// coordinates there, if it is no mesh of triangles.
+    /// Alpha, from 0 to 1, at the point `p` of a light with `count` primitives, the first of which is `first`. `uv`
+    /// gives the texture coordinates at `p`; it is called for shapes other than triangle meshes.
     pub(super) fn alpha(&self, (first, count): (u32, u32), p: Vec3, uv: impl FnOnce() -> Vec2) -> f32 {
         let shape = &self.geometry.geometries[self.id as usize].shape;
         let (primitive, place) = match shape {
@@ -49,7 +50,8 @@ impl Cover {
     }
 }
 
-/// Which of the triangles from `first` on the point lies in, and the weights of its vertices 1 and 2 there.
+/// Index of the triangle that contains the point, among `count` triangles from `first` on, and the weights of its
+/// vertices 1 and 2 there.
 fn triangle_at(mesh: &TriangleMesh, first: u32, count: u32, p: Vec3) -> (u32, [f32; 2]) {
     let weights = |i: u32| {
         let [a, b, c] = mesh.triangle(i as usize);

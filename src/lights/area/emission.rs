@@ -9,7 +9,7 @@ use std::sync::Arc;
 /// Emission of a surface.
 #[derive(Clone, Debug)]
 pub struct Emission {
-    /// Radiance, scale included; a factor of the image if there is one.
+    /// Radiance, including the scale. If there is an image, its values are multiplied by this.
     pub l: Rgb,
     /// True if both sides emit; else the side of the geometric normal.
     pub two_sided: bool,
@@ -17,7 +17,7 @@ pub struct Emission {
     pub image: Option<Arc<EmissionImage>>,
     /// True if the vertex colours of a triangle mesh are a factor.
     pub has_vertex_colors: bool,
-    /// Where the surface is, if an alpha texture cuts it out.
+    /// The alpha texture of the surface, if it has one.
     pub cover: Option<Arc<Cover>>,
 }
 
@@ -27,7 +27,7 @@ impl Emission {
         Emission { l, two_sided: false, image: None, has_vertex_colors: false, cover: None }
     }
 
-    /// True if what is emitted depends on the place.
+    /// True if the emission varies with the texture coordinates.
     #[inline]
     pub fn is_textured(&self) -> bool {
         self.image.is_some() || self.cover.is_some()
@@ -81,18 +81,19 @@ pub struct EmissionImage {
     is_nearest: bool,
 }
 
-/// Texture coordinates of an image on triangles, where they are not those of other textures.
+/// Texture coordinates of an emission image on triangles, if they differ from the coordinates of other textures.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EmissionMapping {
     /// True for the second texture coordinates.
     pub second: bool,
-    /// Texture coordinates to those of the image.
+    /// Transform from texture coordinates to image coordinates.
     pub image_from_uv: Affine2,
 }
 
 impl EmissionImage {
-    /// An image of rows from the top; `Err` with a message if the sizes do not fit. Negative and non-finite values
-    /// become 0.
+    /// An image whose rows start at the top. Negative and non-finite values become 0.
+    ///
+    /// Returns `Err` with a message if the sizes do not fit.
     pub fn new(width: usize, height: usize, data: Vec<Rgb>) -> Result<Self, String> {
         if width == 0 || height == 0 || data.len() != width * height {
             return Err(format!("an emission image of {width}×{height} has {} pixels", data.len()));
@@ -108,26 +109,26 @@ impl EmissionImage {
         Ok(EmissionImage { width, height, data, mean, wrap: [AxisWrap::Clamp; 2], mapping: None, is_nearest: false })
     }
 
-    /// The image with other edges, columns first, and with texture coordinates of its own.
+    /// Sets the wrap modes of the edges (columns first) and the mapping of texture coordinates.
     #[must_use]
     pub fn placed(self, wrap: [AxisWrap; 2], mapping: Option<EmissionMapping>) -> Self {
         EmissionImage { wrap, mapping, ..self }
     }
 
-    /// The image without interpolation between pixels.
+    /// Disables interpolation between pixels.
     #[must_use]
     pub fn nearest(self) -> Self {
         EmissionImage { is_nearest: true, ..self }
     }
 
-    /// How texture coordinates become those of the image, if they do.
+    /// The mapping of texture coordinates to image coordinates, if the image has one.
     pub fn mapping(&self) -> Option<&EmissionMapping> {
         self.mapping.as_ref()
     }
 
-    /// The radiance at `uv`: bilinear, unless the nearest pixel counts.
+    /// The radiance at `uv`: bilinear interpolation, or the nearest pixel.
     pub fn lookup(&self, uv: Vec2) -> Rgb {
-        // Beyond these, floats have no fractions to interpolate by
+        // Larger floats have no fractional bits to interpolate with
         let limit = |v: f32, count: usize, wrap: AxisWrap| match wrap {
             AxisWrap::Clamp => v.clamp(-1.0, count as f32),
             AxisWrap::Repeat | AxisWrap::Mirror => v.clamp(-1e7, 1e7),

@@ -52,9 +52,9 @@ pub struct AreaLight {
     pub shape: AreaShape,
     /// Its plane, if it is flat.
     pub plane: Option<Plane>,
-    /// What it emits.
+    /// Its emission.
     pub emission: Emission,
-    /// First primitive of its geometry that belongs to it.
+    /// Its first primitive in the geometry.
     pub primitive: u32,
 }
 
@@ -93,7 +93,7 @@ impl ShapeSample {
     }
 }
 
-/// Density per steradian of a density per area at `p`, seen from `from`; 0 where it is not defined.
+/// Converts a density per area at `p` to a density per steradian at `from`; 0 if it is not defined.
 #[inline]
 fn pdf_by_area(from: Vec3, p: Vec3, n: Vec3, pdf_area: f32) -> f32 {
     let d = p - from;
@@ -103,8 +103,9 @@ fn pdf_by_area(from: Vec3, p: Vec3, n: Vec3, pdf_area: f32) -> f32 {
 }
 
 impl AreaLight {
-    /// Samples a direction to the surface. `None` if the point is in the plane of a flat light or behind it, if that is
-    /// one-sided, or the geometry is degenerate; a sample on the non-emitting side of a curved light has black `li`.
+    /// Samples a direction to the surface. Returns `None` if the geometry is degenerate, if the point is in the plane
+    /// of a flat light, or if it is behind a one-sided flat light. A sample on the non-emitting side of a curved light
+    /// has black `li`.
     #[inline]
     pub fn sample_li(&self, ctx: &LightCtx, u: [f32; 2]) -> Option<LightSample> {
         if self.is_dark_from(ctx.p) {
@@ -122,7 +123,7 @@ impl AreaLight {
         Some(LightSample { li, wi, pdf, t, p, n, p_error, is_delta: false })
     }
 
-    /// Samples a point of the surface, by area or nearly so, whatever looks at it.
+    /// Samples a point of the surface, uniform or nearly uniform in area, independent of the receiver.
     pub(super) fn sample_point(&self, u: [f32; 2]) -> ShapePoint {
         match &self.shape {
             AreaShape::Triangle(triangle) => triangle.sample_point(u),
@@ -132,18 +133,18 @@ impl AreaLight {
         }
     }
 
-    /// Radiance that leaves the point `p` of the surface on a side that emits, by the part of it that is there.
+    /// Radiance that leaves the point `p` on an emitting side, including vertex colours and alpha.
     pub(super) fn radiance(&self, p: Vec3) -> Rgb {
         let uv = if self.emission.image.is_some() { self.uv(p) } else { Vec2::ZERO };
         self.covered(self.colored(self.emission.radiance(uv), p), p)
     }
 
-    /// A radiance at the point `p` of the surface, times the part of that which its alpha texture leaves.
+    /// Multiplies a radiance by alpha at the point `p`.
     #[inline]
     fn covered(&self, l: Rgb, p: Vec3) -> Rgb {
         match &self.emission.cover {
             Some(cover) if !l.is_black() => {
-                // Two triangles may be one rectangle
+                // A rectangle can be made of two triangles
                 let count = if matches!(self.shape, AreaShape::Rectangle(_)) { 2 } else { 1 };
                 l * cover.alpha((self.primitive, count), p, || self.uv(p))
             }
@@ -151,7 +152,7 @@ impl AreaLight {
         }
     }
 
-    /// A radiance of the emission, times the colour of the vertices at the point `p`.
+    /// Multiplies a radiance by the vertex colour at the point `p`.
     #[inline]
     fn colored(&self, radiance: Rgb, p: Vec3) -> Rgb {
         match &self.shape {
@@ -160,7 +161,7 @@ impl AreaLight {
         }
     }
 
-    /// True if it has the same radiance everywhere.
+    /// True if the radiance is constant over the surface.
     pub(super) fn is_even(&self) -> bool {
         let has_colors = matches!(&self.shape, AreaShape::Triangle(triangle) if triangle.colors.is_some());
         !self.emission.is_textured() && !has_colors
@@ -181,8 +182,8 @@ impl AreaLight {
         emission::luminance_of(self.mean_radiance())
     }
 
-    /// Density per steradian of [`sample_li`](Self::sample_li) at the point `hit`. Of a surface that a ray can cross
-    /// more than once, this is the density of that point alone.
+    /// Density per steradian of [`sample_li`](Self::sample_li) at the point `hit`. If a ray can cross the surface more
+    /// than once, this is the density of this intersection only.
     #[inline]
     pub fn pdf_li(&self, ctx: &LightCtx, _wi: Vec3, hit: &LightHit) -> f32 {
         if self.is_dark_from(ctx.p) {
@@ -196,8 +197,9 @@ impl AreaLight {
         }
     }
 
-    /// Radiance that leaves the point `hit`, which a ray has found to be there, in direction `w`. Which side a flat light emits from is read from the
-    /// light itself, so that both techniques agree; curved ones use the normal of the hit.
+    /// Radiance that leaves the point `hit` in direction `w`, where `hit` is a ray intersection. The emitting side of a
+    /// flat light is read from the light itself, so that light and BSDF sampling agree. Curved lights use the normal of
+    /// the hit.
     #[inline]
     pub fn l(&self, hit: &LightHit, w: Vec3) -> Rgb {
         let n = match &self.shape {
@@ -210,7 +212,7 @@ impl AreaLight {
         self.colored(self.emission.l(n, uv, w), hit.p)
     }
 
-    /// Luminance of the emitted power, π·A·L, twice that of a two-sided light.
+    /// Luminance of the emitted power, π·A·L, doubled for a two-sided light.
     pub fn phi(&self) -> f32 {
         let sides = if self.emission.two_sided { 2.0 } else { 1.0 };
         PI * self.area() * self.mean_luminance() * sides
@@ -244,8 +246,7 @@ impl AreaLight {
         }
     }
 
-    /// True if nothing of a side that emits can be seen from `p`: from the plane of a flat light, and from behind a
-    /// one-sided light.
+    /// True if no emitting side is visible from `p`: `p` is in the plane of a flat light, or behind a one-sided light.
     #[inline]
     pub(super) fn is_dark_from(&self, p: Vec3) -> bool {
         let two_sided = self.emission.two_sided;

@@ -1,7 +1,8 @@
 //! Bilinear patches, sampled uniformly in (u, v).
 //!
-//! p(u, v) = a + u·b + v·c + uv·d; the density per area is 1/|∂p/∂u × ∂p/∂v|. The normal before normalisation is
-//! bilinear in (u, v) too, so it lies in any cone (narrower than a half-space) about its four corner values.
+//! p(u, v) = a + u·b + v·c + uv·d. The density per area is 1/|∂p/∂u × ∂p/∂v|. The normal before normalisation is
+//! bilinear in (u, v) too, so every cone narrower than a half-space that contains the four corner normals contains all
+//! normals.
 
 use super::{ShapePoint, ShapeSample, pdf_by_area};
 use glam::DVec3;
@@ -65,7 +66,7 @@ impl PatchLight {
         if self.flip_normal { -n } else { n }
     }
 
-    /// The unit normal of the plane of both diagonals, on the emitting side; zero if there is none.
+    /// The unit normal of the plane that is parallel to both diagonals, on the emitting side; zero if there is none.
     pub(super) fn mean_normal(&self) -> Vec3 {
         let [p00, p10, p01, p11] = self.corners.map(|p| p.as_dvec3());
         let n = (p11 - p00).cross(p01 - p10).normalize_or_zero().as_vec3();
@@ -99,8 +100,8 @@ impl PatchLight {
         bilinear_vec2(&self.uvs, uv.x, uv.y)
     }
 
-    /// The (u, v) of a point of the patch: of h = p − a, (h − v·c) × (b + v·d) = 0 along the mean normal is quadratic
-    /// in v; the root whose point is nearest to p is taken.
+    /// The (u, v) of a point of the patch. With h = p − a, the component of (h − v·c) × (b + v·d) = 0 along the mean
+    /// normal is a quadratic equation in v. The root whose point is nearest to p is taken.
     pub fn invert(&self, p: Vec3) -> Vec2 {
         let [p00, p10, p01, p11] = self.corners.map(|c| c.as_dvec3());
         let (b, c, d) = (p10 - p00, p01 - p00, p11 - p10 - p01 + p00);
@@ -130,7 +131,7 @@ impl PatchLight {
     }
 }
 
-/// Both real roots of a·x² + b·x + c; the real part if they are complex, and NaN or infinity where there are fewer.
+/// Both real roots of a·x² + b·x + c; the real part if they are complex. NaN or infinite if there are fewer roots.
 fn quadratic_roots(a: f64, b: f64, c: f64) -> [f64; 2] {
     let root = (b * b - 4.0 * a * c).max(0.0).sqrt();
     let q = -0.5 * (b + root.copysign(b));

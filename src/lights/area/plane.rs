@@ -1,16 +1,16 @@
 //! Planes of flat lights.
 //!
-//! A flat light cannot be seen from its own plane. Points of the plane are off by rounding, and an angle that is 0 up to
-//! rounding is no small angle to a point near by, so what is that near the plane counts as on it.
+//! A flat light is not visible from its own plane. Points of the plane are inexact by rounding. At a nearby point even
+//! a tiny offset from the plane gives a large angle, so points within the rounding error count as on the plane.
 
 use super::AreaShape;
 use lumiris_numbers::math::{Vec3, gamma};
 
-/// Bound of the rounding errors of a point of a plane, of the plane, and of the distance between them, relative to their
-/// coordinates.
+/// Bound of the rounding errors of a point of the plane, of the plane itself, and of the distance between them,
+/// relative to their coordinates.
 const ROUNDING: f32 = gamma(9);
-/// Distance of the corners of a patch from one plane, relative to their coordinates, up to which it is flat: as far as
-/// each is off when it is placed.
+/// Maximum distance of the corners of a flat patch from one plane, relative to their coordinates: the rounding error of
+/// the transform to world space.
 const FLATNESS: f32 = gamma(16);
 
 /// The plane of a flat light.
@@ -25,7 +25,7 @@ pub struct Plane {
 }
 
 impl Plane {
-    /// That of a shape; `None` if the shape is curved.
+    /// The plane of a shape; `None` if the shape is curved.
     pub(super) fn of(shape: &AreaShape) -> Option<Plane> {
         match shape {
             AreaShape::Triangle(t) => Some(Plane::new(&t.p, t.n)),
@@ -45,7 +45,7 @@ impl Plane {
         }
     }
 
-    /// The plane through the first of `corners`; others may be off.
+    /// The plane through the first of `corners`. Distances of the other corners increase the error bound.
     fn new(corners: &[Vec3], n: Vec3) -> Plane {
         let (first, normal) = (corners[0].as_dvec3(), n.as_dvec3());
         let off = |p: &Vec3| normal.dot(p.as_dvec3() - first).abs();
@@ -54,7 +54,7 @@ impl Plane {
         Plane { p: corners[0], n, error: bend + n.abs().dot(extent) * ROUNDING }
     }
 
-    /// Distance of `p` on the emitting side, negative behind; 0 for what may be a point of the plane.
+    /// Distance of `p` on the emitting side, negative behind; 0 if `p` is on the plane within the rounding error.
     #[inline]
     pub(super) fn height(&self, p: Vec3) -> f32 {
         let height = self.n.dot(p - self.p);
@@ -78,7 +78,7 @@ mod tests {
         Affine3A::from_scale_rotation_translation(Vec3::splat(scale), rotation, p)
     }
 
-    /// A triangle, a quadrilateral of two, the same as a patch, and a disk.
+    /// A triangle, a quadrilateral of two triangles, the same quadrilateral as a patch, and a disk.
     fn flat_shapes(m: &Affine3A, s: &mut Pcg32) -> [Shape; 4] {
         let far = 1.0 + s.random::<f32>();
         let corners = [(0.0, 0.0), (1.0, 0.1), (0.0, 1.0), (far, far)];
@@ -112,7 +112,7 @@ mod tests {
                     let hit = shape.surface_hit(primitive, uv, -Vec3::Z);
                     for light in lights.iter().flatten() {
                         assert!(light.is_dark_from(hit.p), "{shape:?} {uv:?}");
-                        // Beyond the rounding of what is at p and of the extent of the light
+                        // Larger than the rounding errors of p and of the extent of the light
                         let height = 1e-5 * (hit.p.abs().max_element() + light.area().sqrt());
                         let above = [hit.p + hit.n * height, hit.p - hit.n * height].map(|p| light.is_dark_from(p));
                         assert_eq!(above, [false, !light.emission.two_sided], "{shape:?} {uv:?}");

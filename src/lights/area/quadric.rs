@@ -1,8 +1,8 @@
 //! Spheres, disks and cylinders.
 //!
 //! A full sphere under a similarity transform is sampled uniformly in the cone that it subtends [Pharr et al. 2023,
-//! §6.2.4], and uniformly in area from inside. All others, including partial ones, are sampled uniformly in the area of
-//! their local shape. Under a transform M, an area element is scaled by |cof(M)·n|, n being the local normal.
+//! §6.2.4], and uniformly in area from inside. All other shapes, including partial spheres, are sampled uniformly in
+//! the area of their local shape. A transform M scales an area element by |cof(M)·n|, where n is the local normal.
 
 use super::{ShapePoint, ShapeSample, pdf_by_area};
 use crate::geometry::{Quadric, QuadricKind};
@@ -16,7 +16,7 @@ use std::f32::consts::TAU;
 #[derive(Clone, Debug)]
 pub struct QuadricLight {
     quadric: Quadric,
-    /// Cofactor matrix of the placement.
+    /// Cofactor matrix of the transform.
     cofactor: Mat3,
     local_area: f32,
     /// Area in world space.
@@ -41,7 +41,7 @@ fn local_area(kind: &QuadricKind) -> f32 {
     }
 }
 
-/// The world-space radius of a full sphere under a placement that keeps angles.
+/// The world-space radius of a full sphere under a similarity transform; `None` for other shapes or transforms.
 fn sphere_radius(kind: &QuadricKind, m: &Mat3) -> Option<f32> {
     let QuadricKind::Sphere { radius, z_min, z_max, phi_max } = *kind else { return None };
     let is_full = z_min <= -radius * (1.0 - 1e-6) && z_max >= radius * (1.0 - 1e-6) && phi_max >= TAU - 1e-5;
@@ -124,8 +124,8 @@ impl QuadricLight {
         }
     }
 
-    /// 1 − cos θ of the cone of the sphere seen from `from`, the unit direction to its centre and the squared sine;
-    /// `None` if it is no sphere or `from` is inside.
+    /// The cone that the sphere subtends at `from`: 1 − cos θmax, the unit direction to the centre, and sin²θmax.
+    /// `None` if the shape is not a full sphere or `from` is inside.
     #[inline]
     fn cone(&self, from: Vec3) -> Option<(f32, Vec3, f32)> {
         let (center, radius) = self.sphere?;
@@ -153,8 +153,8 @@ impl QuadricLight {
         (center, radius): (Vec3, f32),
         (one_minus_cos, axis, sin2_max): (f32, Vec3, f32),
     ) -> Option<ShapeSample> {
-        // The point is found from the angle at the centre, which keeps its digits for small and distant spheres:
-        // cos α = sin²θ/sin θmax + cos θ·sqrt(1 − sin²θ/sin²θmax).
+        // The point is computed from the angle α at the centre, which stays accurate for small and distant spheres: cos
+        // α = sin²θ/sin θmax + cos θ·sqrt(1 − sin²θ/sin²θmax).
         let w = sample_uniform_cone(u, one_minus_cos);
         let sin2 = sqr(w.x) + sqr(w.y);
         let cos_alpha = sin2 / sin2_max.sqrt() + w.z * safe_sqrt(1.0 - sin2 / sin2_max);
@@ -198,8 +198,8 @@ impl QuadricLight {
         pdf_by_area(from, p, scaled_n / jacobian, 1.0 / (self.local_area * jacobian))
     }
 
-    /// A point of the plane of a disk and the largest coordinates of the terms that its points are sums of, and its unit
-    /// normal; `None` for other quadrics.
+    /// Two points and the unit normal of a disk's plane: a point of the plane, and the largest coordinates of the terms
+    /// that its points are sums of. `None` for other quadrics.
     pub(super) fn disk_plane(&self) -> Option<([Vec3; 2], Vec3)> {
         let QuadricKind::Disk { height, radius, .. } = self.quadric.kind else { return None };
         let m = self.quadric.group_from_local.as_daffine3();
@@ -210,13 +210,13 @@ impl QuadricLight {
         Some(([center.as_vec3(), extent.as_vec3()], if self.quadric.flip_normal { -n } else { n }))
     }
 
-    /// True if no point of the side of the normal can be seen from `p`: outside a sphere whose normal points inwards,
-    /// inside one whose normal points outwards.
+    /// True if the side of the normal is not visible from `p`: `p` is outside a sphere whose normal points inwards, or
+    /// inside a sphere whose normal points outwards.
     #[inline]
     pub(super) fn is_behind(&self, p: Vec3) -> bool {
         match (self.quadric.kind, self.sphere) {
             (QuadricKind::Sphere { .. }, Some((center, radius))) => {
-                // A point on the sphere itself, which rounding may put on either side, sees the inside.
+                // A point on the sphere, which rounding may put on either side, counts as inside.
                 let distance = p.distance(center);
                 let is_inside = distance < radius * (1.0 - ON_SURFACE);
                 let is_outside = distance > radius * (1.0 + ON_SURFACE);
@@ -226,8 +226,8 @@ impl QuadricLight {
         }
     }
 
-    /// Bounds, axis and cosine of the cone of normals, and the area to multiply the radiance with for the greatest
-    /// intensity (a quarter of the area for spheres, 1/π of it for cylinders; half of it for parts of them).
+    /// Bounds, axis and cosine of the cone of normals, and the factor of the radiance in the maximum intensity: a
+    /// quarter of the area for full spheres, 1/π of it for full cylinders, half of it for parts of them.
     pub(super) fn emission_bounds(&self) -> (Bounds3, Vec3, f32, f32) {
         let bounds = self.quadric.bounds();
         match self.quadric.kind {
@@ -265,8 +265,8 @@ impl QuadricLight {
 
 #[cfg(test)]
 impl QuadricLight {
-    /// True if `sample` can return the point `p`: all points, but for spheres seen from outside, which are sampled
-    /// where they face `from`.
+    /// True if `sample` can return the point `p`. False only for points of a full sphere, sampled from outside, that
+    /// face away from `from`.
     pub(crate) fn pdf_is_visible(&self, from: Vec3, p: Vec3) -> bool {
         match (self.cone(from), self.sphere) {
             (Some(_), Some((center, _))) => (p - center).dot(from - p) > 0.0,

@@ -5,10 +5,10 @@
 //! S = g0 + g1 + g2 + g3 − 2π. For a first number u, the part of the spherical rectangle left of x(u) has the area
 //! u·S; for a second number v, the height is uniform on that arc.
 //!
-//! Beyond a distance of diagonal/[`MAX_EXTENT`] from the centre, points are sampled uniformly in area instead: the
-//! density per steradian is then proportional to t³/|z0| and varies by less than a factor of two to either side, at a
-//! tenth of the cost. The same holds for points within [`MIN_HEIGHT`] diagonals of the plane. `sample` and `pdf` decide
-//! by the same function, so they always agree.
+//! Points farther than diagonal/[`MAX_EXTENT`] from the centre sample uniformly in area instead. The density per
+//! steradian is then proportional to t³/|z0|, varies by less than a factor of two to either side, and costs a tenth of
+//! the time. Points within [`MIN_HEIGHT`] diagonals of the plane do the same. `sample` and `pdf` decide by the same
+//! function, so they always agree.
 
 use super::{ShapePoint, ShapeSample, pdf_by_area};
 use lumiris_lanes::area::many::MAX_EXTENT;
@@ -29,13 +29,13 @@ pub struct RectangleLight {
     pub size: Vec2,
     /// Unit normal of the emitting side.
     pub n: Vec3,
-    /// Distance of the fourth corner from its place; at most 1e-4 of an edge.
+    /// Distance of the fourth corner from its position in an exact rectangle; at most 1e-4 of an edge.
     pub flatness_error: f32,
     /// Texture coordinates at the corner and at the far ends of the two edges.
     pub uvs: [Vec2; 3],
 }
 
-/// A rectangle as seen from a point: [x0, x1] × [y0, y1] × {z0} in the frame of its edges, z0 < 0.
+/// A rectangle relative to a point: [x0, x1] × [y0, y1] × {z0} in the frame of its edges, z0 < 0.
 struct SphericalRectangle {
     /// Extent along the first edge.
     x: [f64; 2],
@@ -61,8 +61,8 @@ fn complex_product(a: (f64, f64), b: (f64, f64)) -> (f64, f64) {
     (a.0 * b.0 - a.1 * b.1, a.0 * b.1 + a.1 * b.0)
 }
 
-/// e^{i·g} up to a positive factor, for the inner angles of the arcs that meet at (x1, y0) and (x1, y1), and of
-/// those at (x0, y1) and (x0, y0): pairwise products.
+/// e^{i·g} up to a positive factor, as two pairwise products: for the inner angles at (x1, y0) and (x1, y1), and for
+/// the inner angles at (x0, y1) and (x0, y0).
 #[inline]
 fn inner_angles(x: [f64; 2], y: [f64; 2], z0: f64) -> [(f64, f64); 2] {
     let (xx, yy, zz) = ([x[0] * x[0], x[1] * x[1]], [y[0] * y[0], y[1] * y[1]], z0 * z0);
@@ -70,14 +70,14 @@ fn inner_angles(x: [f64; 2], y: [f64; 2], z0: f64) -> [(f64, f64); 2] {
     [complex_product(corner(1, 0, 1.0), corner(1, 1, -1.0)), complex_product(corner(0, 1, 1.0), corner(0, 0, -1.0))]
 }
 
-/// The spherical rectangle under which a rectangle is seen, if that is what it is sampled by.
+/// The spherical rectangle subtended at `from`; `None` if points are sampled uniformly in area instead.
 fn spherical_rectangle(rectangle: &RectangleLight, from: Vec3) -> Option<SphericalRectangle> {
     let center = rectangle.corner + rectangle.ex * (0.5 * rectangle.size.x) + rectangle.ey * (0.5 * rectangle.size.y);
     let is_far = rectangle.size.length_squared() < MAX_EXTENT * MAX_EXTENT * (center - from).length_squared();
     if is_far { None } else { accurate_rectangle(rectangle, from) }
 }
 
-/// The spherical rectangle, if its angles are accurate.
+/// The spherical rectangle; `None` if its angles are inaccurate.
 fn accurate_rectangle(rectangle: &RectangleLight, from: Vec3) -> Option<SphericalRectangle> {
     let d = rectangle.corner.as_dvec3() - from.as_dvec3();
     let (ex, ey) = (rectangle.ex.as_dvec3(), rectangle.ey.as_dvec3());
@@ -92,7 +92,7 @@ fn accurate_rectangle(rectangle: &RectangleLight, from: Vec3) -> Option<Spherica
     (solid_angle >= MIN_SOLID_ANGLE).then_some(SphericalRectangle { x, y, z0, solid_angle, g23 })
 }
 
-/// The point (x, y) of the rectangle for two uniform numbers.
+/// The point (x, y) of the rectangle for two uniform random numbers.
 fn sample_spherical(spherical: &SphericalRectangle, u: [f32; 2]) -> [f64; 2] {
     let SphericalRectangle { x, y, z0, solid_angle, g23 } = *spherical;
     // Ureña's b0 and b1: z of the normals of the planes through the edges y0 and y1.
@@ -120,7 +120,7 @@ impl RectangleLight {
         self.size.x * self.size.y
     }
 
-    /// The solid angle under which it is seen, if that is large enough to be accurate.
+    /// The solid angle subtended at `from`; `None` if it is too small to be accurate.
     pub fn solid_angle(&self, from: Vec3) -> Option<f32> {
         accurate_rectangle(self, from).map(|s| s.solid_angle as f32)
     }

@@ -20,7 +20,7 @@ pub struct TriangleLight {
 }
 
 impl TriangleLight {
-    /// A triangle whose emitting side sees its corners counter-clockwise, or clockwise if `flip_normal`.
+    /// A triangle whose corners are counter-clockwise as seen from its emitting side, or clockwise if `flip_normal`.
     pub fn new(p: [Vec3; 3], flip_normal: bool, uvs: [Vec2; 3]) -> Self {
         let [a, b, c] = p.map(|p| p.as_dvec3());
         let cross = (b - a).cross(c - a);
@@ -60,12 +60,12 @@ impl TriangleLight {
     #[inline]
     pub(super) fn color(&self, p: Vec3) -> Rgb {
         let Some(colors) = &self.colors else { return Rgb::WHITE };
-        // Rounding may leave the triangle
+        // Rounding may give weights outside [0, 1]
         let [b0, b1, b2] = self.barycentric(p).map(|b| b.clamp(0.0, 1.0));
         colors[0] * b0 + colors[1] * b1 + colors[2] * b2
     }
 
-    /// The mean of that factor.
+    /// The mean of the factor of the radiance.
     pub(super) fn mean_color(&self) -> Rgb {
         self.colors.as_ref().map_or(Rgb::WHITE, |colors| colors.iter().copied().sum::<Rgb>() / 3.0)
     }

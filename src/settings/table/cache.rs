@@ -6,7 +6,7 @@ use crate::settings::{Cached, IntegratorKind};
 
 const CACHE: Applies = Applies::Integrators(&[IntegratorKind::IrradianceCache]);
 
-/// Records and what they hold.
+/// The irradiance cache and its records.
 pub(super) const IRRADIANCE_CACHE: Group = Group {
     title: "Irradiance cache (--integrator irradiance-cache)",
     rows: &[

@@ -1,4 +1,4 @@
-//! How direct light is estimated.
+//! Settings of direct light.
 
 use super::{Applies, Group, MAX_SAMPLES, RESEARCH, Setting, choice};
 use crate::settings::EstimatorKind::{Auto, Contributing, Correlated, Mis, Ocv, OptimalMis, Ris};

@@ -68,17 +68,17 @@ use super::{EstimatorKind, IntegratorKind, Settings};
 pub struct Setting {
     /// Name on the command line, without `--`.
     pub flag: &'static str,
-    /// Names that it had on the command line before, which are still accepted.
+    /// Former names on the command line, which are still accepted.
     pub aliases: &'static [&'static str],
     /// Placeholder of the value in help.
     pub value_name: &'static str,
     /// Value of the option if none is given, where that is allowed.
     pub bare: Option<&'static str>,
-    /// Directive of scene files whose parameter it is.
+    /// The scene-file directive of its parameters.
     pub directive: Directive,
-    /// Parameters of the directive that make up the value; none if it is the name of the directive itself.
+    /// Parameters of the directive that make up the value; empty if the value is the name of the directive itself.
     pub parameters: &'static [&'static str],
-    /// Names that parameters had before, which are still read: the present name and the old one.
+    /// Former names of parameters, which are still read: the present name and the old one.
     pub old_parameters: &'static [(&'static str, &'static str)],
     /// Name in metadata.
     pub key: &'static str,
@@ -88,15 +88,15 @@ pub struct Setting {
     pub help: &'static str,
     /// The default as help states it; `""` for the value in [`Settings::default`].
     pub default: &'static str,
-    /// Images that it affects.
+    /// The images that it affects.
     pub applies: Applies,
-    /// False if only scene files and Python have it, and the command line has no option for it.
+    /// False if it is only available in scene files and Python, without a command-line option.
     pub is_option: bool,
-    /// False if it cannot affect an image, but only prevent it from being rendered.
+    /// False if it cannot affect an image, but only prevent its rendering.
     pub is_recorded: bool,
-    /// The value; `None` where it is the renderer's choice and there is no word for that.
+    /// The value; `None` if the renderer chooses it and no name stands for that.
     pub get: fn(&Settings) -> Option<Value>,
-    /// The value with the renderer's choice, where that follows from the settings alone.
+    /// The value including the renderer's choice, if that follows from the settings alone.
     pub resolved: Option<fn(&Settings) -> Option<Value>>,
     /// Sets a value of `kind`; `None` if it is of another kind.
     pub set: fn(&mut Settings, Value) -> Option<()>,
@@ -116,11 +116,11 @@ pub enum Directive {
 pub enum Applies {
     /// All.
     Always,
-    /// Those with one of these estimators of direct light.
+    /// Images with one of these estimators of direct light.
     Estimators(&'static [EstimatorKind]),
-    /// Those with one of these integrators.
+    /// Images with one of these integrators.
     Integrators(&'static [IntegratorKind]),
-    /// Those for whose settings this is true, and when that is.
+    /// Images whose settings satisfy the condition, and the condition in words.
     If(fn(&Settings) -> bool, &'static str),
 }
 
@@ -135,7 +135,7 @@ impl Applies {
         }
     }
 
-    /// Which images these are, as the end of a sentence.
+    /// Describes the images, as the end of a sentence.
     pub fn condition(&self) -> String {
         let list = |kind: &str, names: Vec<&str>| {
             let plural = if names.len() > 1 { "s" } else { "" };
@@ -170,7 +170,7 @@ pub struct Group {
     pub rows: &'static [Setting],
 }
 
-/// All settings. Values are set in this order, so those that others depend on come first.
+/// All settings. Values are set in this order, so settings that others depend on come first.
 pub const GROUPS: &[Group] = &[
     transport::TRANSPORT,
     transport::SAMPLING,
@@ -181,13 +181,15 @@ pub const GROUPS: &[Group] = &[
     photons::PHOTONS,
 ];
 
-/// All settings, one after the other.
+/// All settings in order.
 pub fn rows() -> impl Iterator<Item = &'static Setting> {
     GROUPS.iter().flat_map(|group| group.rows)
 }
 
 impl Setting {
-    /// Sets the value that a text stands for. `Err` says what is expected.
+    /// Sets the value from its text.
+    ///
+    /// Returns `Err` with the expected values if the text is invalid.
     pub fn set_text(&self, settings: &mut Settings, text: &str) -> Result<(), String> {
         let value = self.kind.parse(text)?;
         (self.set)(settings, value).ok_or_else(|| format!("expected {}", self.kind))
@@ -226,7 +228,7 @@ impl Setting {
     }
 }
 
-/// One of these names.
+/// A choice of these names.
 const fn choice(names: &'static [&'static str]) -> Kind {
     Kind::Choice { names, synonyms: &[] }
 }
@@ -242,12 +244,12 @@ const MAX_SAMPLES: u64 = 4096;
 const MAX_U32: u64 = u32::MAX as u64;
 
 impl Value {
-    /// The whole number, of 32 bits.
+    /// The integer, as 32 bits.
     fn count(&self) -> Option<u32> {
         self.integer().and_then(|n| u32::try_from(n).ok())
     }
 
-    /// The member of an enumeration that has the name.
+    /// The member of an enumeration with this name.
     fn named<T: std::str::FromStr>(&self) -> Option<T> {
         self.name()?.parse().ok()
     }

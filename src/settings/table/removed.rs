@@ -1,5 +1,5 @@
-//! Settings of earlier versions that no longer exist. Scene files and plans may still have them: they are ignored, and that
-//! is said.
+//! Settings of earlier versions that no longer exist. Scene files and plans may still contain them: they are ignored
+//! with a message.
 
 use super::Directive;
 
@@ -12,11 +12,11 @@ pub struct Removed {
     pub parameter: &'static str,
     /// Its name in metadata.
     pub key: &'static str,
-    /// What holds without it, as the end of a sentence.
+    /// The behaviour without it, as the end of a sentence.
     pub instead: &'static str,
 }
 
-/// All of them.
+/// All removed settings.
 const REMOVED: &[Removed] = &[
     Removed {
         directive: Directive::Integrator,
@@ -45,17 +45,17 @@ const REMOVED: &[Removed] = &[
 ];
 
 impl Removed {
-    /// Those that were parameters of a directive.
+    /// Removed settings of a directive.
     pub fn of(directive: Directive) -> impl Iterator<Item = &'static Removed> {
         REMOVED.iter().filter(move |removed| removed.directive == directive)
     }
 
-    /// The one of this name in metadata.
+    /// The removed setting with this name in metadata.
     pub fn of_key(key: &str) -> Option<&'static Removed> {
         REMOVED.iter().find(|removed| removed.key == key)
     }
 
-    /// A sentence about it where it is called `name`.
+    /// A sentence about the setting, which is called `name` in the input.
     pub fn note(&self, name: &str) -> String {
         format!("the setting `{name}` no longer exists and is ignored: {}", self.instead)
     }

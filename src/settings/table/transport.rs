@@ -1,4 +1,4 @@
-//! What is computed, and with which random numbers.
+//! Settings of the integrator and of random numbers.
 
 use super::{Applies, Directive, Group, MAX_SAMPLES, MAX_U32, Setting, choice};
 use crate::bsdfs::ProposalDensity;
@@ -25,7 +25,7 @@ pub(super) const TRANSPORT: Group = Group {
             get: |s| Some(Value::Name(s.integrator.kind.into())),
             set: |s, v| {
                 s.integrator.kind = v.named()?;
-                // One bounce, unless another number follows
+                // One bounce, unless a depth follows
                 if s.integrator.kind == IntegratorKind::Direct {
                     s.integrator.max_depth = 1;
                 }

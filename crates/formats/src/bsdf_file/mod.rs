@@ -1,7 +1,7 @@
-//! Files of measured BSDFs (`.bsdf`) [Dupuy and Jakob 2018]: tables over the unit square, by the direction of one of both
-//! rays. Their spectra become linear Rec.709 here.
+//! Files of measured BSDFs (`.bsdf`) [Dupuy and Jakob 2018]: tables over the unit square for each direction of one of
+//! the rays. Spectra are converted to linear Rec.709.
 //!
-//! Reading order: [`tensor`], the container; [`tables`], what is in it.
+//! Reading order: [`tensor`], the container; [`tables`], its content.
 
 pub mod tables;
 pub mod tensor;

@@ -1,19 +1,19 @@
-//! What a file of a measured BSDF holds.
+//! Content of a measured-BSDF file.
 //!
-//! Spectra are reduced to linear Rec.709 as reflectances are: by the CIE 1931 observer under D65, white being 1, linear
-//! between the wavelengths of the file and the same beyond the last ones. Colours outside of Rec.709 lose their negative
-//! parts. Files with `rgb` in place of `spectra` have these colours already.
+//! Spectra are converted to linear Rec.709 like reflectances: by the CIE 1931 observer under D65, with white at 1. They
+//! are linear between the wavelengths of the file and constant beyond the last ones. Colours outside of Rec.709 lose
+//! their negative parts. Files with `rgb` instead of `spectra` contain these colours already.
 
 use super::tensor::{Field, TensorError, TensorFile};
 use crate::spectra::hat_weights;
 use lumiris_numbers::math::Rgb;
 use std::path::{Path, PathBuf};
 
-/// The tables of a measured BSDF. Rows of a table are along φ, from −π to π, and columns along √(2θ/π), both of the
-/// unit square; tables follow each other by θ and then by φ of the direction that they are for. Numbers are finite.
+/// The tables of a measured BSDF, over the unit square. Rows are along φ, from −π to π, and columns along √(2θ/π). The
+/// tables are ordered by θ, then by φ, of their direction. All numbers are finite.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MeasuredBsdf {
-    /// What was measured.
+    /// Description of the measurement.
     pub description: String,
     /// Azimuths of the tables (radians), increasing.
     pub phi: Vec<f32>,
@@ -35,24 +35,24 @@ pub struct MeasuredBsdf {
     pub color_size: [usize; 2],
     /// Luminance of the samples of visible normals.
     pub luminance: Vec<f32>,
-    /// What [`Self::is_relative`] says.
+    /// Colours; [`Self::is_relative`] defines their meaning.
     pub color: Vec<Rgb>,
     /// True if the colour is f cos θ over D/(4σ), else f cos θ itself (1/sr).
     pub is_relative: bool,
 }
 
-/// Why a file cannot be read.
+/// Errors of measured-BSDF files.
 #[derive(Debug, thiserror::Error)]
 pub enum BsdfFileError {
-    /// The system says no.
+    /// Error of the operating system.
     #[error("{reason}")]
     Unreadable {
         /// The file.
         path: PathBuf,
-        /// What it says.
+        /// Its reason.
         reason: std::io::Error,
     },
-    /// It is no such file.
+    /// It is not such a file.
     #[error("{}: {error}", path.display())]
     Wrong {
         /// The file.
@@ -72,7 +72,7 @@ pub fn read_bsdf(path: &Path) -> Result<MeasuredBsdf, BsdfFileError> {
 }
 
 impl MeasuredBsdf {
-    /// Understands the bytes of a file.
+    /// Parses the bytes of a file.
     pub fn parse(bytes: &[u8]) -> Result<Self, TensorError> {
         let file = TensorFile::parse(bytes)?;
         let (phi, theta) = (increasing(file.need("phi_i")?)?, increasing(file.need("theta_i")?)?);
@@ -100,7 +100,7 @@ impl MeasuredBsdf {
     }
 }
 
-/// The numbers of a field of one dimension.
+/// The increasing numbers of a one-dimensional field.
 fn increasing(field: &Field<'_>) -> Result<Vec<f32>, TensorError> {
     let values = field.floats()?;
     if field.shape.len() != 1 || values.is_empty() {
@@ -112,7 +112,7 @@ fn increasing(field: &Field<'_>) -> Result<Vec<f32>, TensorError> {
     }
 }
 
-/// The size of a single table and its numbers. One row is for all azimuths, and stands there twice.
+/// The size and numbers of a single table. A single row holds for all azimuths and is duplicated.
 fn facets(field: &Field<'_>) -> Result<([usize; 2], Vec<f32>), TensorError> {
     match field.shape[..] {
         [1, columns] if columns >= 2 => Ok(([columns, 2], field.floats()?.repeat(2))),
@@ -120,7 +120,7 @@ fn facets(field: &Field<'_>) -> Result<([usize; 2], Vec<f32>), TensorError> {
     }
 }
 
-/// Columns and rows of the tables of a field, of which there are as many as `families` says.
+/// Columns and rows of the tables of a field; `families` are the sizes of its leading dimensions.
 fn table_size(field: &Field<'_>, families: &[usize]) -> Result<[usize; 2], TensorError> {
     if let Some([rows, columns]) = field.shape.strip_prefix(families)
         && *rows >= 2
@@ -165,7 +165,7 @@ mod tests {
     use super::super::tensor::{FieldData, write_tensor_file};
     use super::*;
 
-    /// A field of a file, with its numbers.
+    /// A field of a file: name, shape and numbers.
     type Part = (&'static str, Vec<usize>, Vec<f32>);
 
     fn ramp(n: usize) -> Vec<f32> {
@@ -219,7 +219,7 @@ mod tests {
 
     #[test]
     fn spectra_that_are_the_same_everywhere_are_grey_and_long_waves_are_red() {
-        // From 450 to 700 nm: white must not lack what is beyond
+        // From 450 to 700 nm: the spectrum of white must be extended beyond
         let with = |values: [f32; 3]| {
             let mut parts = parts();
             parts.pop();
@@ -232,7 +232,7 @@ mod tests {
         assert!((grey - Rgb::splat(0.3)).map(f32::abs).max_component() < 1e-6, "{grey:?}");
         let red = with([0.0, 0.0, 1.0]);
         assert!(red.r > 2.0 * red.g && red.b >= 0.0, "{red:?}");
-        // The same curve as a reflectance
+        // The same curve, converted as a reflectance
         let pairs = [359.0, 0.0, 450.0, 0.0, 550.0, 0.0, 700.0, 1.0, 900.0, 1.0];
         let curve = crate::spectra::Spectrum::from_pairs(&pairs).unwrap();
         let expected = crate::spectra::unbounded_rgb(&curve);

@@ -1,4 +1,4 @@
-//! The container: named arrays of numbers, low byte first.
+//! The container: named arrays of little-endian numbers.
 //!
 //! | bytes | what |
 //! |---|---|
@@ -8,19 +8,19 @@
 //! | 2, n | length of its name, the name |
 //! | 2 | number of dimensions |
 //! | 1 | type of its numbers |
-//! | 8 | where they are, from the beginning of the file |
-//! | 8 each | length of each dimension; the last one is that of neighbours |
+//! | 8 | their offset from the beginning of the file |
+//! | 8 each | length of each dimension; the last one varies fastest |
 //!
-//! Whatever a file says of lengths and places is compared with its size before anything is allocated.
+//! All lengths and offsets are compared with the size of the file before anything is allocated.
 
 use std::fmt;
 
 const MAGIC: &[u8; 12] = b"tensor_file\0";
-/// More fields, or dimensions of one, are no file of ours.
+/// Maximum number of fields, and of dimensions of a field.
 const MOST_FIELDS: usize = 1000;
 const MOST_DIMENSIONS: usize = 16;
 
-/// What is wrong, and where.
+/// A format error with its position.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct TensorError {
     /// Offset from the beginning of the file.
@@ -61,7 +61,7 @@ impl NumberType {
         TYPES.get(usize::from(code.checked_sub(1)?)).copied()
     }
 
-    /// Bytes of a number.
+    /// Size of a number (bytes).
     fn size(self) -> usize {
         match self {
             NumberType::U8 | NumberType::I8 => 1,
@@ -81,20 +81,20 @@ pub struct Field<'a> {
     pub ty: NumberType,
     /// Length of each dimension.
     pub shape: Vec<usize>,
-    /// Where it is described.
+    /// Offset of its description in the file.
     pub byte: usize,
     /// Its numbers.
     bytes: &'a [u8],
 }
 
 impl Field<'_> {
-    /// The bytes of a field of bytes.
+    /// The numbers of a field of type u8.
     pub fn bytes(&self) -> Result<&[u8], TensorError> {
         self.check_type(NumberType::U8)?;
         Ok(self.bytes)
     }
 
-    /// The numbers of a field of f32, all finite.
+    /// The numbers of a field of type f32, which must be finite.
     pub fn floats(&self) -> Result<Vec<f32>, TensorError> {
         self.check_type(NumberType::F32)?;
         let (words, _) = self.bytes.as_chunks::<4>();
@@ -124,7 +124,7 @@ pub struct TensorFile<'a> {
     fields: Vec<Field<'a>>,
 }
 
-/// The bytes that are left to be read.
+/// The unread bytes.
 struct Reader<'a> {
     file: &'a [u8],
     at: usize,
@@ -178,14 +178,14 @@ impl<'a> Reader<'a> {
             let message = format!("`{name}` of {shape:?} numbers at byte {offset} does not end in the file");
             return Err(TensorError { byte, message });
         };
-        // They are within the file, so they fit
+        // Ranges within the file fit into usize
         let (shape, bytes) = (shape.iter().map(|&n| n as usize).collect(), &self.file[offset as usize..end as usize]);
         Ok(Field { name, ty, shape, byte, bytes })
     }
 }
 
 impl<'a> TensorFile<'a> {
-    /// Understands the bytes of a file.
+    /// Parses the bytes of a file.
     pub fn parse(file: &'a [u8]) -> Result<Self, TensorError> {
         let mut reader = Reader { file, at: 0 };
         if !file.starts_with(MAGIC) {
@@ -204,12 +204,12 @@ impl<'a> TensorFile<'a> {
         Ok(TensorFile { fields })
     }
 
-    /// The field of a name.
+    /// The field with a name.
     pub fn field(&self, name: &str) -> Option<&Field<'a>> {
         self.fields.iter().find(|field| field.name == name)
     }
 
-    /// The field of a name, which there must be.
+    /// The field with a name; an error if it is missing.
     pub fn need(&self, name: &str) -> Result<&Field<'a>, TensorError> {
         let missing = || {
             let there: Vec<&str> = self.fields.iter().map(|field| field.name.as_str()).collect();
@@ -222,7 +222,7 @@ impl<'a> TensorFile<'a> {
     }
 }
 
-/// The bytes of a file of these fields: names, shapes and numbers.
+/// Writes a file with these fields: names, shapes and numbers.
 pub fn write_tensor_file(fields: &[(&str, Vec<usize>, FieldData<'_>)]) -> Vec<u8> {
     let header: usize = 18 + fields.iter().map(|(name, shape, _)| 13 + name.len() + 8 * shape.len()).sum::<usize>();
     let (mut file, mut data) = (MAGIC.to_vec(), Vec::new());

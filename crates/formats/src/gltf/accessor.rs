@@ -3,7 +3,7 @@
 use super::{Document, GltfError, Place};
 use std::collections::HashMap;
 
-/// Greatest number of elements of an accessor without bytes of its own, which are zeros.
+/// Maximum number of elements of an accessor without a buffer view, whose elements are zero.
 const MAX_ZEROS: usize = 1 << 24;
 
 /// Type of a component.
@@ -38,7 +38,7 @@ impl Component {
         }
     }
 
-    /// The value, and the divisor that makes an integer at most 1.
+    /// The value, and the divisor that normalises integers.
     fn read(self, b: &[u8]) -> (f64, f64) {
         match self {
             Component::I8 => (f64::from(b[0] as i8), 127.0),
@@ -71,7 +71,7 @@ impl Numbers {
         self.values.iter().map(|&v| v as f32).collect()
     }
 
-    /// Elements of `N` components; what an element lacks is `fill`.
+    /// Elements of `N` components; missing components are `fill`.
     pub fn elements<const N: usize>(&self, fill: f32) -> Vec<[f32; N]> {
         let element = |e: &[f64]| std::array::from_fn(|i| e.get(i).map_or(fill, |&v| v as f32));
         self.values.chunks_exact(self.width.max(1)).map(element).collect()
@@ -93,7 +93,7 @@ fn width_of(kind: &str) -> Option<usize> {
 /// Elements in a buffer view.
 #[derive(Clone, Copy, Debug)]
 struct Elements<'a> {
-    /// From the first element on.
+    /// Bytes from the first element on.
     bytes: &'a [u8],
     stride: usize,
     component: Component,
@@ -111,15 +111,15 @@ impl Elements<'_> {
     }
 }
 
-/// An accessor whose elements are known to be in their buffer views, and are read when they are asked for: primitives may
-/// share the accessor of all their vertices.
+/// An accessor whose elements are verified to be in their buffer views. Elements are read on demand, since primitives
+/// may share an accessor with more vertices.
 #[derive(Debug)]
 pub struct Accessor<'a> {
     count: usize,
     width: usize,
-    /// Without these, elements are 0.
+    /// Dense elements; `None` for zeros.
     elements: Option<Elements<'a>>,
-    /// Elements that replace others, by the indices of those.
+    /// Sparse elements: the position by element index, and the values.
     sparse: Option<(HashMap<usize, usize>, Elements<'a>)>,
 }
 
@@ -134,7 +134,7 @@ impl Accessor<'_> {
         self.width
     }
 
-    /// The numbers of elements by their indices, which are below [`Self::count`].
+    /// The numbers of the elements with these indices, which must be below [`Self::count`].
     pub fn numbers(&self, indices: impl ExactSizeIterator<Item = usize>) -> Numbers {
         let mut values = Vec::with_capacity(indices.len() * self.width);
         for index in indices {
@@ -165,7 +165,7 @@ impl Document {
         Ok(accessor.numbers(0..accessor.count))
     }
 
-    /// An accessor, of which nothing has been read; normalised integers are −1..1.
+    /// An accessor before reading; normalised integers are −1..1.
     pub fn open(&self, index: usize) -> Result<Accessor<'_>, GltfError> {
         let place = self.root().key("accessors").item(index);
         let component = place.key("componentType").index().and_then(Component::of);
@@ -201,7 +201,7 @@ impl Document {
         Ok(Elements { bytes: &bytes[offset..end], stride, component, width, normalized })
     }
 
-    /// The elements that replace others, by the indices of those.
+    /// The sparse elements: the position by element index, and the values.
     fn sparse(&self, sparse: &Place<'_>, layout: &Layout) -> Result<(HashMap<usize, usize>, Elements<'_>), GltfError> {
         let count = sparse.key("count").index().unwrap_or(0);
         let place = sparse.key("indices");
@@ -228,7 +228,7 @@ mod tests {
     use base64::Engine;
     use std::path::Path;
 
-    /// A document of one accessor, whose buffer has views of 12 bytes and of 4.
+    /// A document with one accessor, whose buffer has views of 12 bytes and of 4.
     fn document(json: &str, bytes: [u8; 16]) -> Result<Document, GltfError> {
         let data = base64::engine::general_purpose::STANDARD.encode(bytes);
         let text = format!(

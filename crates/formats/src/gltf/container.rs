@@ -1,4 +1,4 @@
-//! The binary container: a header of 12 bytes, a chunk of JSON, and at most one chunk of bytes that counts.
+//! The binary container: a header of 12 bytes, a JSON chunk, and at most one binary chunk that is used.
 
 use super::place::GltfError;
 
@@ -6,7 +6,7 @@ const MAGIC: &[u8; 4] = b"glTF";
 const JSON: u32 = 0x4e4f_534a;
 const BIN: u32 = 0x004e_4942;
 
-/// The JSON and the bytes of a file, which is a container if it begins like one.
+/// The JSON and the binary chunk of a file; a file without the container's magic number is JSON.
 pub fn chunks(file: &[u8]) -> Result<(&[u8], Option<&[u8]>), GltfError> {
     if !file.starts_with(MAGIC) {
         return Ok((file, None));

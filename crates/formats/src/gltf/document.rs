@@ -1,4 +1,4 @@
-//! A document: its JSON, checked, and its buffers.
+//! A document: its validated JSON, and its buffers.
 
 use super::container::chunks;
 use super::json::Json;
@@ -13,19 +13,19 @@ use std::path::{Path, PathBuf};
 #[derive(Debug)]
 pub struct Document {
     json: Json,
-    /// `None` for those that could not be read.
+    /// The buffers; `None` for unreadable ones.
     buffers: Vec<Option<Vec<u8>>>,
     /// Files that hold buffers.
     pub files: Vec<PathBuf>,
-    /// Why buffers could not be read. With any of them, only images can be asked for.
+    /// Errors of unreadable buffers. With any error, only images are accessible.
     pub unread: Vec<Unread>,
     folder: PathBuf,
 }
 
-/// Why a buffer could not be read.
+/// Error of an unreadable buffer.
 #[derive(Clone, Debug)]
 pub enum Unread {
-    /// Its file could not.
+    /// Its file is unreadable.
     File {
         /// Index of the buffer.
         buffer: usize,
@@ -34,17 +34,17 @@ pub enum Unread {
         /// The reason.
         reason: String,
     },
-    /// Its content is not what the document says.
+    /// Its content is inconsistent with the document.
     Content(GltfError),
 }
 
-/// Base64 of data URIs, some of which are without the padding at the end.
+/// Base64 of data URIs, with or without padding.
 const BASE64: GeneralPurpose = GeneralPurpose::new(
     &alphabet::STANDARD,
     GeneralPurposeConfig::new().with_decode_padding_mode(DecodePaddingMode::Indifferent),
 );
 
-/// Bytes of a data URI; `None` if it is none.
+/// Bytes of a data URI; `None` for other URIs.
 fn data_uri(uri: &str) -> Option<Result<Vec<u8>, String>> {
     let (kind, data) = uri.strip_prefix("data:")?.split_once(',').unwrap_or_default();
     if !kind.ends_with(";base64") {
@@ -53,7 +53,7 @@ fn data_uri(uri: &str) -> Option<Result<Vec<u8>, String>> {
     Some(BASE64.decode(data.trim_end()).map_err(|e| e.to_string()))
 }
 
-/// The file name that a URI stands for.
+/// The decoded file name of a URI.
 fn percent_decoded(uri: &str) -> String {
     let (bytes, mut out, mut i) = (uri.as_bytes(), Vec::new(), 0);
     while i < bytes.len() {
@@ -72,20 +72,21 @@ fn percent_decoded(uri: &str) -> String {
     String::from_utf8_lossy(&out).into_owned()
 }
 
-/// Where the content of an image or a buffer is.
+/// Location of the content of an image or a buffer.
 #[derive(Clone, Debug)]
 pub enum Content {
     /// A file.
     File(PathBuf),
-    /// In the document.
+    /// Embedded in the document.
     Bytes(Vec<u8>),
-    /// In a buffer that could not be read, as [`Document::unread`] says.
+    /// In an unreadable buffer, see [`Document::unread`].
     Unread,
 }
 
 impl Document {
-    /// Parses a file that lies in `folder`, and reads its buffers; those that cannot be read are in `unread`. All errors
-    /// of the schema are named.
+    /// Parses a file in `folder`, and reads its buffers; unreadable ones are in `unread`.
+    ///
+    /// Returns all errors of the schema.
     pub fn parse(file: &[u8], folder: &Path, required: &[&str]) -> Result<Document, Vec<GltfError>> {
         let (text, embedded) = chunks(file).map_err(|e| vec![e])?;
         let text = text.strip_prefix(b"\xef\xbb\xbf").unwrap_or(text);
@@ -101,12 +102,12 @@ impl Document {
         Ok(document)
     }
 
-    /// The whole of it.
+    /// The root.
     pub fn root(&self) -> Place<'_> {
         Place::root(&self.json)
     }
 
-    /// Where the content of an image is.
+    /// The location of an image.
     pub fn content(&self, place: &Place<'_>) -> Result<Content, GltfError> {
         if let Some(view) = place.key("bufferView").index() {
             let buffer = self.root().key("bufferViews").item(view).key("buffer").index();
@@ -118,7 +119,7 @@ impl Document {
         self.uri_content(place)
     }
 
-    /// The content that a URI names.
+    /// The content of a URI.
     fn uri_content(&self, place: &Place<'_>) -> Result<Content, GltfError> {
         let uri = place.key("uri").text().ok_or_else(|| place.error("has neither a URI nor a buffer view"))?;
         match data_uri(uri) {
@@ -139,7 +140,7 @@ impl Document {
     fn read_buffer(&self, index: usize, embedded: Option<&[u8]>) -> (Result<Vec<u8>, Unread>, Option<PathBuf>) {
         let place = self.root().key("buffers").item(index);
         if !place.key("uri").exists() {
-            // A placeholder is an error only if something is in it
+            // A placeholder is an error only if it is used
             let embedded = embedded.filter(|_| index == 0);
             return (embedded.map_or(Ok(Vec::new()), |bytes| checked(bytes.to_vec(), &place)), None);
         }
@@ -172,7 +173,7 @@ impl Document {
     }
 }
 
-/// The bytes of a buffer if they are as many as it says.
+/// The bytes of a buffer, if their number matches the document.
 fn checked(bytes: Vec<u8>, place: &Place<'_>) -> Result<Vec<u8>, Unread> {
     let length = place.key("byteLength").index().unwrap_or(0);
     if bytes.len() < length {
@@ -182,7 +183,7 @@ fn checked(bytes: Vec<u8>, place: &Place<'_>) -> Result<Vec<u8>, Unread> {
     Ok(bytes)
 }
 
-/// What is not JSON, in the bytes of the file.
+/// An error about invalid JSON, with its position in the file.
 fn syntax_error(file: &[u8], text: &[u8], e: &serde_json::Error) -> GltfError {
     let lines = text.split_inclusive(|&b| b == b'\n').take(e.line().saturating_sub(1));
     let start = text.as_ptr() as usize - file.as_ptr() as usize;
@@ -192,7 +193,7 @@ fn syntax_error(file: &[u8], text: &[u8], e: &serde_json::Error) -> GltfError {
     GltfError { place: format!("byte {at}"), message: format!("no JSON: {message}") }
 }
 
-/// Checks the version and the extensions that must be understood.
+/// Checks the version and the required extensions.
 fn check_asset(json: &Json, known: &[&str]) -> Result<(), Vec<GltfError>> {
     let root = Place::root(json);
     let version = root.key("asset").key("version");

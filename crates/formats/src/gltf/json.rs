@@ -1,7 +1,7 @@
 //! JSON as one array of values of 16 bytes, for documents of 10⁵ nodes: `serde_json::Value` takes some 700 bytes for an
 //! object of two members.
 //!
-//! Children of an array or an object follow one another, so that an element is found by its index.
+//! Children of an array or an object are contiguous, so that an element is accessed by its index.
 
 use serde::de::{DeserializeSeed, Deserializer, Error, MapAccess, SeqAccess, Visitor};
 use std::collections::HashMap;
@@ -16,7 +16,7 @@ pub struct Json {
     values: Vec<Value>,
     /// Names of members, each once.
     names: Vec<String>,
-    /// All strings, one after the other.
+    /// All strings, concatenated.
     text: String,
 }
 
@@ -25,7 +25,7 @@ enum Kind {
     Null,
     /// 0 or 1.
     Flag,
-    /// An integer that is not negative.
+    /// A non-negative integer.
     Whole,
     /// Bits of an f64.
     Number,
@@ -40,7 +40,7 @@ enum Kind {
 /// A value, with its name if it is a member of an object.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Value {
-    /// A number, or a range: its first index in the upper half, its length in the lower.
+    /// A number, or a range: first index in the upper half, length in the lower half.
     bits: u64,
     /// Index into `Json::names`.
     name: u32,
@@ -102,12 +102,12 @@ impl Json {
         (value.kind == Kind::Text).then(|| &self.text[value.range()])
     }
 
-    /// Elements of an array; none of anything else.
+    /// Elements of an array; empty for other values.
     pub(super) fn elements(&self, value: Value) -> &[Value] {
         if value.is_array() { &self.values[value.range()] } else { &[] }
     }
 
-    /// Members of an object with their names; none of anything else.
+    /// Members of an object with their names; empty for other values.
     pub(super) fn members(&self, value: Value) -> impl DoubleEndedIterator<Item = (&str, Value)> {
         let members = if value.is_object() { &self.values[value.range()] } else { &[] };
         members.iter().map(|&member| {
@@ -117,7 +117,7 @@ impl Json {
         })
     }
 
-    /// A member of an object: the last one of this name.
+    /// A member of an object; the last one with this name.
     pub(super) fn member(&self, value: Value, name: &str) -> Option<Value> {
         self.members(value).rev().find_map(|(other, member)| (other == name).then_some(member))
     }
@@ -125,7 +125,7 @@ impl Json {
 
 #[cfg(test)]
 thread_local! {
-    /// Values and members that were looked at: the work of reading a document.
+    /// Number of accesses to values and members: the work of reading a document.
     pub(super) static WORK: std::cell::Cell<u64> = const { std::cell::Cell::new(0) };
 }
 
@@ -134,17 +134,17 @@ pub(super) fn count_work() {
     WORK.set(WORK.get() + 1);
 }
 
-/// A text while it is parsed.
+/// State of the parser.
 struct Builder {
     json: Json,
     /// Indices of names.
     ids: HashMap<String, u32>,
-    /// Children so far of the arrays and objects that are open.
+    /// Children so far of the open arrays and objects.
     open: Vec<Value>,
 }
 
 impl Builder {
-    /// An array or an object of the children that are open from `first` on.
+    /// Closes an array or an object whose children start at `first` in `open`.
     fn close<E: Error>(&mut self, kind: Kind, first: usize) -> Result<Value, E> {
         let range = range(self.json.values.len(), self.open.len() - first)?;
         self.json.values.extend(self.open.drain(first..));
@@ -239,7 +239,7 @@ impl<'de> Visitor<'de> for NameOf<'_> {
         if let Some(&id) = ids.get(name) {
             return Ok(id);
         }
-        // Fewer than bytes of the text, which are below 2³²
+        // Fewer than the bytes of the text, which are below 2³²
         let id = json.names.len() as u32;
         json.names.push(name.to_owned());
         ids.insert(name.to_owned(), id);

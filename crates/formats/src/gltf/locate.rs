@@ -1,10 +1,10 @@
-//! From a place in the JSON to bytes of the file, for messages.
+//! Maps a path in the JSON to bytes of the file, for messages.
 
 use super::container::chunks;
 use std::ops::Range;
 
-/// Bytes of the value at a place, as errors name it, or of the innermost value on the way that exists; the first byte
-/// of arrays and objects. The beginning of the file if the place is unknown.
+/// Byte range of the value at a path, in the notation of errors; of its innermost existing parent if it does not exist;
+/// the first byte of arrays and objects. The beginning of the file if the path is invalid.
 pub fn locate(file: &[u8], place: &str) -> Range<usize> {
     if let Some(at) = place.strip_prefix("byte ").and_then(|at| at.parse::<usize>().ok()) {
         return at.min(file.len())..(at + 1).min(file.len());
@@ -21,7 +21,7 @@ pub fn locate(file: &[u8], place: &str) -> Range<usize> {
     shifted(value_at(json, at), offset)
 }
 
-/// Bytes of a member of each element of an array of the root, as [`locate`] has them, in one pass over the file.
+/// Byte ranges of a member of each element of an array of the root, as by [`locate`], in one pass over the file.
 pub fn locate_members(file: &[u8], array: &str, key: &str) -> Vec<Range<usize>> {
     let Some((json, offset, root)) = beginning(file) else { return Vec::new() };
     let first = member(json, root, array).and_then(|array| item(json, array, 0));
@@ -29,7 +29,7 @@ pub fn locate_members(file: &[u8], array: &str, key: &str) -> Vec<Range<usize>> 
     items.map(|at| shifted(value_at(json, member(json, at, key).unwrap_or(at)), offset)).collect()
 }
 
-/// The JSON of a file, its first byte, and its root from there.
+/// The JSON of a file, its offset, and the offset of its root within.
 fn beginning(file: &[u8]) -> Option<(&[u8], usize, usize)> {
     let (json, _) = chunks(file).ok()?;
     let offset = json.as_ptr() as usize - file.as_ptr() as usize;
@@ -75,7 +75,7 @@ fn enter(json: &[u8], at: usize, bracket: u8) -> Option<usize> {
     (json.get(at) == Some(&bracket)).then_some(at + 1)
 }
 
-/// What follows a value and its comma.
+/// Offset after a value and its comma.
 fn next(json: &[u8], value: usize) -> Option<usize> {
     let comma = skip_blanks(json, skip_value(json, value));
     (json.get(comma) == Some(&b',')).then(|| skip_blanks(json, comma + 1))
@@ -88,7 +88,7 @@ fn skip_blanks(json: &[u8], mut at: usize) -> usize {
     at
 }
 
-/// One past the value at `at`.
+/// Offset after the value at `at`.
 fn skip_value(json: &[u8], mut at: usize) -> usize {
     let mut depth = 0_usize;
     while let Some(&b) = json.get(at) {

@@ -1,7 +1,7 @@
-//! glTF 2.0: containers, checked JSON, buffers and accessors. What they mean is decided by the renderer.
+//! glTF 2.0: containers, validated JSON, buffers and accessors. The renderer defines their semantics.
 //!
-//! The types of what is read and all indices are checked first; whether accessors lie inside their buffers, before
-//! anything is read or allocated. Errors name the place in the JSON, or the byte of the container.
+//! Types of values and all indices are checked first. Accessors are checked against their buffers before anything is
+//! read or allocated. Errors name the path in the JSON, or the byte of the container.
 //!
 //! Reading order: [`json`], [`place`], [`container`], [`schema`], [`document`], [`accessor`]; [`mod@locate`] for
 //! messages.

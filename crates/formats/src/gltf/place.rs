@@ -1,9 +1,9 @@
-//! A place in the JSON: its value, if it has one, and the way to it, whose text is made for messages only.
+//! A path in the JSON and its value, if there is one. The text of the path is only made for messages.
 
 use super::json::{Json, Value};
 use std::fmt::Write;
 
-/// What is wrong, and where.
+/// A format error with its position.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct GltfError {
     /// Path in the JSON, or byte of the container.
@@ -20,22 +20,22 @@ impl std::fmt::Display for GltfError {
 
 impl std::error::Error for GltfError {}
 
-/// Steps of a way that are kept: the way to the numbers of a texture's transformation has nine.
+/// Maximum number of steps stored: the path to the numbers of a texture's transform has nine.
 const STEPS: usize = 12;
 
-/// From a value to one of its children.
+/// A step from a value to one of its children.
 #[derive(Clone, Copy, Debug)]
 enum Step<'a> {
     Member(&'a str),
     Element(usize),
 }
 
-/// A place in the JSON; by default, none where anything is.
+/// A path in the JSON; the default has no value.
 #[derive(Clone, Copy, Debug)]
 pub struct Place<'a> {
     found: Option<(&'a Json, Value)>,
     steps: [Step<'a>; STEPS],
-    /// Number of steps; those beyond [`STEPS`] are missing in the path.
+    /// Number of steps; steps beyond [`STEPS`] are missing in the path.
     depth: usize,
 }
 
@@ -46,12 +46,12 @@ impl Default for Place<'_> {
 }
 
 impl<'a> Place<'a> {
-    /// The whole.
+    /// The root.
     pub fn root(json: &'a Json) -> Self {
         Place { found: Some((json, json.root())), ..Place::default() }
     }
 
-    /// Such as `meshes[0].primitives[1]`.
+    /// The path as text, such as `meshes[0].primitives[1]`.
     pub fn path(&self) -> String {
         let mut path = String::new();
         for step in &self.steps[..self.depth.min(STEPS)] {
@@ -98,12 +98,12 @@ impl<'a> Place<'a> {
         self.to(Step::Element(index), self.elements().get(index).copied())
     }
 
-    /// Number of elements of an array; 0 for anything else.
+    /// Number of elements of an array; 0 for other values.
     pub fn len(&self) -> usize {
         self.elements().len()
     }
 
-    /// True if it is no array, or has no elements.
+    /// True if it is not an array, or has no elements.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
@@ -126,7 +126,7 @@ impl<'a> Place<'a> {
         GltfError { place: self.path(), message: message.into() }
     }
 
-    /// True if there is something.
+    /// True if there is a value.
     pub fn exists(&self) -> bool {
         self.found.is_some()
     }
@@ -140,14 +140,14 @@ impl<'a> Place<'a> {
         self.double().map(|v| v as f32)
     }
 
-    /// As [`Self::number`] with the precision of f64, in the range of f32.
+    /// As [`Self::number`] in f64 precision, within the range of f32.
     pub fn double(&self) -> Option<f64> {
         self.value()?.number().filter(|v| (*v as f32).is_finite())
     }
 
-    /// An integer that is not negative, which may be written with a fraction of 0.
+    /// A non-negative integer, which may be written with a zero fraction.
     pub fn index(&self) -> Option<usize> {
-        // Integers of floats are exact up to 2⁵³
+        // Floats represent integers exactly up to 2⁵³
         let whole = |v: f64| (v >= 0.0 && v.fract() == 0.0 && v < 9e15).then_some(v as u64);
         let value = self.value()?;
         usize::try_from(value.whole().or_else(|| value.number().and_then(whole))?).ok()
@@ -158,12 +158,12 @@ impl<'a> Place<'a> {
         self.found.and_then(|(json, value)| json.text(value))
     }
 
-    /// True or false.
+    /// A Boolean.
     pub fn flag(&self) -> Option<bool> {
         self.value()?.flag()
     }
 
-    /// True if it is there and true.
+    /// True if it exists and is true.
     pub fn is_true(&self) -> bool {
         self.flag().unwrap_or(false)
     }
@@ -178,12 +178,12 @@ impl<'a> Place<'a> {
         self.value().is_some_and(Value::is_object)
     }
 
-    /// An array of numbers, as many as asked for.
+    /// An array of `N` numbers.
     pub fn numbers<const N: usize>(&self) -> Option<[f32; N]> {
         self.doubles().map(|numbers| numbers.map(|v| v as f32))
     }
 
-    /// As [`Self::numbers`] with the precision of f64, in the range of f32.
+    /// As [`Self::numbers`] in f64 precision, within the range of f32.
     pub fn doubles<const N: usize>(&self) -> Option<[f64; N]> {
         if self.len() != N {
             return None;

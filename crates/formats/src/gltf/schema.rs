@@ -1,26 +1,27 @@
-//! What members of the JSON must be, as far as the renderer reads them: a table of paths, and a walk that checks them.
+//! Validation of the JSON members that the renderer reads: a table of paths with types, and a traversal that checks
+//! them.
 //!
-//! A path names members, with `[]` for every element of an array, `*` for every member of an object, and `@` for every
-//! reference to a texture. What is absent is no error here; who needs it says so.
+//! A path consists of member names, with `[]` for every element of an array, `*` for every member of an object, and `@`
+//! for every reference to a texture. Absent values are not errors here.
 
 use super::place::{GltfError, Place};
 use std::sync::LazyLock;
 
-/// Greatest number of errors of one file that are named.
+/// Maximum number of reported errors per file.
 const MAX_ERRORS: usize = 20;
 
-/// What a value must be.
+/// The required type of a value.
 #[derive(Clone, Copy, Debug)]
 enum Rule {
     /// Index into an array of the document.
     Index(&'static str),
     /// Index into the lights.
     Light,
-    /// So many finite numbers.
+    /// An array of this many finite numbers.
     Numbers(usize),
     /// A finite number.
     Number,
-    /// An integer that is not negative.
+    /// A non-negative integer.
     Whole,
     /// One of these integers.
     OneOf(&'static [usize]),
@@ -30,9 +31,9 @@ enum Rule {
     Word(&'static [&'static str]),
     /// A finite number above 0.
     Positive,
-    /// A finite number that is 0 at least.
+    /// A finite non-negative number.
     NotNegative,
-    /// True or false.
+    /// A Boolean.
     Flag,
     /// An array.
     Array,
@@ -181,8 +182,8 @@ const TEXTURES: &[&str] = &[
     "extensions.KHR_materials_transmission.transmissionTexture",
 ];
 
-/// Rules by place: what a value must be, and the rules of its children. One walk over a document checks all of them, and
-/// takes no time for members of extensions that are not there.
+/// Rules as a tree: the required type of a value, and the rules of its children. One traversal of a document checks all
+/// of them; absent extensions take no time.
 #[derive(Default)]
 struct Level {
     rules: Vec<Rule>,
@@ -206,7 +207,7 @@ static LEVELS: LazyLock<Level> = LazyLock::new(|| {
 });
 
 impl Level {
-    /// The level of a path from here.
+    /// The level at a path relative to this one.
     fn below(&mut self, path: &'static str) -> &mut Level {
         path.split('.').filter(|part| !part.is_empty()).fold(self, |level, part| {
             let level = match part.trim_end_matches("[]") {
@@ -225,7 +226,7 @@ impl Level {
         &mut self.members[index].1
     }
 
-    /// Checks a place and all below; stops at the limit of errors.
+    /// Checks a value and all its children; stops at the limit of errors.
     fn check(&self, root: &Place<'_>, place: &Place<'_>, errors: &mut Vec<GltfError>) {
         for rule in &self.rules {
             errors.extend(rule.check(root, place).err().map(|message| place.error(message)));
@@ -247,7 +248,7 @@ impl Level {
     }
 }
 
-/// All that is not what it must be, up to a limit.
+/// All violations, up to a limit.
 pub fn errors(root: &Place<'_>) -> Vec<GltfError> {
     let mut errors = Vec::new();
     LEVELS.check(root, root, &mut errors);

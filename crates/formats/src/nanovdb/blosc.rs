@@ -1,8 +1,8 @@
-//! Data compressed by Blosc 1 with LZ4, as NanoVDB files have it.
+//! Data compressed by Blosc 1 with LZ4, as in NanoVDB files.
 //!
-//! A chunk has a head of 16 bytes, the places of its blocks, and the blocks. A block is one stream of LZ4, or one for each
-//! byte of a number; each begins with its compressed size, and is plain if that is its size. Then the first bytes of
-//! all numbers of the block are together, the second ones follow, and so on.
+//! A chunk has a header of 16 bytes, the offsets of its blocks, and the blocks. A block is a single LZ4 stream, or one
+//! per byte of a number. Each stream begins with its compressed size and is uncompressed if this equals its full size.
+//! With shuffling, the first bytes of all numbers of the block are contiguous, then the second bytes, and so on.
 
 use super::NanoError;
 use super::bytes::Bytes;
@@ -14,13 +14,13 @@ const SHUFFLE: u8 = 1;
 const PLAIN: u8 = 2;
 const BIT_SHUFFLE: u8 = 4;
 const ONE_STREAM: u8 = 16;
-/// A block has one stream if numbers are larger than this, or if there are fewer of them (bytes, numbers).
+/// A block has a single stream if numbers have more bytes than this, or if there are fewer numbers than this.
 const MAX_STREAMS: usize = 16;
 const MIN_NUMBERS: usize = 128;
-/// Names of compressors, by the highest three bits of the flags.
+/// Names of compressors, by the upper three bits of the flags.
 const COMPRESSORS: [&str; 5] = ["blosclz", "LZ4", "snappy", "zlib", "zstd"];
 
-/// Reads chunks, before each of which is its size (8 bytes), up to `size` bytes of content.
+/// Reads chunks, each preceded by its size (8 bytes), up to `size` bytes of content.
 pub(super) fn read_chunks(reader: &mut impl Read, size: u64) -> Result<Vec<u8>, NanoError> {
     let mut out = Vec::new();
     while (out.len() as u64) < size {
@@ -41,7 +41,7 @@ pub(super) fn read_chunks(reader: &mut impl Read, size: u64) -> Result<Vec<u8>, 
     Ok(out)
 }
 
-/// Adds the content of a chunk, of at most `most` bytes, to `out`.
+/// Appends the content of a chunk, at most `most` bytes, to `out`.
 fn decompress(chunk: &[u8], most: u64, out: &mut Vec<u8>) -> Result<(), NanoError> {
     let bytes = Bytes(chunk);
     let head = bytes.slice(0, HEAD)?;
@@ -89,7 +89,7 @@ fn decompress(chunk: &[u8], most: u64, out: &mut Vec<u8>) -> Result<(), NanoErro
     Ok(())
 }
 
-/// Puts the bytes of numbers together; what is left over of a number stays as it is.
+/// Reverses the shuffling of the bytes of numbers; bytes of an incomplete number are unchanged.
 fn unshuffle(block: &[u8], width: usize, out: &mut Vec<u8>) {
     let count = block.len() / width;
     for i in 0..count {
@@ -98,7 +98,7 @@ fn unshuffle(block: &[u8], width: usize, out: &mut Vec<u8>) {
     out.extend_from_slice(&block[count * width..]);
 }
 
-/// Adds the `size` bytes of an LZ4 block to `out`; `None` if they are not there.
+/// Appends the `size` bytes of an LZ4 block to `out`; `None` if the block is invalid.
 fn lz4(mut from: &[u8], size: usize, out: &mut Vec<u8>) -> Option<()> {
     let end = out.len() + size;
     let start = out.len();
@@ -106,7 +106,7 @@ fn lz4(mut from: &[u8], size: usize, out: &mut Vec<u8>) -> Option<()> {
         let (&token, rest) = from.split_first()?;
         from = rest;
 
-        // Bytes as they are
+        // Literal bytes
         let count = length(usize::from(token >> 4), &mut from)?;
         let (literals, rest) = from.split_at_checked(count)?;
         if count > end - out.len() {
@@ -118,7 +118,7 @@ fn lz4(mut from: &[u8], size: usize, out: &mut Vec<u8>) -> Option<()> {
             return (out.len() == end).then_some(());
         }
 
-        // Bytes that were there before, which may overlap what they become
+        // Copy of earlier output, which may overlap itself
         let (distance, rest) = from.split_at_checked(2)?;
         let distance = usize::from(u16::from_le_bytes([distance[0], distance[1]]));
         from = rest;
@@ -132,7 +132,7 @@ fn lz4(mut from: &[u8], size: usize, out: &mut Vec<u8>) -> Option<()> {
     }
 }
 
-/// A length of four bits, and what follows if these are all set.
+/// A length of four bits, with its extension if all four are set.
 fn length(first: usize, from: &mut &[u8]) -> Option<usize> {
     let mut sum = first;
     let mut goes_on = first == 15;

@@ -1,4 +1,4 @@
-//! Numbers at offsets, all of which are checked.
+//! Bounds-checked numbers at offsets.
 
 use super::NanoError;
 
@@ -51,7 +51,7 @@ impl<'a> Bytes<'a> {
         self.array(at).map(f64::from_le_bytes)
     }
 
-    /// Three numbers of 64 bits.
+    /// Three f64 numbers.
     pub(super) fn triple(self, at: u64) -> Result<[f64; 3], NanoError> {
         Ok([self.f64(at)?, self.f64(at + 8)?, self.f64(at + 16)?])
     }
@@ -61,7 +61,7 @@ impl<'a> Bytes<'a> {
         Ok([self.i32(at)?, self.i32(at + 4)?, self.i32(at + 8)?])
     }
 
-    /// A text that ends at its first zero.
+    /// A zero-terminated text.
     pub(super) fn text(self, at: u64, most: usize) -> Result<String, NanoError> {
         let bytes = self.slice(at, most)?;
         let end = bytes.iter().position(|&b| b == 0).unwrap_or(most);

@@ -1,36 +1,36 @@
-//! The list of the grids of a file, and the bytes of one of them.
+//! The list of the grids of a file, and the bytes of a grid.
 //!
-//! A segment begins with 16 bytes: a magic number, the version, the number of its grids, and how they are compressed. For
-//! each grid follow 176 bytes and its name; then all grids, of the sizes that these say.
+//! A segment begins with 16 bytes: magic number, version, number of grids, and compression. For each grid follow 176
+//! bytes and its name; then the data of all grids, with the sizes in the list.
 
 use super::bytes::Bytes;
 use super::{NanoError, TYPES, ValueType, blosc};
 use flate2::read::ZlibDecoder;
 use std::io::{Read, Seek, SeekFrom};
 
-/// What files begin with, up to 32.5; grids begin with the same.
+/// Magic number of files up to 32.5, and of their grids.
 const MAGIC_EITHER: &[u8; 8] = b"NanoVDB0";
-/// What grids begin with, and files that are grids alone.
+/// Magic number of grids, and of files with grids only.
 const MAGIC_GRID: &[u8; 8] = b"NanoVDB1";
-/// What files begin with.
+/// Magic number of files.
 const MAGIC_FILE: &[u8; 8] = b"NanoVDB2";
 
-/// The version whose layout is read.
+/// The supported major version.
 const MAJOR: u32 = 32;
 
-/// Sizes of the head of a segment, of the head of an entry of its list, and of that of a grid.
+/// Sizes of the header of a segment, of the header of a list entry, and of the header of a grid.
 const SEGMENT: usize = 16;
 const ENTRY: usize = 176;
 pub(super) const GRID: usize = 672;
 
-/// Longest name that is believed.
+/// Maximum length of a name.
 const MAX_NAME: u32 = 1 << 16;
-/// Largest factor by which deflate expands.
+/// Maximum expansion factor of deflate.
 const MAX_DEFLATE: u64 = 1032;
-/// Largest factor by which LZ4 expands, and a margin for heads.
+/// Maximum expansion factor of LZ4, with a margin for headers.
 const MAX_LZ4: u64 = 300;
 
-/// How a grid is compressed.
+/// Compression of a grid.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Codec {
     None,
@@ -41,7 +41,7 @@ enum Codec {
 /// A grid of a file.
 struct Entry {
     name: String,
-    /// Where it begins in the file, and its size there.
+    /// Its offset and size in the file.
     start: u64,
     stored: u64,
     /// Its size in memory.
@@ -50,7 +50,7 @@ struct Entry {
     codec: Codec,
 }
 
-/// Name and bytes of the first grid of a name. Nothing else of the file is read but heads.
+/// Name and bytes of the first grid with a name. Of the rest of the file, only headers are read.
 pub(super) fn grid_bytes(
     reader: &mut (impl Read + Seek),
     size: u64,
@@ -78,7 +78,7 @@ pub(super) fn grid_bytes(
     Err(NanoError::no_grid(name, found))
 }
 
-/// What is wrong with a file that has `magic` where a segment should begin.
+/// An error about a file with `magic` at the position of a segment.
 fn foreign(at: u64, magic: &[u8]) -> NanoError {
     if at > 0 {
         return NanoError::damaged(format!("there is no segment at byte {at}"));
@@ -98,7 +98,7 @@ fn check_version(version: u32) -> Result<(), NanoError> {
     if major == MAJOR { Ok(()) } else { Err(NanoError::Version { major, minor }) }
 }
 
-/// A grid without a list.
+/// A grid without a list, after its magic number.
 fn raw_grid(reader: &mut impl Read, at: u64) -> Result<(Vec<Entry>, Option<u64>), NanoError> {
     // Its magic number has been read
     let mut head = [0; GRID];
@@ -111,7 +111,7 @@ fn raw_grid(reader: &mut impl Read, at: u64) -> Result<(Vec<Entry>, Option<u64>)
     Ok((vec![entry], at.checked_add(size)))
 }
 
-/// The grids of a segment, and where it ends.
+/// The grids of a segment, and the offset of its end.
 fn segment(reader: &mut impl Read, at: u64) -> Result<(Vec<Entry>, Option<u64>), NanoError> {
     let mut head = [0; SEGMENT];
     reader.read_exact(&mut head[8..])?;
@@ -172,7 +172,7 @@ fn read_entry(reader: &mut (impl Read + Seek), entry: &Entry, file: u64) -> Resu
             whole(bytes, entry)
         }
         Codec::Zip => {
-            // Its compressed size comes first
+            // Skip the compressed size
             stored.read_exact(&mut [0; 8])?;
             let mut bytes = Vec::new();
             let inflated = ZlibDecoder::new(stored).take(entry.size).read_to_end(&mut bytes);

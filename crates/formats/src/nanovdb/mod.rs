@@ -1,12 +1,12 @@
 //! NanoVDB files: sparse grids of numbers [Museth 2021].
 //!
-//! A file is a row of segments, each of which lists its grids and then holds them, plain or compressed; or it is grids
-//! alone. A grid is the memory of a tree: a root with blocks of 4096³ voxels, below it nodes of 32³ and of 16³ entries, and
-//! leaves of 8³ voxels. An entry that has no child is a *tile*: all of its voxels have one value. Whatever no block holds has
-//! the value of the background. Every number has its low byte first.
+//! A file is a sequence of segments, each with a list of its grids and their data, uncompressed or compressed; or it
+//! consists of grids only. A grid is the memory image of a tree: a root with blocks of 4096³ voxels, nodes of 32³ and
+//! of 16³ entries, and leaves of 8³ voxels. An entry without a child is a *tile*: all of its voxels have the same
+//! value. Voxels outside of all blocks have the background value. Numbers are little-endian.
 //!
-//! The layout is that of all versions 32.x. Of a file, only the list and the grid asked for are read. Each offset is
-//! checked, no node is visited twice, and memory is taken for what the file can hold only.
+//! All versions 32.x share this layout. Only the list and the requested grid are read from a file. Each offset is
+//! checked, no node is visited twice, and allocations are bounded by the size of the file.
 //!
 //! Reading order: `bytes`, `file`, `blosc`, `tree`.
 
@@ -30,29 +30,30 @@ pub const LEAF_VOXELS: usize = 512;
 pub struct NanoGrid {
     /// Its name in the file.
     pub name: String,
-    /// What its values mean.
+    /// The class of its values.
     pub class: GridClass,
-    /// How the file stores them.
+    /// The storage type of its values.
     pub values: ValueType,
     /// The value of voxels that are in no leaf and no tile.
     pub background: f32,
-    /// Tiles of another value.
+    /// Tiles with other values than the background.
     pub tiles: Vec<Tile>,
     /// First voxel of each leaf, a multiple of 8.
     pub leaves: Vec<[i32; 3]>,
-    /// The 512 values of each leaf, z first.
+    /// The 512 values of each leaf, z fastest.
     pub leaf_values: Vec<f32>,
-    /// First and last active voxel along each axis, if the file says.
+    /// First and last active voxel along each axis, if the file has them.
     pub index_bounds: Option<[[i32; 3]; 2]>,
-    /// Box in the space of the file that holds active voxels, each from its index to the next, if the file says.
+    /// Bounding box of the active voxels in the space of the file, where a voxel extends from its index to the next; if
+    /// the file has it.
     pub bounds: Option<[[f64; 3]; 2]>,
-    /// Columns of the matrix from indices to the space of the file, and what is added. The matrix is finite.
+    /// Columns of the matrix from indices to the space of the file, and the translation. All are finite.
     pub space_from_index: [[f64; 3]; 4],
 }
 
 impl NanoGrid {
-    /// The box in the space of the file that holds what is active: as the file says, or as far as leaves and tiles reach;
-    /// `None` if there are none.
+    /// The bounding box of the active voxels in the space of the file: as in the file, or by the leaves and tiles;
+    /// `None` without any.
     pub fn space_bounds(&self) -> Option<[[f64; 3]; 2]> {
         if self.bounds.is_some() {
             return self.bounds;
@@ -71,7 +72,7 @@ impl NanoGrid {
         (0..8).map(corner).reduce(joined)
     }
 
-    /// Replaces every value by what `f` makes of it, if it makes anything of it; says how many were replaced.
+    /// Replaces every value for which `f` returns one; returns the number of replaced values.
     pub fn replace(&mut self, f: impl Fn(f32) -> Option<f32>) -> usize {
         let tiles = self.tiles.iter_mut().map(|tile| &mut tile.value);
         let all = self.leaf_values.iter_mut().chain(tiles).chain([&mut self.background]);
@@ -86,7 +87,7 @@ impl NanoGrid {
     }
 }
 
-/// The box of two boxes.
+/// The bounding box of two boxes.
 fn joined<T: Copy + PartialOrd>([a, b]: [[T; 3]; 2], [c, d]: [[T; 3]; 2]) -> [[T; 3]; 2] {
     let least = |x: T, y: T| if y < x { y } else { x };
     let greatest = |x: T, y: T| if y > x { y } else { x };
@@ -104,20 +105,20 @@ pub struct Tile {
     pub value: f32,
 }
 
-/// How values are stored.
+/// Storage type of values.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ValueType {
     /// 32 bits.
     Float,
     /// 64 bits.
     Double,
-    /// Steps between two values of a leaf, of 4, 8 or 16 bits.
+    /// Quantised between two values of a leaf, with 4, 8 or 16 bits.
     Fixed(u8),
-    /// Steps of 1 to 16 bits, as each leaf says.
+    /// Quantised with 1 to 16 bits, as specified per leaf.
     FixedByLeaf,
 }
 
-/// Names of the types of the format, in its order.
+/// Names of the types of the format, in their order.
 const TYPES: [&str; 27] = [
     "unknown",
     "float",
@@ -162,14 +163,14 @@ impl ValueType {
     }
 }
 
-/// What the values of a grid mean.
+/// The class of a grid's values.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct GridClass(pub u32);
 
 impl GridClass {
-    /// The file does not say.
+    /// Unspecified.
     pub const UNKNOWN: GridClass = GridClass(0);
-    /// A density, or something else that belongs to a volume.
+    /// A density, or another volumetric quantity.
     pub const FOG_VOLUME: GridClass = GridClass(2);
 }
 
@@ -194,7 +195,7 @@ impl fmt::Display for GridClass {
 /// Errors of NanoVDB files.
 #[derive(Debug, thiserror::Error)]
 pub enum NanoError {
-    /// It cannot be read.
+    /// Reading failed.
     #[error("{}{source}", if path.as_os_str().is_empty() { String::new() } else { format!("{}: ", path.display()) })]
     Io {
         /// The file; empty if bytes were given.
@@ -202,29 +203,29 @@ pub enum NanoError {
         /// The reason.
         source: io::Error,
     },
-    /// It is something else.
+    /// It is not a NanoVDB file.
     #[error("is not a NanoVDB file{0}")]
     Format(&'static str),
-    /// Its version has another layout.
+    /// Its version is not supported.
     #[error("has version {major}.{minor} of NanoVDB, of which 32.x is read: convert it anew")]
     Version {
-        /// Number of the layout.
+        /// Major version.
         major: u32,
-        /// Number within.
+        /// Minor version.
         minor: u32,
     },
-    /// It is compressed in a way that is not read.
+    /// Its compression is not supported.
     #[error("is compressed by {0}, which is not read: convert it without, or with zip")]
     Codec(String),
-    /// It has no grid of the name.
+    /// It has no grid with the name.
     #[error("has no grid `{name}`: {}", if found.is_empty() { "it has no grids".to_owned() } else { format!("its grids are {}", found.join(", ")) })]
     NoGrid {
         /// The name.
         name: String,
-        /// Names of those that there are.
+        /// Names of the existing grids.
         found: Vec<String>,
     },
-    /// The values of the grid are no numbers that are read.
+    /// The value type of the grid is not supported.
     #[error("its grid `{name}` has values of the type {ty}: float, double, fp4, fp8, fp16 and fpn are read")]
     Values {
         /// The grid.
@@ -256,7 +257,7 @@ impl From<io::Error> for NanoError {
     }
 }
 
-/// Reads the first grid of a name from a file.
+/// Reads the first grid with a name from a file.
 pub fn read_nanovdb(path: &Path, name: &str) -> Result<NanoGrid, NanoError> {
     open(path).map_err(NanoError::from).and_then(|(file, size)| read_any(BufReader::new(file), size, name)).map_err(
         |error| match error {
@@ -266,13 +267,13 @@ pub fn read_nanovdb(path: &Path, name: &str) -> Result<NanoGrid, NanoError> {
     )
 }
 
-/// Reads the first grid of a name from the bytes of a file.
+/// Reads the first grid with a name from the bytes of a file.
 pub fn parse_nanovdb(bytes: &[u8], name: &str) -> Result<NanoGrid, NanoError> {
     read_any(Cursor::new(bytes), bytes.len() as u64, name)
 }
 
 fn open(path: &Path) -> io::Result<(File, u64)> {
-    // Opening a pipe would wait for a writer, and reading a folder gives an unclear message
+    // Opening a pipe would block, and reading a folder gives an unclear message
     let metadata = std::fs::metadata(path)?;
     if !metadata.is_file() {
         return Err(io::Error::new(io::ErrorKind::InvalidInput, "is not a regular file"));

@@ -1,4 +1,4 @@
-//! Reading: grids of known values in every way of storing them, files of nanovdb_convert, and whatever is damaged.
+//! Reading grids with known values in every storage type, files of nanovdb_convert, and damaged files.
 
 use super::*;
 use flate2::Compression;
@@ -62,7 +62,7 @@ fn files_of_nanovdb_convert_have_the_values_that_went_in() {
         assert_eq!(density.index_bounds, Some([[-4000, -9000, -30], [9000, 127, 127]]));
         let columns = [[0.1, 0.02, 0.0], [-0.03, 0.2, 0.01], [0.0, 0.05, 0.3], [1.0, 2.0, 3.0]];
         assert_eq!(density.space_from_index, columns);
-        // Both corners are indices, the second one after the last voxel
+        // Both corners are indices; the second one is after the last voxel
         let [low, high] = temperature.bounds.unwrap();
         assert_eq!((low, high), ([-5.5, -2.5, -15.0], [4.5, 4.0, -10.5]));
     }
@@ -108,7 +108,7 @@ fn every_type_of_values_is_read() {
     ] {
         let mut written = spec(ty, bits);
         if ty > 2 {
-            // Steps of a leaf have its least and its greatest value
+            // Quantisation represents the minimum and maximum of a leaf exactly
             written.leaves.iter_mut().flat_map(|(_, v)| v).filter(|v| **v == 0.125).for_each(|v| *v = 0.0);
         }
         let grid = parse_nanovdb(&plain_nano_file(&[written]), "fog").unwrap();
@@ -146,7 +146,7 @@ fn zip(bytes: &[u8]) -> Vec<u8> {
     [&(zipped.len() as u64).to_le_bytes()[..], &zipped].concat()
 }
 
-/// Data of LZ4 without repetitions, in one block, shuffled or not.
+/// LZ4 data without repetitions, in one block, shuffled or not.
 fn blosc(bytes: &[u8], width: usize) -> Vec<u8> {
     let mut shuffled = Vec::new();
     (0..width).for_each(|byte| shuffled.extend(bytes.chunks_exact(width).map(|number| number[byte])));
@@ -159,7 +159,7 @@ fn blosc(bytes: &[u8], width: usize) -> Vec<u8> {
     }
     literals.push(rest as u8);
     literals.extend(&shuffled);
-    // One stream, of LZ4, with shuffled bytes
+    // A single LZ4 stream with shuffled bytes
     let mut chunk = vec![2, 1, 1 << 5 | 16 | u8::from(width > 1), width as u8];
     chunk.extend((bytes.len() as u32).to_le_bytes());
     chunk.extend((bytes.len() as u32).to_le_bytes());
@@ -227,7 +227,7 @@ fn what_is_not_read_is_named() {
     assert!(matches!(read_nanovdb(Path::new("/nowhere/fog.nvdb"), "fog"), Err(NanoError::Io { .. })));
 }
 
-/// The heads of a file of one grid: list, grid, tree and root.
+/// The headers of a file with one grid: list, grid, tree and root.
 const HEADS: usize = 16 + 176 + 4 + 736 + 64 + 32;
 
 #[test]
@@ -255,7 +255,7 @@ fn damaged_files_are_errors_or_other_grids_but_no_panics() {
                 let byte = [0xff, 0x80, 0x7f, 0, 1, (stream.random::<f32>() * 256.0) as u8][turn % 6];
                 damaged[at.min(reach - 1)] = byte;
             }
-            // Whatever it is by now, it takes no more than it could hold
+            // If it is still valid, it takes no more memory than its size allows
             if let Ok(grid) = parse_nanovdb(&damaged, name) {
                 assert!(grid.leaf_values.len() == 512 * grid.leaves.len() && grid.leaves.len() <= 3000);
             }
@@ -273,7 +273,7 @@ fn nodes_that_share_their_place_and_absurd_sizes_are_errors() {
         file[at..at + bytes.len()].copy_from_slice(bytes);
         parse_nanovdb(&file, "fog").unwrap_err().to_string()
     };
-    // Each entry of a node of 32³ says that it has the same child
+    // All entries of a node of 32³ refer to the same child
     let mut shared = file.clone();
     let uppers = shared[start + 672 + 16..start + 672 + 24].try_into().map(u64::from_le_bytes).unwrap() as usize;
     let upper = start + 672 + uppers;
@@ -285,7 +285,7 @@ fn nodes_that_share_their_place_and_absurd_sizes_are_errors() {
     }
     let error = parse_nanovdb(&shared, "fog").unwrap_err().to_string();
     assert!(error.contains("two of its nodes have the same place"), "{error}");
-    // Sizes: of the grid, of what is stored, and the number of entries of the root
+    // Sizes: the grid, the stored data, and the number of root entries
     assert!(fault(16, &u64::MAX.to_le_bytes()).contains("does not fit"));
     assert!(fault(24, &(u64::MAX - 8).to_le_bytes()).contains("does not fit"));
     let mut endless = file.clone();

@@ -1,4 +1,4 @@
-//! From the bytes of a grid to its leaves and tiles.
+//! Converts the bytes of a grid to leaves and tiles.
 //!
 //! | | bytes |
 //! |---|---|
@@ -9,29 +9,29 @@
 //! | node | masks of n³ bits: active 32, children behind it; statistics; then n³ entries of 8 bytes: child (from the node) or value |
 //! | leaf | bit width 15 (highest three bits), then values; or least value 80, step 84, and numbers of steps 96 |
 //!
-//! A key has 21 bits for each axis, z lowest: the index in units of 4096. In nodes and leaves, z runs fastest.
+//! A key has 21 bits for each axis, z lowest: the index in units of 4096. In nodes and leaves, z is fastest.
 
 use super::bytes::Bytes;
 use super::file::GRID;
 use super::{GridClass, LEAF, LEAF_VOXELS, NanoError, NanoGrid, Tile, ValueType};
 
-/// Size of an entry of the root.
+/// Size of a root entry.
 const ROOT_ENTRY: u64 = 32;
-/// Where the masks of a node begin.
+/// Offset of the masks of a node.
 const MASKS: u64 = 32;
-/// Where the values of a leaf begin, if they are 32 bits or less.
+/// Offset of the values of a leaf, for types of up to 32 bits.
 const LEAF_VALUES: u64 = 96;
-/// Bits of a key for an axis, and of an index below it.
+/// Bits of a key per axis, and bits of an index below it.
 const KEY_BITS: u32 = 21;
 const BLOCK_BITS: u32 = 12;
 
 /// A level of inner nodes.
 struct Level {
-    /// Entries along an axis are 2 to this.
+    /// log₂ of the number of entries along an axis.
     log2: u32,
-    /// Voxels of an entry along an axis are 2 to this.
+    /// log₂ of the number of voxels of an entry along an axis.
     child_log2: u32,
-    /// Where the entries begin.
+    /// Offset of the entries.
     table: u64,
 }
 
@@ -49,7 +49,7 @@ impl Level {
     }
 }
 
-/// The grid that bytes hold.
+/// Parses the bytes of a grid.
 pub(super) fn grid(name: String, bytes: &[u8]) -> Result<NanoGrid, NanoError> {
     let head = Bytes(bytes);
     if !head.slice(0, 7)?.starts_with(b"NanoVDB") {
@@ -87,17 +87,17 @@ pub(super) fn grid(name: String, bytes: &[u8]) -> Result<NanoGrid, NanoError> {
     Ok(walk.grid)
 }
 
-/// Two corners, if the first is below the second along each axis.
+/// Two corners; `None` unless the first is below the second along each axis.
 fn ordered<T: Copy>(corners: [[T; 3]; 2], is_below: impl Fn(T, T) -> bool) -> Option<[[T; 3]; 2]> {
     (0..3).all(|axis| is_below(corners[0][axis], corners[1][axis])).then_some(corners)
 }
 
-/// A number outside of leaves.
+/// A value outside of leaves.
 fn value(bytes: Bytes<'_>, values: ValueType, at: u64) -> Result<f32, NanoError> {
     if values == ValueType::Double { bytes.f64(at).map(|v| v as f32) } else { bytes.f32(at) }
 }
 
-/// Bytes of a leaf, at least.
+/// Minimum size of a leaf (bytes).
 fn smallest_leaf(values: ValueType) -> u64 {
     let voxels = LEAF_VOXELS as u64;
     match values {
@@ -108,10 +108,10 @@ fn smallest_leaf(values: ValueType) -> u64 {
     }
 }
 
-/// What is left to visit, and what was found.
+/// State of the traversal.
 struct Walk<'a> {
     bytes: Bytes<'a>,
-    /// How many nodes of each level fit into the grid, less those seen: more are seen only where nodes share bytes.
+    /// Remaining number of nodes per level that fit into the grid; it is only exhausted if nodes overlap.
     visits: [u64; 3],
     grid: NanoGrid,
 }
@@ -197,7 +197,7 @@ impl Walk<'_> {
     }
 }
 
-/// Values in steps of `bits` bits: 1, 2, 4, 8 or 16.
+/// Values quantised with `bits` bits: 1, 2, 4, 8 or 16.
 fn fixed(bytes: Bytes<'_>, at: u64, bits: u32, out: &mut Vec<f32>) -> Result<(), NanoError> {
     let (least, step) = (bytes.f32(at + 80)?, bytes.f32(at + 84)?);
     let codes = bytes.slice(at + LEAF_VALUES, LEAF_VOXELS / 8 * bits as usize)?;
@@ -212,10 +212,10 @@ fn fixed(bytes: Bytes<'_>, at: u64, bits: u32, out: &mut Vec<f32>) -> Result<(),
     Ok(())
 }
 
-/// Where a child is, from its parent.
+/// Offset of a child, from its parent.
 fn place(parent: u64, offset: i64) -> Result<u64, NanoError> {
     parent.checked_add_signed(offset).ok_or_else(|| NanoError::damaged("the place of a node"))
 }
 
-/// Leaves have the size that the format says.
+/// The leaf size of the format.
 const _: () = assert!(LEAF_VOXELS == (LEAF * LEAF * LEAF) as usize);

@@ -7,10 +7,10 @@ use crate::diagnostic::{Diagnostics, did_you_mean};
 use crate::names::nfc;
 use crate::source::Span;
 
-/// An error that is in the diagnostics already.
+/// An error that is already in the diagnostics.
 pub struct Reported;
 
-/// Reads arguments and reports what is wrong with them.
+/// Reads arguments and reports their errors.
 pub struct Arguments<'a> {
     /// Receives the errors.
     pub diagnostics: &'a mut Diagnostics,
@@ -57,8 +57,8 @@ impl Arguments<'_> {
         }
     }
 
-    /// An affine matrix, column after column. pbrt divides points by w, so a last row 0 0 0 w is made 0 0 0 1; any
-    /// other would be a projection.
+    /// An affine matrix, column by column. pbrt divides points by w, so a last row 0 0 0 w is normalised to 0 0 0 1.
+    /// Other last rows are projections and therefore errors.
     pub fn matrix(&mut self, lexer: &mut Lexer<'_>, keyword: &str) -> Result<[f64; 16], Reported> {
         let start = self.peek(lexer)?.map_or(lexer.position(), |t| t.span.start as usize);
         let m: [f64; 16] = self.numbers(lexer, keyword)?;
@@ -86,7 +86,7 @@ impl Arguments<'_> {
         }
     }
 
-    /// What `Attribute` is about.
+    /// The target of `Attribute`.
     pub fn attribute_target(&mut self, name: &Name) -> Result<AttributeTarget, Reported> {
         match name.text.as_str() {
             "shape" => Ok(AttributeTarget::Shape),
@@ -107,13 +107,13 @@ impl Arguments<'_> {
         Ok(DirectiveKind::MediumInterface { inside, outside })
     }
 
-    /// A name: a string argument in normal form C, so that names compare whatever form they are written in.
+    /// A name: a string argument in normal form C, so that names compare equal in any form.
     pub fn name(&mut self, lexer: &mut Lexer<'_>, keyword: &str) -> Result<Name, Reported> {
         let Name { text, span } = self.verbatim_name(lexer, keyword)?;
         Ok(Name { text: nfc(&text).into_owned(), span })
     }
 
-    /// A string argument as it is written, such as the name of a file.
+    /// A string argument as written, such as a file name.
     pub fn verbatim_name(&mut self, lexer: &mut Lexer<'_>, keyword: &str) -> Result<Name, Reported> {
         let position = lexer.position();
         let token = self.next(lexer, "a string")?;
@@ -126,7 +126,7 @@ impl Arguments<'_> {
         Ok(Name { text, span: token.span })
     }
 
-    /// The value of an option, in quotes or not.
+    /// The value of an option, with or without quotes.
     pub fn option_value(&mut self, lexer: &mut Lexer<'_>) -> Result<Name, Reported> {
         let position = lexer.position();
         let token = self.next(lexer, "the value of an option")?;
@@ -164,7 +164,7 @@ impl Arguments<'_> {
         loop {
             match lexer.peek() {
                 Ok(Some(token)) if token.kind == TokenKind::Quoted => {
-                    // It was peeked at, so it is there.
+                    // Exists, since it was peeked.
                     let _ = lexer.next_token();
                     match self.param(lexer, token) {
                         Ok(Some(param)) => set.push(param, self.diagnostics),
@@ -182,7 +182,7 @@ impl Arguments<'_> {
         }
     }
 
-    /// One parameter; `None` if it was read but cannot be used.
+    /// One parameter; `None` if it was read but is invalid.
     fn param(&mut self, lexer: &mut Lexer<'_>, declaration: Token) -> Result<Option<Param>, Reported> {
         let span = declaration.span;
         let text = lexer.unquote(span).map_err(|e| self.report(e))?;
@@ -326,7 +326,7 @@ impl Arguments<'_> {
     }
 }
 
-/// Goes on to the next keyword, or to the next string that declares a parameter.
+/// Skips to the next keyword, or to the next string that declares a parameter.
 fn skip_to_param(lexer: &mut Lexer<'_>) {
     skip_until(lexer, |lexer, token| {
         let declares = || {
@@ -345,7 +345,7 @@ pub fn skip_until(lexer: &mut Lexer<'_>, stop: impl Fn(&Lexer<'_>, Token) -> boo
         match lexer.next_token() {
             Ok(None) => return,
             Ok(Some(token)) if stop(lexer, token) => return lexer.rewind(position),
-            // Broken strings among what is skipped are part of the error that was reported.
+            // Invalid strings in the skipped part belong to the reported error.
             Ok(Some(_)) | Err(_) => {}
         }
     }

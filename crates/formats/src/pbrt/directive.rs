@@ -1,18 +1,18 @@
-//! The directives of a pbrt file, checked for their form.
+//! The directives of a pbrt file, syntactically valid.
 
 use super::params::ParamSet;
 use crate::source::Span;
 
-/// A string argument, or the value of an option, and its place.
+/// A string argument, or the value of an option, and its source position.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Name {
     /// The string, without quotes.
     pub text: String,
-    /// Where it stands.
+    /// Source position.
     pub span: Span,
 }
 
-/// Which time samples of the current transform a transform directive changes.
+/// The time samples of the current transform that a transform directive changes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ActiveTimes {
     /// The first.
@@ -23,7 +23,7 @@ pub enum ActiveTimes {
     All,
 }
 
-/// What `Attribute` sets default parameters of.
+/// The target of the default parameters of `Attribute`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum AttributeTarget {
     /// Shapes.
@@ -38,8 +38,8 @@ pub enum AttributeTarget {
     Texture,
 }
 
-/// A directive without its parameter list. Matrices are in the order of the file, which is columns of `to_from · point`
-/// one after another, and have the last row 0 0 0 1.
+/// A directive without its parameter list. Matrices are in file order, column by column for `to_from · point`, and have
+/// the last row 0 0 0 1.
 #[derive(Clone, Debug, PartialEq)]
 #[allow(missing_docs, reason = "the variants are pbrt's directives")]
 pub enum DirectiveKind {
@@ -85,7 +85,7 @@ pub enum DirectiveKind {
 /// A directive.
 #[derive(Clone, Debug)]
 pub struct Directive {
-    /// What it says.
+    /// The directive with its arguments.
     pub kind: DirectiveKind,
     /// Its keyword.
     pub span: Span,
@@ -93,7 +93,7 @@ pub struct Directive {
     pub params: ParamSet,
 }
 
-/// Every keyword, for suggestions and for finding the next directive after an error.
+/// All keywords, for suggestions and for finding the next directive after an error.
 pub const KEYWORDS: &[&str] = &[
     "Accelerator",
     "ActiveTransform",

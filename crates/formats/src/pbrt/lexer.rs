@@ -1,13 +1,13 @@
 //! Tokens of a pbrt file.
 //!
-//! The text is bytes; bytes outside ASCII may occur in strings and comments only. Words, quoted strings and brackets
-//! are tokens; lists of numbers are parsed without creating tokens.
+//! The text consists of bytes; non-ASCII bytes may only occur in strings and comments. Words, quoted strings and
+//! brackets are tokens; lists of numbers are parsed without creating tokens.
 
 use crate::number::{NumberError, is_delimiter, parse_f32, parse_f64, parse_i32};
 use crate::source::{FileId, Span};
 use std::borrow::Cow;
 
-/// What a token is.
+/// The kind of a token.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum TokenKind {
     /// A string in quotes; the span includes them.
@@ -16,25 +16,25 @@ pub enum TokenKind {
     Open,
     /// `]`
     Close,
-    /// Anything else up to the next blank: a directive, a number, `true`, `false`.
+    /// Any other word up to the next blank: a directive, a number, `true`, `false`.
     Word,
 }
 
-/// A token and its place.
+/// A token and its source position.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Token {
-    /// What it is.
+    /// Its kind.
     pub kind: TokenKind,
-    /// Where it stands.
+    /// Its source position.
     pub span: Span,
 }
 
-/// Why bytes are not a token or a value.
+/// An error of the lexer.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct LexError {
     /// One sentence without a full stop.
     pub message: String,
-    /// Where.
+    /// Its source position.
     pub span: Span,
 }
 
@@ -58,7 +58,7 @@ impl<'a> Lexer<'a> {
         self.position
     }
 
-    /// Goes back to a place that [`Lexer::position`] returned.
+    /// Returns to a position from [`Lexer::position`].
     pub fn rewind(&mut self, position: usize) {
         self.position = position.min(self.bytes.len());
     }
@@ -73,7 +73,7 @@ impl<'a> Lexer<'a> {
         self.bytes.get(span.start as usize..span.end as usize).unwrap_or(&[])
     }
 
-    /// The text of a span, with broken UTF-8 replaced.
+    /// The text of a span, with invalid UTF-8 replaced.
     pub fn text(&self, span: Span) -> Cow<'a, str> {
         String::from_utf8_lossy(self.slice(span))
     }
@@ -101,7 +101,7 @@ impl<'a> Lexer<'a> {
         Ok(Some(Token { kind, span: self.span(start, self.position) }))
     }
 
-    /// The next token without taking it.
+    /// The next token, without consuming it.
     pub fn peek(&mut self) -> Result<Option<Token>, LexError> {
         let position = self.position;
         let token = self.next_token();
@@ -140,17 +140,17 @@ impl<'a> Lexer<'a> {
         String::from_utf8(content).map_err(|_| LexError { message: "string is not valid UTF-8".to_owned(), span })
     }
 
-    /// Appends numbers up to `]` or the first thing that is no number; does not take what ends the list.
+    /// Appends numbers up to `]` or the first other token, which is not consumed.
     pub fn numbers_f32(&mut self, out: &mut Vec<f32>) -> Result<(), LexError> {
         self.numbers(out, parse_f32, "a number")
     }
 
-    /// As [`Lexer::numbers_f32`] with the precision of f64.
+    /// As [`Lexer::numbers_f32`] in f64 precision.
     pub fn numbers_f64(&mut self, out: &mut Vec<f64>) -> Result<(), LexError> {
         self.numbers(out, parse_f64, "a number")
     }
 
-    /// As [`Lexer::numbers_f32`] for whole numbers.
+    /// As [`Lexer::numbers_f32`] for integers.
     pub fn numbers_i32(&mut self, out: &mut Vec<i32>) -> Result<(), LexError> {
         self.numbers(out, parse_i32, "a whole number")
     }
@@ -160,12 +160,12 @@ impl<'a> Lexer<'a> {
         self.number(parse_f32, "a number")
     }
 
-    /// Reads one number with the precision of f64.
+    /// Reads one number in f64 precision.
     pub fn number_f64(&mut self) -> Result<f64, LexError> {
         self.number(parse_f64, "a number")
     }
 
-    /// Reads one whole number.
+    /// Reads one integer.
     pub fn number_i32(&mut self) -> Result<i32, LexError> {
         self.number(parse_i32, "a whole number")
     }
@@ -180,7 +180,7 @@ impl<'a> Lexer<'a> {
         let bytes = self.bytes;
         let mut i = self.position;
         loop {
-            // Skip blanks in line; comments are rare and handled by the general routine.
+            // Skip blanks inline; comments are rare and left to the general routine.
             while i < bytes.len() && matches!(bytes[i], b' ' | b'\n' | b'\r' | b'\t') {
                 i += 1;
             }
@@ -207,7 +207,7 @@ impl<'a> Lexer<'a> {
         Ok(())
     }
 
-    /// Leaves what is no number in place: it may be the start of the next directive.
+    /// Does not consume other tokens, since they may start the next directive.
     fn number<T>(
         &mut self,
         parse: impl Fn(&[u8]) -> Result<(T, usize), NumberError>,

@@ -1,7 +1,7 @@
-//! Typed parameter lists, with lookups that record which parameters were used.
+//! Typed parameter lists, with lookups that record the use of parameters.
 //!
-//! After a directive was processed, [`ParamSet::report_unused`] reports every parameter that was never looked up: a
-//! misspelled parameter is an error, never silently a default.
+//! After processing a directive, [`ParamSet::report_unused`] reports every parameter without lookup: a misspelled
+//! parameter is an error, never silently a default.
 
 use crate::color_space::ColorSpace;
 use crate::diagnostic::{Diagnostics, similar_parameter};
@@ -30,7 +30,7 @@ pub enum ParamType {
 }
 
 impl ParamType {
-    /// The type of a declaration, and true if the spelling is one of pbrt-v3.
+    /// The type of a declaration, and true if the spelling is from pbrt-v3.
     pub fn from_name(name: &str) -> Option<(Self, bool)> {
         Some(match name {
             "integer" => (ParamType::Integer, false),
@@ -74,7 +74,7 @@ impl ParamType {
         }
     }
 
-    /// Numbers that make one value.
+    /// Number of scalars per value.
     pub fn arity(self) -> usize {
         match self {
             ParamType::Point2 | ParamType::Vector2 => 2,
@@ -110,9 +110,9 @@ impl ParamType {
 /// The values of a parameter.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Values {
-    /// Numbers of all types but `integer` and `point3`.
+    /// Numbers of all types except `integer` and `point3`.
     Floats(Vec<f32>),
-    /// Numbers of `point3`: points may be far from the origin, compared with their distances.
+    /// Numbers of `point3`: distances between points may be small relative to their coordinates.
     Doubles(Vec<f64>),
     /// `integer`.
     Integers(Vec<i32>),
@@ -134,12 +134,12 @@ impl Values {
         }
     }
 
-    /// True if there is none.
+    /// True if there are none.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
-    /// The text of the only scalar.
+    /// The text of a single scalar.
     pub fn only(&self) -> Option<String> {
         fn text<T: ToString>(values: &[T]) -> Option<String> {
             if let [value] = values { Some(value.to_string()) } else { None }
@@ -167,14 +167,14 @@ pub struct Param {
     pub value_span: Span,
     /// The values; whole values of the type.
     pub values: Values,
-    /// Colour space of an `rgb` where that is not the current one of the directive which has it.
+    /// Colour space of an `rgb`, if it differs from the current one of the directive that uses it.
     pub color_space: Option<ColorSpace>,
     used: Cell<bool>,
     inherited: bool,
 }
 
 impl Param {
-    /// A parameter that has not been used yet.
+    /// An unused parameter.
     pub fn new(ty: ParamType, name: String, span: Span, value_span: Span, values: Values) -> Self {
         Param { ty, name, span, value_span, values, color_space: None, used: Cell::new(false), inherited: false }
     }
@@ -183,7 +183,7 @@ impl Param {
 /// A spectrum as written.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum SpectrumValue<'a> {
-    /// Red, green, blue in a colour space: that of the parameter, or the current one.
+    /// Red, green, blue in a colour space: the parameter's own, or the current one.
     Rgb([f32; 3], Option<ColorSpace>),
     /// CIE XYZ (pbrt-v3).
     Xyz([f32; 3]),
@@ -198,7 +198,7 @@ pub enum SpectrumValue<'a> {
 /// A value or the name of a texture.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Input<'a, T> {
-    /// The same everywhere.
+    /// A constant value.
     Value(T),
     /// Name of a texture.
     Texture(&'a str),
@@ -207,7 +207,7 @@ pub enum Input<'a, T> {
 /// The parameters of one directive.
 #[derive(Clone, Debug)]
 pub struct ParamSet {
-    /// What they belong to, for messages: `Shape "sphere"`.
+    /// The directive, for messages: `Shape "sphere"`.
     pub owner: String,
     /// The keyword of the directive.
     pub span: Span,
@@ -231,7 +231,8 @@ impl ParamSet {
         self.params.push(param);
     }
 
-    /// Adds parameters of `Attribute` as defaults: they yield to the directive's own and need not be used.
+    /// Adds parameters of `Attribute` as defaults: the directive's own parameters take precedence, and defaults may be
+    /// unused.
     pub fn inherit<'a>(&mut self, defaults: impl IntoIterator<Item = &'a Param>) {
         for default in defaults {
             self.params.retain(|p| !(p.inherited && p.name == default.name));
@@ -241,7 +242,7 @@ impl ParamSet {
         }
     }
 
-    /// All parameters, as they are in the colour space that is current here, for a directive elsewhere.
+    /// All parameters, with the current colour space recorded, for use in a directive elsewhere.
     pub fn in_color_space(&self, space: ColorSpace) -> impl Iterator<Item = Param> {
         self.params.iter().map(move |p| Param { color_space: Some(space), ..p.clone() })
     }
@@ -251,7 +252,7 @@ impl ParamSet {
         self.params.iter()
     }
 
-    /// True if there is none.
+    /// True if there are none.
     pub fn is_empty(&self) -> bool {
         self.params.is_empty()
     }
@@ -261,12 +262,12 @@ impl ParamSet {
         self.params.iter().find(|p| p.name == name).map(|p| p.ty)
     }
 
-    /// Where a parameter is declared, or the directive if it is absent.
+    /// Source position of a parameter's declaration, or of the directive if it is absent.
     pub fn span_of(&self, name: &str) -> Span {
         self.params.iter().find(|p| p.name == name).map_or(self.span, |p| p.span.to(p.value_span))
     }
 
-    /// Marks the parameter as used, whatever its type; true if it is present.
+    /// Marks a parameter of any type as used; returns true if it is present.
     pub fn ignore(&self, name: &'static str) -> bool {
         self.note(name);
         let found = self.params.iter().find(|p| p.name == name);
@@ -278,7 +279,7 @@ impl ParamSet {
         self.params.iter().for_each(|p| p.used.set(true));
     }
 
-    /// The parameter if it is there and has one of the types; a wrong type is an error.
+    /// The parameter, if it is present with one of the types; another type is an error.
     pub fn get(&self, name: &'static str, types: &[ParamType], diagnostics: &mut Diagnostics) -> Option<&Param> {
         self.note(name);
         let param = self.params.iter().find(|p| p.name == name)?;
@@ -295,7 +296,7 @@ impl ParamSet {
         None
     }
 
-    /// As [`ParamSet::get`], and there must be exactly one value.
+    /// As [`ParamSet::get`]; there must be exactly one value.
     pub fn get_one(&self, name: &'static str, types: &[ParamType], diagnostics: &mut Diagnostics) -> Option<&Param> {
         let param = self.get(name, types, diagnostics)?;
         let count = param.values.len() / param.ty.arity();
@@ -311,7 +312,7 @@ impl ParamSet {
         self.get_one(name, &[ParamType::Float], diagnostics).and_then(|p| p.first_float())
     }
 
-    /// One whole number.
+    /// One integer.
     pub fn integer(&self, name: &'static str, diagnostics: &mut Diagnostics) -> Option<i32> {
         match &self.get_one(name, &[ParamType::Integer], diagnostics)?.values {
             Values::Integers(v) => v.first().copied(),
@@ -319,7 +320,7 @@ impl ParamSet {
         }
     }
 
-    /// One truth value.
+    /// One Boolean.
     pub fn boolean(&self, name: &'static str, diagnostics: &mut Diagnostics) -> Option<bool> {
         match &self.get_one(name, &[ParamType::Bool], diagnostics)?.values {
             Values::Bools(v) => v.first().copied(),
@@ -365,7 +366,7 @@ impl ParamSet {
         self.get(name, &[ParamType::Float], diagnostics).and_then(|p| p.floats())
     }
 
-    /// Takes the numbers of an array out of the set.
+    /// Moves the numbers of an array out of the set.
     pub fn take_floats(
         &mut self,
         name: &'static str,
@@ -379,7 +380,7 @@ impl ParamSet {
         }
     }
 
-    /// Takes the numbers of an `integer` array out of the set.
+    /// Moves the numbers of an `integer` array out of the set.
     pub fn take_integers(&mut self, name: &'static str, diagnostics: &mut Diagnostics) -> Option<Vec<i32>> {
         self.get(name, &[ParamType::Integer], diagnostics)?;
         match &mut self.params.iter_mut().find(|p| p.name == name)?.values {
@@ -453,7 +454,7 @@ impl Param {
         }
     }
 
-    /// The numbers, if they are neither integers nor those of points.
+    /// The numbers, except for integers and points.
     pub fn floats(&self) -> Option<&[f32]> {
         match &self.values {
             Values::Floats(v) => Some(v),

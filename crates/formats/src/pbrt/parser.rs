@@ -1,8 +1,8 @@
-//! From text to checked directives.
+//! Converts text to syntactically valid directives.
 //!
-//! The parser follows `Include` and `Import`, checks that blocks nest, and goes on after an error at the next
-//! directive, so that one run finds the errors of a whole scene. It hands each directive to a [`Visitor`] as soon as
-//! it is read.
+//! The parser follows `Include` and `Import`, checks the nesting of blocks, and continues after an error at the next
+//! directive, so that one run reports the errors of a whole scene. It passes each directive to a [`Visitor`]
+//! immediately.
 
 use super::arguments::{Arguments, Reported, is_keyword, skip_until};
 use super::directive::{Directive, DirectiveKind, KEYWORDS, Name};
@@ -13,12 +13,12 @@ use crate::names::file_in;
 use crate::source::{FileId, SourceMap, Span};
 use std::path::{Path, PathBuf};
 
-/// Files that may include each other in a chain.
+/// Maximum depth of file inclusion.
 const MAX_INCLUDE_DEPTH: usize = 64;
-/// Blocks that may nest.
+/// Maximum nesting depth of blocks.
 const MAX_BLOCK_DEPTH: usize = 10_000;
 
-/// Receives the directives of a scene in their order.
+/// Receives the directives of a scene in order.
 pub trait Visitor {
     /// Takes one directive.
     fn directive(&mut self, directive: Directive, sources: &SourceMap, diagnostics: &mut Diagnostics);
@@ -30,7 +30,7 @@ impl<F: FnMut(Directive, &SourceMap, &mut Diagnostics)> Visitor for F {
     }
 }
 
-/// Parses a scene file and all that it includes.
+/// Parses a scene file and all included files.
 pub fn parse_file(path: &Path, sources: &mut SourceMap, diagnostics: &mut Diagnostics, visitor: &mut dyn Visitor) {
     match sources.read(path) {
         Ok(file) => parse_source(file, path, sources, diagnostics, visitor),
@@ -38,7 +38,7 @@ pub fn parse_file(path: &Path, sources: &mut SourceMap, diagnostics: &mut Diagno
     }
 }
 
-/// Parses a text that is in `sources` already; files that it names are sought in the folder of `path`.
+/// Parses a text that is already in `sources`. File names are relative to the folder of `path`.
 pub fn parse_source(
     file: FileId,
     path: &Path,
@@ -54,7 +54,7 @@ pub fn parse_source(
     parser.finish(file);
 }
 
-/// What tells two files apart.
+/// Identifies a file.
 fn identity(path: &Path) -> PathBuf {
     path.canonicalize().unwrap_or_else(|_| path.to_path_buf())
 }
@@ -90,7 +90,7 @@ struct Parser<'a> {
     open: Vec<PathBuf>,
     blocks: Vec<(Block, Span)>,
     world: Option<Span>,
-    /// True once a world directive before `WorldBegin` was reported.
+    /// True after a world directive before `WorldBegin` was reported.
     early: bool,
 }
 
@@ -189,7 +189,7 @@ impl Parser<'_> {
         Ok(())
     }
 
-    /// Directives that end in a parameter list.
+    /// Parses directives that end in a parameter list.
     fn with_params(&mut self, lexer: &mut Lexer<'_>, keyword: &str, span: Span) -> Result<(), Reported> {
         use DirectiveKind as D;
         let make: fn(Name) -> D = match keyword {
@@ -231,7 +231,7 @@ impl Parser<'_> {
         Ok(())
     }
 
-    /// `Option "name" value`; files made for Lumiris may have typed parameters there, as other directives do.
+    /// `Option "name" value`; files for Lumiris may use typed parameters there, as for other directives.
     fn option(&mut self, lexer: &mut Lexer<'_>, span: Span) -> Result<(), Reported> {
         let position = lexer.position();
         let name = self.arguments().name(lexer, "Option")?;
@@ -354,7 +354,7 @@ impl Parser<'_> {
         };
         self.open.push(identity);
         let depth = self.blocks.len();
-        // What an imported file sets stays inside it, as if it stood in a block of its own.
+        // State changes in an imported file are local to it, as in a block.
         let scoped = keyword == "Import";
         let opened =
             if scoped { self.open_block(Block::Attribute, DirectiveKind::AttributeBegin, span) } else { Ok(()) };
@@ -368,7 +368,7 @@ impl Parser<'_> {
         opened
     }
 
-    /// Closes the block of an import and those that the imported file left open.
+    /// Closes the block of an import and all blocks that the imported file left open.
     fn close_import(&mut self, depth: usize, span: Span) {
         while self.blocks.len() > depth + 1 {
             if let Some((block, opened)) = self.blocks.pop() {
@@ -383,7 +383,7 @@ impl Parser<'_> {
     }
 }
 
-/// Goes on to the next keyword.
+/// Skips to the next keyword.
 fn skip_to_directive(lexer: &mut Lexer<'_>) {
     skip_until(lexer, is_keyword);
 }

@@ -7,17 +7,17 @@ use super::wedges::{self, NONE};
 use super::{Place, PlyError, PlyMesh};
 use lumiris_numbers::math::{Vec2, Vec3};
 
-/// The property that has the number of a face.
+/// The property with the number of a face.
 const NUMBER: &str = "face_indices";
-/// The list that has u and v of each corner, and the number of their texture among several.
+/// The list with u and v of each corner, and the property with the index of their texture.
 const TEXCOORD: &str = "texcoord";
 const TEXTURE: &str = "texnumber";
-/// Properties of colours and textures that are read.
+/// Properties of colours and textures that are supported.
 pub(super) const READ: [&str; 2] = [TEXCOORD, TEXTURE];
-/// Ends a strip and begins another inside one list.
+/// Separates strips within a list.
 const RESTART: i64 = -1;
 
-/// Faces as they come in.
+/// Faces during reading.
 #[derive(Default)]
 pub(super) struct Faces {
     vertices: u64,
@@ -25,9 +25,9 @@ pub(super) struct Faces {
     quads: FaceList<4>,
     polygons: u64,
     degenerate: u64,
-    /// Faces whose list of texture coordinates has another length than it should.
+    /// Number of faces whose list of texture coordinates has a wrong length.
     odd_uvs: u64,
-    /// Smallest and largest number of a texture.
+    /// Minimum and maximum texture index.
     textures: Option<[i64; 2]>,
 }
 
@@ -35,14 +35,14 @@ pub(super) struct Faces {
 #[derive(Default)]
 struct FaceList<const N: usize> {
     indices: Vec<[u32; N]>,
-    /// Numbers of the faces that these are, if the file has any.
+    /// Their face numbers, if the file has any.
     numbers: Vec<u32>,
-    /// Texture coordinates of the corners, up to the last face that has some.
+    /// Texture coordinates of the corners, up to the last face that has any.
     uvs: Vec<[Vec2; N]>,
 }
 
 impl<const N: usize> FaceList<N> {
-    /// Adds the face of the corners `at` of a face, and its number.
+    /// Adds a face made of the corners `at` of a polygon, with its number.
     fn push(&mut self, (corners, uvs): (&[u32], &[[f32; 2]]), at: [usize; N], number: Option<u32>) {
         if !uvs.is_empty() {
             self.uvs.resize(self.indices.len(), [NONE; N]);
@@ -54,7 +54,7 @@ impl<const N: usize> FaceList<N> {
 }
 
 impl Faces {
-    /// No faces yet, of `vertices` vertices.
+    /// No faces yet, for a mesh with `vertices` vertices.
     pub(super) fn new(vertices: u64) -> Self {
         Faces { vertices, ..Faces::default() }
     }
@@ -69,7 +69,7 @@ impl Faces {
         self.triangles.indices.reserve_exact(numbers.stream().trusted_items(element.count, triangle));
         let mut row = 0;
         while row < element.count {
-            // Runs of triangles in blocks; what stops them, and other layouts, face by face.
+            // Runs of triangles are read in blocks; other faces and layouts, face by face.
             row += match (N::ORDER, TriangleRows::of(element, column)) {
                 (Some(ByteOrder::Little), Some(rows)) => {
                     self.read_run::<false>(rows, element.count - row, numbers.stream())?
@@ -133,7 +133,7 @@ impl Faces {
         Ok(())
     }
 
-    /// Reads triangles up to another face, an index out of range, or the end, and at most `left`; returns their number.
+    /// Reads up to `left` triangles, until another face, an index out of range, or the end; returns their number.
     fn read_run<const BIG: bool>(
         &mut self,
         rows: TriangleRows,
@@ -166,7 +166,7 @@ impl Faces {
         }
     }
 
-    /// Adds the face of some vertices, all in range, with u and v of each corner or without, and its number.
+    /// Adds the face with these vertices, which are in range, with u and v of each corner or without, and its number.
     fn push(&mut self, corners: &[u32], uvs: &[f32], number: Option<u32>) {
         let is_whole = uvs.len() == 2 * corners.len();
         self.odd_uvs += u64::from(!is_whole && !uvs.is_empty());
@@ -183,8 +183,8 @@ impl Faces {
         }
     }
 
-    /// Reads a table of strips: of the vertices a, b, c, d, e the triangles abc, cbd, cde, so that all have one
-    /// orientation. Triangles that repeat a vertex only join strips, and are left out.
+    /// Reads a table of strips. The vertices a, b, c, d, e give the triangles abc, cbd, cde, all with the same
+    /// orientation. Triangles that repeat a vertex only connect strips and are omitted.
     pub(super) fn read_strips<'a>(
         &mut self,
         element: &Element,
@@ -240,9 +240,9 @@ impl Faces {
         }
     }
 
-    /// Hands all faces to the mesh, whose vertices are complete.
+    /// Moves all faces to the mesh, whose vertices are complete.
     pub(super) fn finish(mut self, mesh: &mut PlyMesh) {
-        // Memory was taken for as many triangles as there are faces.
+        // Memory was reserved for one triangle per face.
         self.triangles.indices.shrink_to_fit();
         let has_uvs = !self.triangles.uvs.is_empty() || !self.quads.uvs.is_empty();
         mesh.triangles = self.triangles.indices;
@@ -279,17 +279,17 @@ impl Faces {
     }
 }
 
-/// Faces that are read one by one before another run of triangles is tried.
+/// Number of faces that are read one by one before trying another run of triangles.
 const SLOW_RUN: u64 = 256;
 
-/// Rows of a fixed size if they are triangles: one list `uchar, int`, and numbers around it.
+/// Rows of fixed size, if they are triangles: one list `uchar, int`, and numbers before and after it.
 #[derive(Clone, Copy)]
 struct TriangleRows {
-    /// Of the list in the row (bytes).
+    /// Offset of the list in the row (bytes).
     offset: usize,
-    /// Of the row (bytes).
+    /// Size of the row (bytes).
     stride: usize,
-    /// Of the number of the face in the row, if it has one.
+    /// Offset of the face number in the row, if there is one.
     number: Option<usize>,
 }
 
@@ -317,9 +317,10 @@ impl TriangleRows {
     }
 }
 
-/// Removes faces of vertices that are not finite, and replaces such vertices by the origin. The file has the first `vertices`.
+/// Removes faces with non-finite vertices, and replaces such vertices by the origin. The first `vertices` come from the
+/// file.
 fn drop_broken_vertices(mesh: &mut PlyMesh, vertices: usize) {
-    // A sum of products with zero is zero only if all are finite: one pass without branches finds the common case.
+    // A sum of products with zero is zero only if all are finite: one branchless pass handles the common case.
     let probe: f32 = mesh.positions.iter().map(|p| (p.x + p.y + p.z) * 0.0).sum();
     if probe == 0.0 {
         return;
@@ -337,7 +338,7 @@ fn drop_broken_vertices(mesh: &mut PlyMesh, vertices: usize) {
     mesh.warnings.push(format!("{count} vertices are not finite; {left_out} faces of them are left out"));
 }
 
-/// Removes faces of broken vertices, and their numbers.
+/// Removes faces with non-finite vertices, and their numbers.
 fn retain_whole<const N: usize>(faces: &mut Vec<[u32; N]>, numbers: &mut Vec<u32>, broken: &[bool]) {
     let is_whole = |face: &[u32; N]| face.iter().all(|&v| !broken[v as usize]);
     let mut kept = faces.iter().map(is_whole);

@@ -3,19 +3,19 @@
 use super::PlyError;
 use super::stream::{MAX_FILL, Stream};
 
-/// Maximum number of header lines, and so of elements and properties.
+/// Maximum number of header lines, and therefore of elements and properties.
 const MAX_LINES: u64 = 10_000;
-/// Elements that have a meaning, and so can be there once only.
+/// Elements with a meaning, which may occur only once.
 const KNOWN: [&str; 3] = ["vertex", "face", "tristrips"];
 
-/// How numbers are written.
+/// Encoding of numbers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Encoding {
     /// Decimal text.
     Ascii,
-    /// Binary, low byte first.
+    /// Binary, little-endian.
     LittleEndian,
-    /// Binary, high byte first.
+    /// Binary, big-endian.
     BigEndian,
 }
 
@@ -48,7 +48,7 @@ impl Scalar {
         })
     }
 
-    /// Bytes in binary files.
+    /// Size in binary files (bytes).
     pub(super) fn size(self) -> usize {
         match self {
             Scalar::I8 | Scalar::U8 => 1,
@@ -58,13 +58,13 @@ impl Scalar {
         }
     }
 
-    /// True for the types that can count.
+    /// True for integer types.
     pub(super) fn is_integer(self) -> bool {
         !matches!(self, Scalar::F32 | Scalar::F64)
     }
 }
 
-/// What one instance of an element holds in one place.
+/// A column of an element.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Property {
     /// Its name.
@@ -82,14 +82,14 @@ pub(super) struct Element {
     pub name: String,
     /// Number of rows.
     pub count: u64,
-    /// The line of the header that announces it.
+    /// Line of its declaration in the header.
     pub line: u64,
     /// Its columns.
     pub properties: Vec<Property>,
 }
 
 impl Element {
-    /// Bytes of a row in binary files, without the items of lists.
+    /// Size of a row in binary files, without the items of lists (bytes).
     pub(super) fn min_stride(&self) -> usize {
         self.properties.iter().map(|p| p.list.unwrap_or(p.ty).size()).sum()
     }
@@ -105,7 +105,7 @@ impl Element {
         self.properties.iter().position(|p| p.list.is_some() && names.contains(&p.name.as_str()))
     }
 
-    /// Index of the column of a name, if it is no list.
+    /// Index of the scalar column with a name.
     pub(super) fn scalar(&self, name: &str) -> Option<usize> {
         self.properties.iter().position(|p| p.list.is_none() && p.name == name)
     }
@@ -114,7 +114,7 @@ impl Element {
 /// The header.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Header {
-    /// How numbers are written.
+    /// Encoding of numbers.
     pub encoding: Encoding,
     /// The tables in the order of the file.
     pub elements: Vec<Element>,
@@ -123,17 +123,17 @@ pub(super) struct Header {
 }
 
 impl Header {
-    /// The table of a name.
+    /// The table with a name.
     pub(super) fn element(&self, name: &str) -> Option<&Element> {
         self.elements.iter().find(|e| e.name == name)
     }
 
-    /// Fails if the rows cannot fit into `available` bytes, so that nothing is allocated for counts that lie.
+    /// Fails if the rows cannot fit into `available` bytes, so that nothing is allocated for false counts.
     pub(super) fn check_counts(&self, available: u64) -> Result<(), PlyError> {
         let mut needed = 0_u64;
         for element in &self.elements {
             let row = match self.encoding {
-                // A digit and a blank each; the last blank of the file may be missing.
+                // At least a digit and a blank each; the last blank of the file may be missing.
                 Encoding::Ascii => 2 * element.properties.len() as u64,
                 Encoding::LittleEndian | Encoding::BigEndian => element.min_stride() as u64,
             };
@@ -151,7 +151,7 @@ impl Header {
     }
 }
 
-/// Reads the header; the stream then stands at the first row.
+/// Reads the header; the stream is then at the first row.
 pub(super) fn read_header(stream: &mut Stream<'_>) -> Result<Header, PlyError> {
     if read_line(stream)?.trim_end() != "ply" {
         return Err(PlyError::header(
@@ -217,7 +217,7 @@ fn property(words: &[&str]) -> Option<Property> {
     }
 }
 
-/// Reads a line that ends in LF, CR LF, or, if the first line does, in CR.
+/// Reads a line that ends in LF, in CR LF, or, if the first line does, in CR only.
 fn read_line(stream: &mut Stream<'_>) -> Result<String, PlyError> {
     let number = stream.line;
     let newline = stream.newline;
@@ -225,7 +225,7 @@ fn read_line(stream: &mut Stream<'_>) -> Result<String, PlyError> {
     let window = &available[..available.len().min(MAX_FILL)];
     let found = window.iter().position(|&b| b == newline);
 
-    // The first line tells whether lines end in CR alone; then an LF behind a CR is data.
+    // The first line determines whether lines end in CR only; an LF after a CR is then data.
     let carriage = window.iter().position(|&b| b == b'\r').filter(|_| number == 1);
     let is_old = |&at: &usize| found.is_none_or(|lf| at + 1 < lf) && at + 1 < window.len();
     let (end, newline) = match carriage.filter(is_old) {

@@ -1,10 +1,10 @@
 //! Stanford PLY meshes: ASCII and binary of both byte orders, plain or gzip.
 //!
-//! The file is streamed through a small buffer: that is faster than mapping it (no page faults), needs no `unsafe`, and
-//! allocates only the mesh. Counts in the header are compared with the size of the file before anything is allocated,
-//! and every index is checked. Faces with three vertices become triangles, faces with four become quads (bilinear
-//! patches in pbrt), larger ones triangle fans; triangle strips are expanded. Where corners of faces have texture
-//! coordinates, vertices at seams are split.
+//! The file is streamed through a small buffer, which is faster than memory mapping (no page faults), needs no
+//! `unsafe`, and allocates only the mesh. Counts in the header are compared with the size of the file before anything
+//! is allocated, and every index is checked. Faces with three vertices become triangles, faces with four become quads
+//! (bilinear patches in pbrt), larger ones triangle fans; triangle strips are expanded. If corners of faces have
+//! texture coordinates, vertices at seams are split.
 //!
 //! Reading order: `header`, `stream`, `numbers`, `vertices`, `faces`, `wedges`, `unread`.
 
@@ -26,12 +26,12 @@ use std::io::{self, BufReader, Read};
 use std::path::{Path, PathBuf};
 use stream::Stream;
 
-/// What a PLY file holds.
+/// The content of a PLY file.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct PlyMesh {
     /// Vertex positions relative to `origin`, all finite; there is capacity for one more.
     pub positions: Vec<Vec3>,
-    /// An origin near to the vertices: numbers of double precision keep it until this is subtracted.
+    /// An origin near the vertices, which is subtracted before numbers of double precision are rounded.
     pub origin: DVec3,
     /// Normals as written, one per vertex, or empty.
     pub normals: Vec<Vec3>,
@@ -39,18 +39,18 @@ pub struct PlyMesh {
     pub uvs: Vec<Vec2>,
     /// Faces of three vertices, fans of larger ones, and strips; indices are in range.
     pub triangles: Vec<[u32; 3]>,
-    /// Faces of four vertices in the order of the file, which is around the face; indices are in range.
-    /// A bilinear patch p00, p10, p01, p11 has the corners 0, 1, 3, 2 of it.
+    /// Faces of four vertices in circular order, as in the file; indices are in range. A bilinear patch p00, p10, p01,
+    /// p11 has the corners 0, 1, 3, 2.
     pub quads: Vec<[u32; 4]>,
     /// Numbers of the faces (`face_indices`) of the triangles, or empty.
     pub triangle_numbers: Vec<u32>,
     /// Numbers of the faces of the quads, or empty.
     pub quad_numbers: Vec<u32>,
-    /// What was odd.
+    /// Irregularities of the file.
     pub warnings: Vec<String>,
 }
 
-/// A place in a file.
+/// A position in a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Place {
     /// Line of a text, from 1.
@@ -71,7 +71,7 @@ impl fmt::Display for Place {
 /// Errors of PLY files.
 #[derive(Debug, thiserror::Error)]
 pub enum PlyError {
-    /// It cannot be read or decompressed.
+    /// Reading or decompression failed.
     #[error("{}{source}", if path.as_os_str().is_empty() { String::new() } else { format!("{}: ", path.display()) })]
     Io {
         /// The file; empty if bytes were given.
@@ -79,15 +79,15 @@ pub enum PlyError {
         /// The reason.
         source: io::Error,
     },
-    /// The header is broken, or does not describe a mesh.
+    /// The header is invalid, or does not describe a mesh.
     #[error("line {line} of the header: {message}")]
     Header {
         /// Line, from 1.
         line: u64,
-        /// What is wrong.
+        /// The error.
         message: String,
     },
-    /// The header announces more than the file can hold.
+    /// The header declares more than the file can hold.
     #[error(
         "{count} of `{element}` are announced, which takes at least {needed} bytes, but at most {available} follow the \
          header"
@@ -95,51 +95,51 @@ pub enum PlyError {
     Counts {
         /// Name of the element.
         element: String,
-        /// Rows of it.
+        /// Number of its rows.
         count: u64,
-        /// Minimum size of it and of the elements before it (bytes).
+        /// Minimum size of this element and the elements before it (bytes).
         needed: u64,
-        /// Largest size of what follows the header (bytes).
+        /// Maximum size of the data after the header (bytes).
         available: u64,
     },
     /// The file ends too early.
     #[error("the file ends at {place}, inside `{element}`")]
     Truncated {
-        /// Where it ends, or where a list begins that does not fit.
+        /// Position of the end, or of a list that does not fit.
         place: Place,
-        /// What should have followed.
+        /// The element that is incomplete.
         element: String,
     },
     /// A word of an ASCII file is not a number of the expected kind.
     #[error("{place}: `{word}` in `{element}`, where {expected} is expected")]
     Number {
-        /// Where it is.
+        /// Its position.
         place: Place,
         /// The word.
         word: String,
-        /// What it belongs to.
+        /// Its element.
         element: String,
-        /// What is expected.
+        /// The expected kind.
         expected: &'static str,
     },
     /// A list has a negative length.
     #[error("{place}: a list of {length} items in `{element}`")]
     ListLength {
-        /// Where it begins.
+        /// Position of the list.
         place: Place,
         /// Its length.
         length: i64,
-        /// What it belongs to.
+        /// Its element.
         element: String,
     },
     /// A face refers to a vertex that does not exist.
     #[error("{place}: face {face} refers to vertex {index}, but there are {vertices} vertices")]
     IndexOutOfRange {
-        /// Where the index is, or the face.
+        /// Position of the index, or of the face.
         place: Place,
         /// The face, from 0; of strips, the strip.
         face: u64,
-        /// The index; −1 if it is no whole number.
+        /// The index; −1 if it is not an integer.
         index: i64,
         /// Number of vertices.
         vertices: u64,
@@ -172,7 +172,7 @@ pub fn parse_ply(bytes: &[u8]) -> Result<PlyMesh, PlyError> {
 }
 
 fn open(path: &Path) -> io::Result<(File, u64)> {
-    // Opening a pipe would wait for a writer, and reading a folder gives an unclear message.
+    // Opening a pipe would block, and reading a folder gives an unclear message.
     let metadata = std::fs::metadata(path)?;
     if !metadata.is_file() {
         return Err(io::Error::new(io::ErrorKind::InvalidInput, "is not a regular file"));
@@ -180,7 +180,7 @@ fn open(path: &Path) -> io::Result<(File, u64)> {
     Ok((File::open(path)?, metadata.len()))
 }
 
-/// Reads from `reader`, which yields `size` bytes.
+/// Reads from `reader`, which returns `size` bytes.
 fn read_any(mut reader: impl Read, size: u64) -> Result<PlyMesh, PlyError> {
     let mut magic = Vec::new();
     reader.by_ref().take(2).read_to_end(&mut magic)?;

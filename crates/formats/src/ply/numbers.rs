@@ -5,45 +5,45 @@ use super::stream::Stream;
 use super::{Place, PlyError};
 use crate::number::{NumberError, parse_f32, parse_f64, parse_i32};
 
-/// Longest word of a text (bytes).
+/// Maximum length of a word in text (bytes).
 const MAX_WORD: usize = 256;
 
-/// Which byte of a number comes first.
+/// Byte order of numbers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum ByteOrder {
-    /// The low one.
+    /// Little-endian.
     Little,
-    /// The high one.
+    /// Big-endian.
     Big,
 }
 
 /// A source of numbers of given types. `element` is named in errors.
 pub(super) trait Numbers<'a> {
-    /// The order of bytes; `None` for texts.
+    /// Byte order; `None` for text.
     const ORDER: Option<ByteOrder>;
 
-    /// The bytes that the numbers are made of.
+    /// The underlying bytes.
     fn stream(&mut self) -> &mut Stream<'a>;
 
     /// The next number.
     fn float(&mut self, ty: Scalar, element: &str) -> Result<f32, PlyError>;
 
-    /// As [`Numbers::float`] with the precision of f64.
+    /// As [`Numbers::float`] in f64 precision.
     fn double(&mut self, ty: Scalar, element: &str) -> Result<f64, PlyError>;
 
-    /// The next number, which should be whole.
+    /// The next number, as an integer.
     fn integer(&mut self, ty: Scalar, element: &str) -> Result<i64, PlyError>;
 
-    /// Passes over `count` numbers.
+    /// Skips `count` numbers.
     fn skip(&mut self, ty: Scalar, count: u64, element: &str) -> Result<(), PlyError>;
 
-    /// Where the next number is.
+    /// Position of the next number.
     fn place(&mut self) -> Place;
 
     /// Minimum size of a number (bytes).
     fn size(ty: Scalar) -> u64;
 
-    /// The length of a list, which fits into the rest of the file.
+    /// The length of a list; checked to fit into the rest of the file.
     fn list_length(&mut self, count_type: Scalar, ty: Scalar, element: &str) -> Result<u64, PlyError> {
         let place = self.place();
         let length = self.integer(count_type, element)?;
@@ -51,14 +51,14 @@ pub(super) trait Numbers<'a> {
         let Ok(count) = u64::try_from(length) else {
             return Err(PlyError::ListLength { place, length, element });
         };
-        // A text may lack the blank after its last number.
+        // The blank after the last number of a text may be missing.
         if count.saturating_mul(Self::size(ty)) > self.stream().remaining_limit() + 1 {
             return Err(PlyError::Truncated { place, element });
         }
         Ok(count)
     }
 
-    /// Passes over a column of a row.
+    /// Skips a column of a row.
     fn skip_property(&mut self, property: &Property, element: &str) -> Result<(), PlyError> {
         let count = match property.list {
             None => 1,
@@ -67,7 +67,7 @@ pub(super) trait Numbers<'a> {
         self.skip(property.ty, count, element)
     }
 
-    /// Passes over all rows.
+    /// Skips all rows.
     fn skip_element(&mut self, element: &Element) -> Result<(), PlyError> {
         if element.properties.is_empty() {
             return Ok(());
@@ -81,7 +81,7 @@ pub(super) trait Numbers<'a> {
     }
 }
 
-/// The number of type `$ty` at `$at`.
+/// Reads a number of type `$ty` at `$at`.
 macro_rules! number_at {
     ($ty:ty, $big:expr, $bytes:expr, $at:expr) => {{
         let mut raw = [0; size_of::<$ty>()];
@@ -91,7 +91,7 @@ macro_rules! number_at {
 }
 pub(super) use number_at;
 
-/// The number of type `ty` at the offset `at`.
+/// Reads a number of type `ty` at the offset `at`.
 #[inline]
 pub(super) fn double_at<const BIG: bool>(bytes: &[u8], at: usize, ty: Scalar) -> f64 {
     match ty {
@@ -117,12 +117,12 @@ fn integer_at<const BIG: bool>(bytes: &[u8], at: usize, ty: Scalar) -> i64 {
     }
 }
 
-/// A float that is used as an index; what is no whole number becomes one that is out of range.
+/// Converts a float to an index; non-integers become an index out of range.
 fn whole(value: f64) -> i64 {
     if value.fract() == 0.0 { value as i64 } else { -1 }
 }
 
-/// Numbers as bytes; the high one first if `BIG`.
+/// Binary numbers; big-endian if `BIG`.
 pub(super) struct Binary<'s, 'a, const BIG: bool>(pub &'s mut Stream<'a>);
 
 impl<'a, const BIG: bool> Numbers<'a> for Binary<'_, 'a, BIG> {
@@ -166,11 +166,11 @@ impl<'a, const BIG: bool> Numbers<'a> for Binary<'_, 'a, BIG> {
     }
 }
 
-/// Numbers as words between blanks; line ends mean nothing, as in most readers.
+/// Numbers as words between blanks; line ends have no meaning, as in most readers.
 pub(super) struct Ascii<'s, 'a>(pub &'s mut Stream<'a>);
 
 impl Ascii<'_, '_> {
-    /// Hands the next word to `parse`, which returns a value and the length of the word.
+    /// Passes the next word to `parse`, which returns a value and the length of the word.
     #[inline]
     fn word<T>(
         &mut self,
@@ -181,7 +181,7 @@ impl Ascii<'_, '_> {
         self.skip_blanks()?;
         let bytes = self.0.fill(MAX_WORD)?;
         match parse(bytes) {
-            // A longer word may be cut by the end of the buffer; other delimiters than blanks do not belong here.
+            // The end of the buffer may cut a longer word; only blanks are delimiters here.
             Ok((value, length)) if length < MAX_WORD && bytes.get(length).is_none_or(u8::is_ascii_whitespace) => {
                 self.0.consume(length);
                 Ok(value)
@@ -226,13 +226,13 @@ fn word_length(bytes: &[u8]) -> usize {
     bytes.iter().take(MAX_WORD).position(u8::is_ascii_whitespace).unwrap_or(bytes.len().min(MAX_WORD))
 }
 
-/// As [`parse_f32`], and also `nan` and `inf` in their spellings, which exporters write for broken vertices.
+/// As [`parse_f32`], including the spellings of `nan` and `inf` that exporters write for invalid vertices.
 #[inline]
 fn parse_any_f32(bytes: &[u8]) -> Result<(f32, usize), NumberError> {
     parse_f32(bytes).or_else(|error| odd_float(&bytes[..word_length(bytes)], error))
 }
 
-/// As [`parse_any_f32`] with the precision of f64.
+/// As [`parse_any_f32`] in f64 precision.
 #[inline]
 fn parse_any_f64(bytes: &[u8]) -> Result<(f64, usize), NumberError> {
     parse_f64(bytes).or_else(|error| {
@@ -253,7 +253,7 @@ fn odd_float(word: &[u8], error: NumberError) -> Result<(f32, usize), NumberErro
     }
 }
 
-/// A whole number; one that is written with a point, as some exporters do, is taken too.
+/// An integer; also accepted with a decimal point, as some exporters write it.
 #[inline]
 fn parse_whole(bytes: &[u8]) -> Result<(i64, usize), NumberError> {
     match parse_i32(bytes) {

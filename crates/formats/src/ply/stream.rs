@@ -1,4 +1,4 @@
-//! A reader seen through a buffer of fixed size.
+//! A reader with a buffer of fixed size.
 
 use super::{Place, PlyError};
 use std::io::{self, Read};
@@ -7,54 +7,54 @@ use std::io::{self, Read};
 const BUFFER: usize = 1 << 18;
 /// Maximum number of bytes per request.
 pub(super) const MAX_FILL: usize = 4096;
-/// Largest factor by which deflate expands; bounds what a gzip file can hold.
+/// Maximum expansion factor of deflate, which bounds the content of a gzip file.
 const MAX_INFLATION: u64 = 1032;
-/// Factor by which a mesh may expand before it is suspected to be a trick: memory for more is not taken in advance.
+/// Maximum plausible expansion of a mesh: no memory is reserved in advance for more.
 const USUAL_INFLATION: u64 = 16;
-/// Bytes behind the mesh that are decompressed to come to the checksum.
+/// Maximum number of bytes after the mesh that are decompressed to reach the checksum.
 const MAX_TAIL: usize = 1 << 24;
 
-/// A buffered reader that knows a bound of what is still to come.
+/// A buffered reader with an upper bound of the remaining bytes.
 pub(super) struct Stream<'a> {
     reader: &'a mut dyn Read,
     buffer: Vec<u8>,
     start: usize,
     end: usize,
-    /// Upper bound of the bytes that the reader still has.
+    /// Upper bound of the unread bytes of the reader.
     unread: u64,
     /// Offset of the buffer in the file.
     origin: u64,
-    /// Bytes for which memory may be taken before they are seen.
+    /// Number of bytes for which memory may be reserved before they are read.
     trusted: u64,
     /// Line of the next byte, if the file is a text.
     pub line: u64,
-    /// What ends a line: LF, or CR if the file has CR alone.
+    /// End of lines: LF, or CR if the file has CR only.
     pub newline: u8,
 }
 
 impl<'a> Stream<'a> {
-    /// Reads from `reader`, which yields at most `limit` bytes; what it yields beyond is not seen.
+    /// Reads at most `limit` bytes from `reader`.
     pub(super) fn new(reader: &'a mut dyn Read, limit: u64) -> Self {
         let size = (limit.min(BUFFER as u64) as usize).max(MAX_FILL);
         let buffer = vec![0; size];
         Stream { reader, buffer, start: 0, end: 0, unread: limit, origin: 0, trusted: limit, line: 1, newline: b'\n' }
     }
 
-    /// Reads from a decoder of `size` bytes of deflated data.
+    /// Reads from a decoder of `size` bytes of deflate data.
     pub(super) fn inflated(reader: &'a mut dyn Read, size: u64) -> Self {
         let trusted = size.saturating_mul(USUAL_INFLATION);
         Stream { trusted, ..Stream::new(reader, size.saturating_mul(MAX_INFLATION)) }
     }
 
-    /// Upper bound of the bytes that are still to come.
+    /// Upper bound of the remaining bytes.
     pub(super) fn remaining_limit(&self) -> u64 {
         self.unread + (self.end - self.start) as u64
     }
 
-    /// For how many of `count` items, each of at least `size` bytes, memory may be taken in advance.
+    /// Number of items, out of `count` with at least `size` bytes each, for which memory may be reserved in advance.
     pub(super) fn trusted_items(&self, count: u64, size: u64) -> usize {
         let bytes = self.trusted.min(self.remaining_limit());
-        // A text may lack the blank after its last number.
+        // The blank after the last number of a text may be missing.
         usize::try_from(count.min((bytes + 1) / size.max(1))).unwrap_or(usize::MAX)
     }
 
@@ -63,8 +63,8 @@ impl<'a> Stream<'a> {
         self.origin + self.start as u64
     }
 
-    /// Makes at least `wanted` bytes available if there are so many, and returns all that are available.
-    /// `wanted` must not exceed [`MAX_FILL`].
+    /// Makes at least `wanted` bytes available, if they exist, and returns all available bytes. `wanted` must not
+    /// exceed [`MAX_FILL`].
     #[inline]
     pub(super) fn fill(&mut self, wanted: usize) -> Result<&[u8], PlyError> {
         if self.end - self.start < wanted {
@@ -73,7 +73,7 @@ impl<'a> Stream<'a> {
         Ok(&self.buffer[self.start..self.end])
     }
 
-    /// Makes `count` bytes available, or fails with the name of the element that lacks them.
+    /// Makes `count` bytes available, or fails with the name of the incomplete element.
     #[inline]
     pub(super) fn require(&mut self, count: usize, element: &str) -> Result<&[u8], PlyError> {
         if self.end - self.start < count {
@@ -86,13 +86,13 @@ impl<'a> Stream<'a> {
         Ok(&self.buffer[self.start..self.end])
     }
 
-    /// Drops the first `count` available bytes.
+    /// Consumes the first `count` available bytes.
     #[inline]
     pub(super) fn consume(&mut self, count: usize) {
         self.start = (self.start + count).min(self.end);
     }
 
-    /// Drops `count` bytes.
+    /// Consumes `count` bytes.
     pub(super) fn skip(&mut self, mut count: u64, element: &str) -> Result<(), PlyError> {
         while count > 0 {
             let available = self.require(1, element)?.len() as u64;
@@ -103,7 +103,7 @@ impl<'a> Stream<'a> {
         Ok(())
     }
 
-    /// Reads to the end, so that a decoder compares its checksum.
+    /// Reads to the end, so that a decoder verifies its checksum.
     pub(super) fn drain(&mut self) -> Result<(), PlyError> {
         let mut drained = 0;
         while drained < MAX_TAIL {

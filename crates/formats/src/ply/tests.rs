@@ -16,7 +16,7 @@ const SCALARS: [(Scalar, [&str; 2]); 8] = [
     (F64, ["double", "float64"]),
 ];
 
-/// Writes a file of any encoding.
+/// Writes a file in any encoding.
 struct Writer {
     format: &'static str,
     head: String,
@@ -101,7 +101,7 @@ fn sample(format: &'static str) -> Vec<u8> {
     w.bytes()
 }
 
-/// Five vertices and what follows them.
+/// A file with five vertices, followed by the content of `fill`.
 fn with_faces(format: &'static str, head: &str, fill: impl Fn(&mut Writer)) -> Vec<u8> {
     let mut w = Writer::new(format);
     w.head("element vertex 5").head(XYZ).head(head);
@@ -327,7 +327,7 @@ fn corners_of_faces_have_texture_coordinates_of_their_own() {
     // A triangle, a quad, a polygon, and one with none; before the indices and behind them
     let faces: [&[f64]; 4] = [&[0., 1., 2.], &[0., 1., 2., 3.], &[0., 1., 2., 3., 4.], &[2., 3., 4.]];
     let uv = |face: usize, corner: usize| match face {
-        // The triangle and the quad share a seam at the corners 1 and 2, and agree at 0
+        // The triangle and the quad have a seam at the corners 1 and 2, and agree at 0
         0 | 1 => [corner as f64 / 8.0 + if corner > 0 { face as f64 } else { 0.0 }, 0.5],
         _ => [corner as f64, 2.0],
     };
@@ -364,7 +364,7 @@ fn corners_of_faces_have_texture_coordinates_of_their_own() {
                 triangle.iter().zip(corners).for_each(|(&v, corner)| check(v, face, corner));
             }
             mesh.quads[0].iter().enumerate().for_each(|(corner, &v)| check(v, 1, corner));
-            // Pairs of a vertex and its coordinates: 3 + 3 of the quad (one is shared) + 5 + 3
+            // Pairs of a vertex and its coordinates: 3 + 3 of the quad (one shared) + 5 + 3
             assert_eq!(mesh.positions.len(), 14, "{format}");
             assert!(mesh.positions.capacity() > mesh.positions.len());
             assert_eq!(mesh.warnings, ["1 faces have more than four vertices; each becomes a fan of triangles"]);
@@ -409,7 +409,7 @@ fn strips_keep_their_orientation_and_restart() {
             w.list(I32, I32, &[0., 1., 1., 2., 3.]).end_row();
         });
         let mesh = parse_ply(&bytes).unwrap();
-        // The second strip has two triangles without area; the last one is the third, so in order.
+        // The second strip has two degenerate triangles; the last one is the third, which keeps the orientation.
         assert_eq!(mesh.triangles, [[0, 1, 3], [3, 1, 2], [3, 2, 4], [4, 3, 2], [1, 2, 3]], "{format}");
         let wrong = with_faces(format, "element tristrips 1\nproperty list int int vertex_indices", |w| {
             w.list(I32, I32, &[0., 1., -2.]).end_row();
@@ -549,7 +549,7 @@ fn absurd_counts_are_refused_before_anything_is_allocated() {
             }
         }
     }
-    // What deflate could hold is not refused, but memory is taken only as data come in.
+    // The maximum expansion of deflate is accepted, but memory is only reserved as data are read.
     let mut reader: &[u8] = &[];
     assert_eq!(Stream::new(&mut reader, 1200).trusted_items(u64::MAX, 12), 100);
     let mut reader: &[u8] = &[];
@@ -593,7 +593,7 @@ fn indices_out_of_range_are_refused_with_their_face() {
                     let expected = if format == "ascii" { Place::Line(17) } else { place };
                     assert_eq!(place, expected);
                 }
-                // A text says that it is no whole number.
+                // Text distinguishes non-integers.
                 PlyError::Number { place: Place::Line(17), .. } if format == "ascii" && ty == F32 => {}
                 other => panic!("{format} {ty:?} {index}: {other}"),
             }
@@ -633,7 +633,7 @@ fn broken_vertices_lose_their_faces_and_are_counted() {
         let mesh = parse_ply(&bytes).unwrap();
         assert_eq!(mesh.warnings, ["1 vertices are not finite; 0 faces of them are left out"], "{format}");
     }
-    // Large but finite values are no reason.
+    // Large finite values are valid.
     let large = parse_ply(&replaced("0.5 2 0.25 0.5 2", "3e38 3e38 3e38 0 0")).unwrap();
     assert!(large.warnings.is_empty() && large.positions[4].x == 3e38);
 }
@@ -642,7 +642,7 @@ fn broken_vertices_lose_their_faces_and_are_counted() {
 fn truncated_files_are_refused_wherever_they_end() {
     for format in FORMATS {
         let bytes = sample(format);
-        // Of a text, the last number may miss digits and the blank and line end behind it.
+        // In text, the last number may lack digits, and the blank and line end after it.
         let end = bytes.len() - if format == "ascii" { 3 } else { 0 };
         for cut in 0..end {
             let error = parse_ply(&bytes[..cut]).expect_err(&format!("{cut} bytes of {format}"));

@@ -1,9 +1,9 @@
-//! Colours and textures of a file that are not read.
+//! Colours and textures of a file that are not supported.
 
 use super::header::{Element, Header};
 use super::{faces, vertices};
 
-/// Parts of names that tell of colours and textures.
+/// Parts of names that indicate colours and textures.
 const PARTS: [&str; 9] = ["tex", "color", "colour", "red", "green", "blue", "alpha", "uv", "material"];
 /// Whole names of that kind.
 const NAMES: [&str; 12] = ["r", "g", "b", "a", "rgb", "rgba", "u", "v", "s", "t", "tu", "tv"];
@@ -13,7 +13,7 @@ fn tells_of_appearance(name: &str) -> bool {
     PARTS.iter().any(|part| name.contains(part))
 }
 
-/// A warning that names them; `None` if there are none.
+/// A warning that names them; `None` without any.
 pub(super) fn warning(header: &Header) -> Option<String> {
     let of_element = |element: &Element| {
         let is_read = |name: &str| match element.name.as_str() {

@@ -37,7 +37,7 @@ pub(super) fn read<'a, N: Numbers<'a>>(element: &Element, numbers: &mut N, mesh:
     } else {
         (mesh.positions, mesh.origin) = relative(doubles.iter().copied());
     }
-    // Usually a no-op; compressed files may hold more than memory was taken for.
+    // Usually a no-op; compressed files may exceed the reserved memory.
     mesh.positions.reserve_exact(1);
     Ok(())
 }
@@ -45,20 +45,20 @@ pub(super) fn read<'a, N: Numbers<'a>>(element: &Element, numbers: &mut N, mesh:
 /// Names of texture coordinates.
 const UVS: [[&str; 2]; 4] = [["u", "v"], ["s", "t"], ["texture_u", "texture_v"], ["texture_s", "texture_t"]];
 
-/// The texture coordinates that a table of vertices has.
+/// The names of the texture coordinates in a vertex table.
 fn uvs_of(element: &Element) -> Option<[&'static str; 2]> {
     UVS.into_iter().find(|pair| pair.iter().all(|name| element.scalar(name).is_some()))
 }
 
-/// True if a property of vertices is their texture coordinates.
+/// True if a vertex property is a texture coordinate.
 pub(super) fn reads(element: &Element, name: &str) -> bool {
     uvs_of(element).is_some_and(|pair| pair.contains(&name))
 }
 
-/// A mesh, and its positions where they are not of single precision.
+/// A mesh, and its positions if they are not of single precision.
 type Out<'m> = (&'m mut PlyMesh, &'m mut Vec<DVec3>);
 
-/// Which columns are used.
+/// The columns in use.
 struct Columns {
     position: [usize; 3],
     normal: Option<[usize; 3]>,
@@ -66,7 +66,7 @@ struct Columns {
 }
 
 impl Columns {
-    /// `None` if there are no positions.
+    /// `None` without positions.
     fn new(element: &Element) -> Option<Self> {
         let three = |[x, y, z]: [&str; 3]| Some([element.scalar(x)?, element.scalar(y)?, element.scalar(z)?]);
         let uv = uvs_of(element).and_then(|[u, v]| Some([element.scalar(u)?, element.scalar(v)?]));
@@ -79,7 +79,7 @@ impl Columns {
     }
 }
 
-/// Rows number by number.
+/// Reads rows number by number.
 fn read_rows<'a>(
     element: &Element,
     columns: &Columns,
@@ -103,7 +103,7 @@ fn read_rows<'a>(
     Ok(())
 }
 
-/// Rows of fixed size in blocks: each wanted number is picked at its offset.
+/// Reads rows of fixed size in blocks: each number is read at its offset.
 fn read_blocks<const BIG: bool>(
     element: &Element,
     columns: &Columns,
@@ -147,7 +147,7 @@ fn read_blocks<const BIG: bool>(
 
 /// Offset and type of a number.
 type Place = (usize, Scalar);
-/// Of normals and texture coordinates.
+/// Offsets of normals and texture coordinates.
 type Places = (Option<[Place; 3]>, Option<[Place; 2]>);
 
 #[inline]

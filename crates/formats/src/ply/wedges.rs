@@ -1,15 +1,15 @@
-//! Texture coordinates of the corners of faces, as photogrammetry programs write them: at seams of the texture, a vertex has
-//! several, and becomes as many vertices.
+//! Texture coordinates of the corners of faces, as photogrammetry programs write them. A vertex at a texture seam has
+//! several coordinates and is split into several vertices.
 
 use super::PlyMesh;
 use lumiris_numbers::math::Vec2;
 use std::collections::HashMap;
 
-/// Stands for coordinates that a corner does not have: those of its vertex count.
+/// Stands for a corner without coordinates, which uses the coordinates of its vertex.
 pub(super) const NONE: Vec2 = Vec2::NAN;
 
-/// Gives the corners of the mesh's triangles and quads their texture coordinates, by vertices of one pair each: the first pair
-/// of a vertex stays with it, every other one takes a copy of it behind the vertices of the file.
+/// Assigns texture coordinates to the corners of the mesh's triangles and quads, by vertices with one pair each. The
+/// first pair of a vertex is assigned to it; other pairs are assigned to copies, which are appended.
 pub(super) fn apply(mesh: &mut PlyMesh, triangles: &[[Vec2; 3]], quads: &[[Vec2; 4]]) {
     let count = mesh.positions.len();
     let given = std::mem::take(&mut mesh.uvs);
@@ -24,7 +24,7 @@ pub(super) fn apply(mesh: &mut PlyMesh, triangles: &[[Vec2; 3]], quads: &[[Vec2;
             uvs[v] = uv;
         } else if uvs[v] != uv {
             *vertex = *copies.entry((*vertex, uv.to_array().map(f32::to_bits))).or_insert_with(|| {
-                // No file has vertices beyond 32 bits, and no memory holds their copies
+                // Meshes with more than 2³² vertices would not fit into memory
                 let Ok(copy) = u32::try_from(count + sources.len()) else { return *vertex };
                 sources.push(*vertex);
                 uvs.push(uv);

@@ -5,29 +5,29 @@ use flate2::read::ZlibDecoder;
 use half::f16;
 use std::io::Read;
 
-/// Deflate makes at most so many bytes of one.
+/// Maximum expansion factor of deflate.
 const MOST_RATIO: usize = 1032;
 
-/// Bytes that are read from the front.
+/// Bytes that are read sequentially.
 pub(super) struct Blocks<'a> {
     bytes: &'a [u8],
-    /// Where they begin in the file.
+    /// Their offset in the file.
     base: usize,
     at: usize,
 }
 
 impl<'a> Blocks<'a> {
-    /// Bytes that begin at byte `base` of the file.
+    /// Bytes at the offset `base` of the file.
     pub(super) fn new(bytes: &'a [u8], base: usize) -> Self {
         Blocks { bytes, base, at: 0 }
     }
 
-    /// Offset in the file of what comes next.
+    /// Offset in the file of the next byte.
     pub(super) fn at(&self) -> usize {
         self.base + self.at
     }
 
-    /// The next `count` bytes, which are `what`.
+    /// The next `count` bytes; `what` names them in errors.
     pub(super) fn take(&mut self, count: usize, what: &str) -> Result<&'a [u8], PtexError> {
         let end = self.at.checked_add(count).filter(|&end| end <= self.bytes.len());
         let end = end.ok_or_else(|| {
@@ -73,7 +73,7 @@ impl NumberType {
         [NumberType::U8, NumberType::U16, NumberType::F16, NumberType::F32].get(code as usize).copied()
     }
 
-    /// Bytes of a number.
+    /// Size of a number (bytes).
     pub(super) fn size(self) -> usize {
         match self {
             NumberType::U8 => 1,
@@ -82,7 +82,7 @@ impl NumberType {
         }
     }
 
-    /// The number of its [`Self::size`] bytes; integers are fractions of the largest.
+    /// Decodes a number of [`Self::size`] bytes; integers are fractions of their maximum.
     pub(super) fn number(self, bytes: &[u8]) -> f32 {
         match (self, bytes) {
             (NumberType::U8, &[a]) => f32::from(a) / 255.0,
@@ -93,7 +93,7 @@ impl NumberType {
         }
     }
 
-    /// Replaces differences of neighbours by the numbers, if they are integers; others are never stored so.
+    /// Reverses difference coding of neighbours, which is only used for integers.
     fn undo_differences(self, bytes: &mut [u8]) {
         match self {
             NumberType::U8 => {
@@ -115,15 +115,15 @@ impl NumberType {
     }
 }
 
-/// How texels are stored.
+/// Storage of texels.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Encoding {
-    /// One for all.
+    /// One value for all texels.
     Constant,
     Compressed,
-    /// Each number less the one before it.
+    /// Each number minus the one before it.
     Differences,
-    /// In parts, each with an encoding of its own.
+    /// In tiles, each with its own encoding.
     Tiled,
 }
 
@@ -158,7 +158,7 @@ pub(super) fn inflate(block: &[u8], expected: Option<usize>, at: usize) -> Resul
     Ok(bytes)
 }
 
-/// Appends the texels of a face or tile of 2^`log2` texels, channel by channel.
+/// Appends the texels of a face or tile of 2^`log2` texels, planar by channel.
 pub(super) fn read_texels(
     block: &[u8],
     encoding: Encoding,
@@ -198,7 +198,7 @@ pub(super) fn read_texels(
     Ok(())
 }
 
-/// Columns and rows of a tile, and the texels of all of them.
+/// Columns and rows of a tile, and the texels of all tiles.
 type Tiles = ([usize; 2], Vec<Vec<u8>>);
 
 fn read_tiles(block: &[u8], log2: [u8; 2], numbers: (usize, NumberType), at: usize) -> Result<Tiles, PtexError> {

@@ -1,9 +1,9 @@
 //! Ptex files (`.ptx`): a texture for each face of a mesh, without texture coordinates [Burley and Lacewell 2008]. The
-//! format is that of <https://ptex.us/PtexFile.html>, version 1.
+//! format is specified at <https://ptex.us/PtexFile.html>, version 1.
 //!
-//! Level 0 is read, of quadrilateral meshes; coarser levels follow from it. A file consists of a header, and of blocks
-//! whose sizes the header tells: numbers of the faces, means of the faces, sizes of the levels, levels. Blocks are
-//! compressed each by itself. Whatever a file says of sizes is compared with its own size before anything is allocated.
+//! Only level 0 of quadrilateral meshes is read; coarser levels are computed from it. A file consists of a header, and
+//! of blocks whose sizes are in the header: face descriptions, means of the faces, sizes of the levels, levels. Each
+//! block is compressed separately. All sizes are compared with the size of the file before anything is allocated.
 //!
 //! Reading order: [`blocks`], numbers and blocks; then this file.
 
@@ -14,26 +14,26 @@ mod tests;
 use blocks::{Blocks, Encoding, NumberType, inflate};
 use std::path::{Path, PathBuf};
 
-/// Largest logarithm of a face's number of texels in a row: larger ones are no sizes of textures.
+/// Maximum log₂ of the number of texels along an edge of a face.
 const MOST_LOG2: u8 = 16;
 
-/// Texels take at most so many bytes for one of the file, more than the compression of pictures makes of one, or
-/// [`LEAST_ROOM`] in a small file: what claims more is damaged.
+/// Maximum expansion of texels relative to the file, more than image compression achieves; small files may expand to
+/// [`LEAST_ROOM`]. Files that claim more are damaged.
 const MOST_EXPANSION: usize = 4096;
 const LEAST_ROOM: usize = 1 << 26;
 
-/// What a file holds.
+/// The content of a file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PtexFile {
     /// Faces, in the order of their numbers.
     pub faces: Vec<PtexFace>,
-    /// Channels of a texel: three if the file has as many, else one.
+    /// Channels of a texel: three if the file has three or more, else one.
     pub channels: usize,
     /// Texels of all faces, face by face.
     pub texels: PtexTexels,
 }
 
-/// Numbers of texels, channels interleaved.
+/// Texel values, channels interleaved.
 #[derive(Clone, Debug, PartialEq)]
 pub enum PtexTexels {
     /// Multiples of 1/255.
@@ -42,20 +42,20 @@ pub enum PtexTexels {
     Floats(Vec<f32>),
 }
 
-/// A face of the mesh. Its texels stand row by row, from (u, v) = (0, 0); of a face of one colour there is one.
+/// A face of the mesh. Its texels are in row order, from (u, v) = (0, 0); a face of constant colour has one texel.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PtexFace {
     /// Index of its first texel.
     pub first: usize,
     /// Binary logarithms of the numbers of columns and rows.
     pub log2: [u8; 2],
-    /// True if one texel stands for all.
+    /// True if a single texel stands for all.
     pub is_constant: bool,
-    /// What is beyond its edges v = 0, u = 1, v = 1, u = 0.
+    /// Neighbours at its edges v = 0, u = 1, v = 1, u = 0.
     pub neighbors: [Option<Neighbor>; 4],
 }
 
-/// A face beyond an edge, which joins it along one of its own edges, in the reverse direction.
+/// An adjacent face, which is joined along one of its own edges, in the reverse direction.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Neighbor {
     /// Number of the face.
@@ -64,18 +64,18 @@ pub struct Neighbor {
     pub edge: u8,
 }
 
-/// Why a file cannot be read.
+/// Errors of Ptex files.
 #[derive(Debug, thiserror::Error)]
 pub enum PtexError {
-    /// The system says no.
+    /// Error of the operating system.
     #[error("{reason}")]
     Unreadable {
         /// The file.
         path: PathBuf,
-        /// What it says.
+        /// Its reason.
         reason: std::io::Error,
     },
-    /// It is no such file, or not one that can be rendered.
+    /// It is not a Ptex file, or not a supported one.
     #[error("{}: byte {byte}: {message}", path.display())]
     Wrong {
         /// The file; empty for bytes.
@@ -102,7 +102,7 @@ pub fn read_ptex(path: &Path) -> Result<PtexFile, PtexError> {
     })
 }
 
-/// What the header says.
+/// The content of the header.
 struct Header {
     ty: NumberType,
     /// Channels in the file.
@@ -146,25 +146,26 @@ impl Header {
         }
         let [extension_size, faces_size, means_size, levels_size] = blocks.sizes()?;
         let _minor_version = blocks.u32()?;
-        // The sizes of all levels together, and of metadata
+        // The total size of all levels, and of metadata
         blocks.take(16, "the header")?;
         Ok(Header { ty, channels, faces, extension_size, faces_size, means_size, levels_size })
     }
 
-    /// Bytes of a texel.
+    /// Size of a texel (bytes).
     fn texel_bytes(&self) -> usize {
         self.channels * self.ty.size()
     }
 
-    /// Appends the mean of a face; means stand channel by channel.
+    /// Appends the mean of a face; means are planar by channel.
     fn mean(&self, means: &[u8], face: usize, out: &mut Vec<u8>) {
         let size = self.ty.size();
         let channels = means.chunks_exact(self.faces * size);
         channels.for_each(|channel| out.extend_from_slice(&channel[face * size..][..size]));
     }
 
-    /// Logarithms of the columns and rows of a face, for whose texels there must be `room` (bytes). `Err` says what is wrong
-    /// with them.
+    /// log₂ of the columns and rows of a face, whose texels must fit into `room` (bytes).
+    ///
+    /// Returns `Err` with a message if they are invalid.
     fn size(&self, info: &[u8], is_constant: bool, room: &mut usize) -> Result<[u8; 2], String> {
         let log2 = [info[0], info[1]];
         let bytes = match log2.iter().all(|&log2| log2 <= MOST_LOG2) {
@@ -235,7 +236,7 @@ pub fn parse_ptex(bytes: &[u8]) -> Result<PtexFile, PtexError> {
 const FLAG_CONSTANT: u8 = 1;
 const FLAG_SUBFACE: u8 = 8;
 
-/// The neighbours of a face, but for those of half its size or twice: parts of faces that are no quadrilaterals beside
+/// The neighbours of a face, except neighbours of half or twice its size: subfaces of non-quadrilateral faces beside
 /// whole ones.
 fn neighbors(info: &[u8], infos: &[u8]) -> [Option<Neighbor>; 4] {
     std::array::from_fn(|side| {
@@ -248,7 +249,7 @@ fn neighbors(info: &[u8], infos: &[u8]) -> [Option<Neighbor>; 4] {
     })
 }
 
-/// Texels with the channels that are wanted.
+/// Texels with selected channels.
 struct Interleaved {
     ty: NumberType,
     /// Channels in the file.
@@ -266,7 +267,7 @@ impl Interleaved {
         Interleaved { ty: header.ty, of: header.channels, channels, values }
     }
 
-    /// How many texels there are.
+    /// Number of texels.
     fn texels(&self) -> usize {
         let numbers = match &self.values {
             PtexTexels::Bytes(v) => v.len(),
@@ -275,7 +276,7 @@ impl Interleaved {
         numbers / self.channels
     }
 
-    /// Adds texels that stand channel by channel.
+    /// Adds texels that are planar by channel.
     fn push(&mut self, planar: &[u8]) {
         let size = self.ty.size();
         let count = planar.len() / (self.of * size);

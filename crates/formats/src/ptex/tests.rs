@@ -1,4 +1,4 @@
-//! Reading: texels of known values in every way of storing them, and whatever is damaged.
+//! Reading texels with known values in every encoding, and damaged files.
 
 use super::*;
 use lumiris_test_support::ptex::{PtexEncoding, PtexFaceSpec, PtexSpec, ptex_file};
@@ -78,7 +78,7 @@ fn damaged_files_are_errors_with_a_place() {
             let at = random.random_range(0..bytes.len());
             bytes[at] = random.random_range(0..=255);
         }
-        // Whatever it is, it is no panic
+        // May be invalid, but must not panic
         let _ = parse_ptex(&bytes);
     }
 }
@@ -97,7 +97,7 @@ fn what_is_not_read_is_said() {
     assert!(message(12, &[9]).contains("type of data 9"));
     assert!(message(20, &[0]).contains("0 channels"));
     assert!(message(64 + 24, &[1]).contains("edits"));
-    // A face that claims far more texels than the file can have of tiles of one colour
+    // A face that claims far more texels than the tiles of constant colour in the file allow
     let mut face = PtexFaceSpec { encoding: PtexEncoding::Tiled([0, 0]), ..PtexFaceSpec::new([0, 0], vec![0.5]) };
     let file = |face: &PtexFaceSpec| ptex_file(&PtexSpec { ty: 3, channels: 1, faces: vec![face.clone(); 3] });
     assert!(parse_ptex(&file(&face)).is_ok());
