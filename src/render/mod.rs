@@ -138,6 +138,8 @@ pub struct Continuation<'a> {
     pub checkpoints: Option<&'a mut Checkpoints>,
     /// Whether the exact sums are part of the result.
     pub keeps_sums: bool,
+    /// Whether the progress has the noise even where nobody watches tiles or passes.
+    pub tells_noise: bool,
     /// Gets tiles on the way.
     pub watch: Option<&'a TileObserver<'a>>,
     /// Waits between passes.

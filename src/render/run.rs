@@ -106,7 +106,8 @@ impl<'a> Run<'a> {
     }
 
     pub(super) fn run(self, threads: usize, continuation: Continuation<'_>) -> Result<Rendering, RenderError> {
-        let Continuation { stored, cells, mut checkpoints, keeps_sums, watch, passes } = continuation;
+        let Continuation { stored, cells, mut checkpoints, keeps_sums, tells_noise, watch, passes } = continuation;
+        let tells_noise = tells_noise || watch.is_some() || passes.is_some();
         let seed = self.job.settings().sampling.seed;
         let cameras = |pixel, sample| self.camera.sample_of_seed(pixel, sample, seed);
         let mut integrator = integrator(self.job, &cameras, self.stop)?;
@@ -130,7 +131,7 @@ impl<'a> Run<'a> {
                     passes(&self.progress(self.samples_total(&tiles.tiles), noise));
                 }
                 let now = Instant::now();
-                if now >= observed && first < end && !self.is_late() {
+                if tells_noise && now >= observed && first < end && !self.is_late() {
                     let processor = processor_time::of_process();
                     noise = Some(self.film(&tiles.tiles).summary().noise.median);
                     times.noise += processor_time::of_process().saturating_sub(processor);

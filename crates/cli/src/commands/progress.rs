@@ -174,6 +174,11 @@ impl Bar {
         Bar(())
     }
 
+    /// True if somebody may see the line.
+    pub(super) fn is_visible(&self) -> bool {
+        line().as_ref().is_some_and(|line| !line.bar.is_hidden())
+    }
+
     /// Shows the progress of a rendering: what is done of its samples, or of its time if that is more.
     pub(super) fn update(&self, progress: &Progress) {
         let Some(line) = &mut *line() else { return };

@@ -279,6 +279,7 @@ fn render_shown(
         bar.update(progress);
         watch::observe(canvas, progress);
     };
+    let continuation = Continuation { tells_noise: bar.is_visible(), ..continuation };
     let Some(shown) = canvas else { return Ok(go_on(job, settings, interrupt::stop(), &observe, continuation)?) };
     let set_tile = |tile: &Film| shown.set_tile(tile);
     let watched = Continuation { watch: Some(&set_tile), ..continuation };
