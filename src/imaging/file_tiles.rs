@@ -24,13 +24,12 @@ impl FileTexels {
 
     /// A whole level.
     pub(super) fn level(&self, level: usize) -> Result<Level, ImageError> {
-        let [width, height] = self.file.sizes()[level];
         let values = self.file.level(level, &self.channels)?;
         let texels = match self.channel_bytes() {
             1 => Texels::Bytes(values.into_iter().map(byte).collect()),
             _ => Texels::Floats(values.into_iter().map(|v| self.encoding.to_linear(v)).collect()),
         };
-        Ok(Level { width, height, texels })
+        Ok(Level::new(self.file.sizes()[level], texels))
     }
 
     /// The same with tiles in `store` that are read when they are wanted, unless it is a tile itself.
@@ -44,7 +43,7 @@ impl FileTexels {
         let read = move |index: usize| texels.tile(level, index).map_err(|error| error.to_string());
         let first = store.add_level(columns * rows, self.tile_bytes(), Arc::new(read));
         let tiled = Tiled { store: Arc::clone(store), first, columns, channel_bytes: self.channel_bytes() };
-        Ok(Level { width, height, texels: Texels::Tiled(tiled) })
+        Ok(Level::new([width, height], Texels::Tiled(tiled)))
     }
 
     fn tile_bytes(&self) -> usize {

@@ -2,7 +2,7 @@
 
 use super::Image;
 use super::tiles::{TILE, TileStore};
-use lumiris_numbers::math::Rgb;
+use lumiris_numbers::math::{Rgb, Vec2};
 use std::io;
 use std::sync::Arc;
 
@@ -31,7 +31,6 @@ pub(super) struct Tiled {
 
 impl Tiled {
     /// The first `N` channels of a pixel.
-    #[inline]
     fn values<const N: usize>(&self, channels: usize, [x, y]: [usize; 2], table: &[f32; 256]) -> [f32; N] {
         let pixel_bytes = channels * self.channel_bytes;
         let tile_bytes = TILE * TILE * pixel_bytes;
@@ -50,10 +49,16 @@ impl Tiled {
 pub(super) struct Level {
     pub(super) width: usize,
     pub(super) height: usize,
+    /// Width and height, so that no lookup converts them.
+    pub(super) size: Vec2,
     pub(super) texels: Texels,
 }
 
 impl Level {
+    pub(super) fn new([width, height]: [usize; 2], texels: Texels) -> Self {
+        Level { width, height, size: Vec2::new(width as f32, height as f32), texels }
+    }
+
     /// The linear value of a channel of a pixel; `table` has those of bytes.
     #[inline]
     pub(super) fn texel(&self, [x, y]: [usize; 2], c: usize, channels: usize, table: &[f32; 256]) -> f32 {
@@ -61,28 +66,33 @@ impl Level {
         match &self.texels {
             Texels::Bytes(v) => table[usize::from(v[i])],
             Texels::Floats(v) => v[i],
-            Texels::Tiled(_) => self.color([x, y], channels, table)[c],
+            Texels::Tiled(_) => self.colors([[x, y]], channels, table)[0][c],
         }
     }
 
-    /// The linear colour of a pixel; grey if there is one channel.
+    /// The linear colours of pixels; grey if there is one channel.
     #[inline]
-    pub(super) fn color(&self, pixel: [usize; 2], channels: usize, table: &[f32; 256]) -> Rgb {
-        let i = (pixel[1] * self.width + pixel[0]) * channels;
-        // The texels are told apart once, not for each channel
+    pub(super) fn colors<const N: usize>(
+        &self,
+        pixels: [[usize; 2]; N],
+        channels: usize,
+        table: &[f32; 256],
+    ) -> [Rgb; N] {
+        let index = |[x, y]: [usize; 2]| y * self.width + x;
+        // The texels are told apart once, not for each pixel or channel
         match (&self.texels, channels) {
-            (Texels::Bytes(v), 1) => Rgb::splat(table[usize::from(v[i])]),
-            (Texels::Bytes(v), _) => {
-                let v = &v[i..i + 3];
+            (Texels::Bytes(v), 1) => pixels.map(|pixel| Rgb::splat(table[usize::from(v[index(pixel)])])),
+            (Texels::Bytes(v), _) => pixels.map(|pixel| {
+                let v = &v[3 * index(pixel)..][..3];
                 Rgb::new(table[usize::from(v[0])], table[usize::from(v[1])], table[usize::from(v[2])])
-            }
-            (Texels::Floats(v), 1) => Rgb::splat(v[i]),
-            (Texels::Floats(v), _) => {
-                let v = &v[i..i + 3];
+            }),
+            (Texels::Floats(v), 1) => pixels.map(|pixel| Rgb::splat(v[index(pixel)])),
+            (Texels::Floats(v), _) => pixels.map(|pixel| {
+                let v = &v[3 * index(pixel)..][..3];
                 Rgb::new(v[0], v[1], v[2])
-            }
-            (Texels::Tiled(tiled), 1) => Rgb::splat(tiled.values::<1>(channels, pixel, table)[0]),
-            (Texels::Tiled(tiled), _) => Rgb::from_array(tiled.values(channels, pixel, table)),
+            }),
+            (Texels::Tiled(tiled), 1) => pixels.map(|pixel| Rgb::splat(tiled.values::<1>(channels, pixel, table)[0])),
+            (Texels::Tiled(tiled), _) => pixels.map(|pixel| Rgb::from_array(tiled.values(channels, pixel, table))),
         }
     }
 

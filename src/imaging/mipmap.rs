@@ -42,9 +42,25 @@ pub enum AxisWrap {
     Clamp,
 }
 
+impl Wrap {
+    /// The wrap of each axis, if none depends on the other one.
+    fn axes(self) -> Option<[AxisWrap; 2]> {
+        match self {
+            Wrap::Repeat => Some([AxisWrap::Repeat; 2]),
+            Wrap::Clamp => Some([AxisWrap::Clamp; 2]),
+            Wrap::Axes(axes) => Some(axes),
+            Wrap::Black | Wrap::OctahedralSphere => None,
+        }
+    }
+}
+
 impl AxisWrap {
     /// The pixel of 0..`count` that stands at `i`. Panics if there is none.
+    #[inline]
     pub fn pixel(self, i: i64, count: i64) -> i64 {
+        if (0..count).contains(&i) {
+            return i;
+        }
         match self {
             AxisWrap::Repeat => i.rem_euclid(count),
             AxisWrap::Mirror => {
@@ -113,8 +129,7 @@ impl MipMap {
                 Texels::Floats(values.map(|v| encoding.to_linear(v)).collect())
             }
         };
-        let level = Level { width, height, texels };
-        Self::with_base(level, positions.len(), wrap, filter, table)
+        Self::with_base(Level::new([width, height], texels), positions.len(), wrap, filter, table)
     }
 
     /// The pyramid that a file holds, of the channels at these positions, one or three, whose values `encoding` makes linear.
@@ -137,7 +152,7 @@ impl MipMap {
 
     /// One pixel of one channel.
     pub fn constant(value: f32, wrap: Wrap, filter: Filter) -> Self {
-        let level = Level { width: 1, height: 1, texels: Texels::Floats(vec![value]) };
+        let level = Level::new([1, 1], Texels::Floats(vec![value]));
         Self::with_base(level, 1, wrap, filter, Box::new(ColorEncoding::Linear.byte_table()))
     }
 
@@ -179,7 +194,7 @@ impl MipMap {
             Texels::Floats(_) | Texels::Tiled(_) => Texels::Floats(values),
             Texels::Bytes(_) => Texels::Bytes(values.iter().map(|&v| nearest.of(v)).collect()),
         };
-        Some(Level { width, height, texels })
+        Some(Level::new([width, height], texels))
     }
 
     /// Columns and rows of level 0.
@@ -218,56 +233,52 @@ impl MipMap {
     /// Linear colour of a pixel of a level, wrapped; grey if the map has one channel. Panics if there is no such level.
     pub fn texel(&self, level: usize, x: i64, y: i64) -> Rgb {
         let level = &self.levels[level];
-        let Some((x, y)) = self.wrap_pixel(level, x, y) else { return Rgb::BLACK };
-        level.color([x, y], self.channels, &self.table)
+        let Some(pixel) = self.wrap_pixel(level, x, y) else { return Rgb::BLACK };
+        let [color] = level.colors([pixel], self.channels, &self.table);
+        color
     }
 
     /// The pixel inside the image that stands at (x, y).
-    fn wrap_pixel(&self, level: &Level, x: i64, y: i64) -> Option<(usize, usize)> {
+    fn wrap_pixel(&self, level: &Level, x: i64, y: i64) -> Option<[usize; 2]> {
         let (w, h) = (level.width as i64, level.height as i64);
-        if (0..w).contains(&x) && (0..h).contains(&y) {
-            return Some((x as usize, y as usize));
+        if let Some([of_x, of_y]) = self.wrap.axes() {
+            return Some([of_x.pixel(x, w), of_y.pixel(y, h)].map(|i| i as usize));
         }
-        let (x, y) = match self.wrap {
-            Wrap::Repeat => (x.rem_euclid(w), y.rem_euclid(h)),
-            Wrap::Black => return None,
-            Wrap::Clamp => (x.clamp(0, w - 1), y.clamp(0, h - 1)),
-            Wrap::Axes([of_x, of_y]) => (of_x.pixel(x, w), of_y.pixel(y, h)),
-            Wrap::OctahedralSphere => {
-                // Each step over an edge mirrors the other axis; lookups go at most one image beyond.
-                let (mut x, mut y) = (x, y);
-                if x < 0 || x >= w {
-                    x = if x < 0 { -1 - x } else { 2 * w - 1 - x };
-                    y = h - 1 - y;
-                }
-                if y < 0 || y >= h {
-                    x = w - 1 - x;
-                    y = if y < 0 { -1 - y } else { 2 * h - 1 - y };
-                }
-                (x.clamp(0, w - 1), y.clamp(0, h - 1))
-            }
-        };
-        Some((x as usize, y as usize))
+        let is_inside = (0..w).contains(&x) && (0..h).contains(&y);
+        if is_inside || self.wrap == Wrap::Black {
+            return is_inside.then_some([x as usize, y as usize]);
+        }
+        // Each step over an edge of the octahedron mirrors the other axis; lookups go at most one image beyond.
+        let (mut x, mut y) = (x, y);
+        if x < 0 || x >= w {
+            x = if x < 0 { -1 - x } else { 2 * w - 1 - x };
+            y = h - 1 - y;
+        }
+        if y < 0 || y >= h {
+            x = w - 1 - x;
+            y = if y < 0 { -1 - y } else { 2 * h - 1 - y };
+        }
+        Some([x.clamp(0, w - 1) as usize, y.clamp(0, h - 1) as usize])
     }
 
-    /// Bilinear interpolation between the pixel centres of a level.
-    pub fn bilinear(&self, level: usize, st: Vec2) -> Rgb {
-        let Level { width, height, .. } = self.levels[level];
-        let (x, y) = (st.x * width as f32 - 0.5, st.y * height as f32 - 0.5);
-        let (x0, y0) = (x.floor(), y.floor());
-        let (dx, dy) = (x - x0, y - y0);
-        // A cast saturates, so that absurd or non-finite coordinates wrap somewhere instead of overflowing.
-        let limit = |v: f32| (v as i64).clamp(-(1 << 40), 1 << 40);
-        let (x0, y0) = (limit(x0), limit(y0));
-        let top = self.texel(level, x0, y0).lerp(self.texel(level, x0 + 1, y0), dx);
-        let bottom = self.texel(level, x0, y0 + 1).lerp(self.texel(level, x0 + 1, y0 + 1), dx);
-        top.lerp(bottom, dy)
+    /// Bilinear interpolation between the pixel centres of level `index`.
+    pub fn bilinear(&self, index: usize, st: Vec2) -> Rgb {
+        let level = &self.levels[index];
+        let ((x, dx), (y, dy)) = (floor(st.x * level.size.x - 0.5), floor(st.y * level.size.y - 0.5));
+        let [a, b, c, d] = match self.wrap.axes() {
+            Some([of_x, of_y]) => {
+                let [x0, x1] = [x, x + 1].map(|x| of_x.pixel(x, level.width as i64) as usize);
+                let [y0, y1] = [y, y + 1].map(|y| of_y.pixel(y, level.height as i64) as usize);
+                level.colors([[x0, y0], [x1, y0], [x0, y1], [x1, y1]], self.channels, &self.table)
+            }
+            None => [[x, y], [x + 1, y], [x, y + 1], [x + 1, y + 1]].map(|[x, y]| self.texel(index, x, y)),
+        };
+        a.lerp(b, dx).lerp(c.lerp(d, dx), dy)
     }
 
     fn nearest(&self, level: usize, st: Vec2) -> Rgb {
-        let Level { width, height, .. } = self.levels[level];
-        let limit = |v: f32| (v.floor() as i64).clamp(-(1 << 40), 1 << 40);
-        self.texel(level, limit(st.x * width as f32), limit(st.y * height as f32))
+        let at = st * self.levels[level].size;
+        self.texel(level, floor(at.x).0, floor(at.y).0)
     }
 
     /// `st` without whole periods of an image that repeats, where they would leave few bits of an f32 for the rest.
@@ -287,23 +298,42 @@ impl MipMap {
             Filter::Ewa => 0.5 * (width.x + width.y),
         };
         // pbrt-v4 takes twice the derivative as the width of the filter.
-        let top = (self.levels.len() - 1) as f32;
-        let level = top + (2.0 * extent).max(1e-8).log2();
-        if level >= top {
-            return self.texel(self.levels.len() - 1, 0, 0);
+        let extent = (2.0 * extent).max(1e-8);
+        let top = self.levels.len() - 1;
+        // ⌊log₂⌋ of a positive float is its exponent, less 127; little below a power of two, log₂ is rounded up to it
+        let bits = extent.to_bits();
+        let below = match bits & 0x7f_ff00 {
+            0x7f_ff00 => (top as f32 + extent.log2()).floor() as isize,
+            _ => top as isize + (bits >> 23) as isize - 127,
+        };
+        if below >= top as isize {
+            return self.texel(top, 0, 0);
         }
-        let level = level.max(0.0);
-        let below = level as usize;
+        let below = below.max(0) as usize;
         match self.filter {
             Filter::Point => self.nearest(below, st),
             Filter::Bilinear => self.bilinear(below, st),
             Filter::Trilinear | Filter::Ewa => {
                 let fine = self.bilinear(below, st);
-                let delta = level - below as f32;
-                if delta == 0.0 { fine } else { fine.lerp(self.bilinear(below + 1, st), delta) }
+                let delta = top as f32 + extent.log2() - below as f32;
+                if delta <= 0.0 { fine } else { fine.lerp(self.bilinear(below + 1, st), delta) }
             }
         }
     }
+}
+
+/// ⌊v⌋ and v − ⌊v⌋.
+#[inline]
+fn floor(v: f32) -> (i64, f32) {
+    /// From here on all floats are integers.
+    const WHOLE: f32 = (1 << 23) as f32;
+    // Adding and taking away rounds. Without SSE 4.1, `f32::floor` is a call of a function whose branches are hard to
+    // predict. A cast to an integer and back would wait for the lookup before: x86 keeps the rest of the register.
+    let large = WHOLE.copysign(v);
+    let near = (v + large) - large;
+    let floor = if v.abs() < WHOLE { near - if near > v { 1.0 } else { 0.0 } } else { v };
+    // The cast saturates, so that absurd or non-finite coordinates wrap somewhere instead of overflowing.
+    (i64::from(floor as i32), v - floor)
 }
 
 /// Source pixels under pixel `i` of `n` over a source of `m` pixels, with their fractions of its area.
@@ -386,6 +416,38 @@ mod tests {
         assert_eq!(at(mixed, 5.125, -0.75), at(Wrap::Clamp, 0.125, 0.75));
         assert_eq!(at(Wrap::Repeat, f32::NAN, 0.2), Rgb::BLACK);
         assert!(at(Wrap::Repeat, 1e30, -1e30).is_finite());
+    }
+
+    #[test]
+    fn bilinear_lookups_are_those_of_four_texels_at_and_beyond_edges() {
+        let mixed = Wrap::Axes([AxisWrap::Mirror, AxisWrap::Clamp]);
+        for (w, h) in [(1, 1), (4, 4), (7, 3)] {
+            let image = image(w, h, |x, y| [x as f32, y as f32, (x * y) as f32]);
+            for wrap in [Wrap::Repeat, Wrap::Black, Wrap::Clamp, Wrap::OctahedralSphere, mixed] {
+                let map = map(&image, wrap, Filter::Bilinear);
+                for i in 0..2000 {
+                    let st = Vec2::new(i as f32 * 0.0113 - 7.0, i as f32 * 0.0071 - 5.0);
+                    let v = st * Vec2::new(w as f32, h as f32) - 0.5;
+                    let ([x, y], d) = (v.floor().to_array().map(|i| i as i64), v - v.floor());
+                    let row = |y| map.texel(0, x, y).lerp(map.texel(0, x + 1, y), d.x);
+                    assert_eq!(map.lookup(st, Vec2::ZERO), row(y).lerp(row(y + 1), d.y), "{wrap:?} {st}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn floors_are_those_of_the_standard_library() {
+        for i in 0..60_000_u32 {
+            for v in [f32::from_bits(i << 16), -f32::from_bits(i << 16), i as f32 * 0.25 - 7000.0].map(|v| v + 0.0) {
+                let whole = v.floor();
+                let (floor, rest) = floor(v);
+                assert!(
+                    floor == i64::from(whole as i32) && rest.to_bits() == (v - whole).to_bits() || v.is_nan(),
+                    "{v}"
+                );
+            }
+        }
     }
 
     #[test]
