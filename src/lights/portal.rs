@@ -501,7 +501,7 @@ mod tests {
                     observed[y * N + x] += 1.0;
                 }
 
-                // The density is constant between the edges of these cells and of those of the table
+                // The density is constant between the edges of these cells and of the table's cells
                 let edges = |k: usize| {
                     let own = (0..=N).map(|i| low[k] + (high[k] - low[k]) * i as f64 / N as f64);
                     let table = (0..=light.cells).map(|i| i as f64 / light.cells as f64);

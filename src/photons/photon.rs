@@ -1,6 +1,6 @@
 //! A photon in 28 bytes: power, position, direction, and last scattering event.
 //!
-//! | bits | what |
+//! | bits | content |
 //! |---|---|
 //! | 3 × 32 | position |
 //! | 28 + 28 | direction and normal, by [`lumiris_numbers::math::octahedral`]: within 2.7·10⁻⁴ rad |

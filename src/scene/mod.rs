@@ -52,7 +52,7 @@ pub struct Scene {
     pub origin: DVec3,
 }
 
-/// Names of what a file lets people choose from, by their indices. A pbrt file has no choice.
+/// Cameras and scenes of a file that users can choose from, by index. A pbrt file has none.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Choices {
     /// Names of the file's cameras; empty strings for unnamed ones.

@@ -11,8 +11,8 @@ pub struct PixelSamples {
     pub spp: u32,
     /// Sample counts, row by row, at least 1.
     pub counts: Vec<u32>,
-    /// Emission rays: camera rays per sample that measure the emission of directly visible lights, row by row, at least
-    /// 1. If the list is empty, the count is 1 everywhere. One of the rays continues as the path of the sample.
+    /// Emission rays: camera rays per sample that measure the emission of directly visible lights, row by row, never 0.
+    /// If the list is empty, the count is 1 everywhere. One of the rays continues as the path of the sample.
     pub looks: Vec<u8>,
 }
 

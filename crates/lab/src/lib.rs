@@ -1,7 +1,7 @@
-//! Experiments: figures of papers, reproduced by rendering and measuring, and the scenes for them.
+//! Experiments: figures of papers, reproduced by rendering and measurement, and their scenes.
 //!
 //! [`procedural`] generates content (a statue, skies, adjacent rooms), [`sphere_study`] estimates a sphere by BSDF
-//! sampling alone, and [`reproduce`] measures figures and writes them as a page.
+//! sampling only, and [`reproduce`] measures figures and writes them as a page.
 
 pub mod procedural;
 pub mod reproduce;

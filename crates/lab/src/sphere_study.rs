@@ -1,24 +1,24 @@
-//! Images and variances of a sphere lit from far away, estimated by BSDF sampling alone [Talbot et al. 2005, Fig. 5].
+//! Images and variances of a distantly lit sphere, estimated by BSDF sampling only [Talbot et al. 2005, Fig. 5].
 //!
-//! The sphere is seen along −z by parallel rays through the centres of the pixels. Each estimate of a pixel is f |cos
+//! The sphere is viewed along −z by parallel rays through the centres of the pixels. Each estimate of a pixel is f |cos
 //! θ| L(wi) W for one direction that [`lumiris::bsdfs::resample()`] draws from M proposals (N = 1), so that all
-//! variance is that of direction sampling. Nothing is traced: light comes from infinity and is unoccluded.
+//! variance is due to direction sampling. Nothing is traced: light comes from infinity and is unoccluded.
 
 use lumiris::bsdfs::{Bsdf, resample};
 use lumiris_numbers::math::{Frame, Rgb, Vec3};
 use lumiris_numbers::samplers::{SampleStream, SamplerKind};
 use rayon::prelude::*;
 
-/// Domains below the stream of an estimate.
+/// Random-number domains of an estimate.
 mod domain {
     pub(super) const PROPOSAL: u32 = 0;
     pub(super) const CHOICE: u32 = 1;
 }
 
-/// Part of the image's half-width that the sphere fills.
+/// Radius of the sphere relative to the image's half-width.
 const RADIUS: f32 = 0.96;
 
-/// How a sphere is estimated.
+/// Settings of the estimates of a sphere.
 #[derive(Clone, Copy, Debug)]
 pub struct SphereSettings {
     /// Proposals per estimate (M); 1 is plain importance sampling.
@@ -38,11 +38,11 @@ pub struct SphereStudy {
     pub width: u32,
     /// Height in pixels.
     pub height: u32,
-    /// Radiance: mean of the estimates, row-major from the top left; black beside the sphere.
+    /// Radiance: mean of the estimates, row-major from the top left; black outside the sphere.
     pub pixels: Vec<Rgb>,
-    /// Unbiased variance of one estimate; 0 beside the sphere and if there is one estimate per pixel.
+    /// Unbiased variance of one estimate; 0 outside the sphere and with one estimate per pixel.
     pub variance: Vec<Rgb>,
-    /// Whether the pixel shows the sphere.
+    /// True if the pixel is covered by the sphere.
     pub covered: Vec<bool>,
 }
 
@@ -67,7 +67,7 @@ impl SphereStudy {
     }
 }
 
-/// A sphere of `bsdf` under light of radiance `l(wi)` from the direction `wi`; the viewer is at +z and y is up.
+/// A sphere with `bsdf` under incident radiance `l(wi)` from the direction `wi`; the viewer is at +z and y is up.
 pub fn sphere_image(bsdf: &Bsdf<'_>, l: &(dyn Fn(Vec3) -> Rgb + Sync), settings: &SphereSettings) -> SphereStudy {
     let SphereSettings { size, .. } = *settings;
     let pixels: Vec<Option<[Rgb; 2]>> = (0..size * size)
@@ -86,7 +86,7 @@ pub fn sphere_image(bsdf: &Bsdf<'_>, l: &(dyn Fn(Vec3) -> Rgb + Sync), settings:
     }
 }
 
-/// Normal of the sphere at the centre of a pixel; `None` beside it.
+/// Normal of the sphere at the centre of a pixel; `None` outside it.
 fn normal(pixel: [u32; 2], size: u32) -> Option<Vec3> {
     let [x, y] = pixel.map(|p| (2.0 * (p as f32 + 0.5) / size as f32 - 1.0) / RADIUS);
     let z2 = 1.0 - x * x - y * y;
@@ -105,7 +105,7 @@ fn estimate(
     let wo = frame.to_local(Vec3::Z);
     let (mut mean, mut m2) = ([0.0_f64; 3], [0.0_f64; 3]);
     for sample in 0..settings.spp {
-        // Independent numbers, so that the variance is that of the estimator and not of the sequence.
+        // Independent numbers, so that the variance is due to the estimator and not to the sequence.
         let stream = SampleStream::new(SamplerKind::Independent, pixel, sample, settings.seed);
         let proposal = |j| stream.split(domain::PROPOSAL, settings.proposals, j).draw::<3>();
         let [u_choice] = stream.domain(domain::CHOICE).draw::<1>();
@@ -147,7 +147,7 @@ mod tests {
         ]
     }
 
-    /// Light that differs by direction.
+    /// Incident radiance that varies with direction.
     fn uneven(wi: Vec3) -> Rgb {
         Rgb::new(1.0 + wi.x, 1.0, 0.3 + 0.5 * (wi.y + 1.0))
     }
@@ -164,7 +164,7 @@ mod tests {
                 for (under, l) in [("uniform", (|_| Rgb::WHITE) as fn(Vec3) -> Rgb), ("uneven", uneven)] {
                     let [one, eight, twenty] = [1, 8, 20].map(|m| study(model, density, l, m));
                     let v = [&one, &eight, &twenty].map(|s| s.mean_variance()[1]);
-                    // What f alone cannot tell stays: differences of colour, and those of the light.
+                    // Resampling by f does not remove the variance of colour differences and of the incident radiance.
                     let limit = if under == "uniform" { 0.3 } else { 0.5 };
                     assert!(v[2] < limit * v[0], "{name} {density:?} {under}: {v:?}");
                     assert!(v[2] < v[1] && v[1] < v[0], "{name} {density:?} {under}: {v:?}");
@@ -181,10 +181,10 @@ mod tests {
         assert!((mean[0] - 0.9).abs() < 5e-3 && (mean[1] - 0.5).abs() < 5e-3, "{mean:?}");
         assert_eq!(sphere.pixels.len(), 32 * 32);
         assert!(!sphere.covered[0] && sphere.pixels[0].is_black() && sphere.covered[16 * 32 + 16]);
-        // A cosine-free uniform density costs a Lambertian a relative variance of 4/3 − 1.
+        // A uniform density without the cosine gives a Lambertian a relative variance of 4/3 − 1.
         let uniform = study(Model::Diffuse(RED), ProposalDensity::Uniform, white, 1);
         assert!((uniform.mean_variance()[0] / 0.81 - 1.0 / 3.0).abs() < 0.02, "{:?}", uniform.mean_variance());
-        // The same twice, and another image for another seed.
+        // The same image twice, and another image for another seed.
         assert_eq!(study(Model::Diffuse(RED), ProposalDensity::Lobes, white, 8).pixels, sphere.pixels);
         let bsdf = Bsdf::Evaluated(Evaluated { model: Model::Diffuse(RED), density: ProposalDensity::Lobes });
         let other = SphereSettings { proposals: 8, spp: 64, size: 32, seed: 5 };

@@ -1,5 +1,5 @@
-//! Nanoseconds per shading point of optimizing control variates: sums over its samples, and the system, of many points
-//! at a time and of one.
+//! Time per shading point of optimizing control variates (ns): sums over its samples, and the system, for many points
+//! at a time and for one.
 //!
 //! `cargo bench --bench ocv`
 #![allow(clippy::print_stdout, missing_docs)]
@@ -12,7 +12,7 @@ use std::time::Instant;
 const POINTS: usize = 4096;
 const RUNS: u32 = 9;
 
-/// Best of several runs over all points, in nanoseconds per point.
+/// The minimum over several runs of all points, in nanoseconds per point.
 fn time(mut run: impl FnMut()) -> f64 {
     let mut best = f64::INFINITY;
     for _ in 0..RUNS {

@@ -1,4 +1,4 @@
-//! Bias and variance of optimizing control variates on integrals of known value: the tables of
+//! Bias and variance of optimizing control variates on integrals with known values: the tables of
 //! `docs/measurements/ocv/README.md`.
 //!
 //! `cargo run --release --example ocv_tables -- [forms|first|later|shared]`
@@ -25,7 +25,7 @@ fn main() {
     }
 }
 
-/// Moments of several estimates from each of `runs`, of their first channel.
+/// Moments of the first channel of K estimates, over `runs` runs.
 fn moments<const K: usize>(runs: usize, key: u32, mut run: impl FnMut(&mut Pcg32) -> [f32; K]) -> [Welford; K] {
     let (mut stream, mut welford) = (pcg32([40, key, 0]), [Welford::new(); K]);
     for _ in 0..runs {
@@ -34,7 +34,7 @@ fn moments<const K: usize>(runs: usize, key: u32, mut run: impl FnMut(&mut Pcg32
     welford
 }
 
-/// The first channel of the estimate of a form with the coefficients that `system` gives of the same `rows` of sums of
+/// The first channel of the estimate of a form. `system` determines the coefficients from the same `rows` of sums of
 /// r_j.
 fn estimate(form: Form, system: System, sampler: &Sampler, rows: &[f32]) -> f32 {
     let equations = sampler.equations;
@@ -92,7 +92,7 @@ fn forms() {
     }
 }
 
-/// Estimates of MIS and of the progressive form over the first `passes`, with one system.
+/// Estimates of MIS and of the progressive form over the first `passes` passes, with one system.
 fn progressive(sampler: &Sampler, passes: u32, system: System, stream: &mut Pcg32) -> [[f32; 3]; 2] {
     let equations = sampler.equations;
     let (mut all, mut sums) = (vec![0.0; equations.len()], vec![0.0; equations.len()]);
@@ -121,7 +121,7 @@ fn ratio(sampler: &Sampler, passes: u32, system: System, runs: usize) -> f64 {
     worst
 }
 
-/// Variance of the mean of the first four passes over that of MIS, for several systems.
+/// Ratio of the variance of the mean of the first four passes to MIS, for several systems.
 fn first_passes() {
     let ridge = |ridge| System { matrix: Matrix::KnownMeans, ridge, shrink: 0.0 };
     let systems = [
@@ -148,7 +148,7 @@ fn first_passes() {
     }
 }
 
-/// Variance of all passes so far over that of MIS.
+/// Ratio of the variance of all passes so far to MIS.
 fn later_passes() {
     println!("\n## Variance of the mean of all passes over that of MIS\n");
     println!("| integral | N | samples | 2 | 4 | 8 | 16 | 64 passes |\n|---|---|---|---|---|---|---|---|");
@@ -166,7 +166,8 @@ fn later_passes() {
     }
 }
 
-/// Sums of `pixels` whose occluders differ by up to `spread`, shared or not: variance of the mean of four passes.
+/// Variance of the mean of four passes, with sums of `pixels` pixels whose occluders differ by up to `spread`, shared
+/// or separate.
 fn shared_sums() {
     println!("\n## Sums shared by pixels, mean of the first four passes: variance over that of MIS\n");
     println!(
@@ -194,7 +195,7 @@ fn shared_sums() {
                             for (sampler, row) in samplers.iter().zip(&mut rows) {
                                 sampler.block(Form::Progressive, len, stream, row);
                             }
-                            // The last pixel is watched, whose occluder is at the end of the range.
+                            // The last pixel is measured; its occluder is at the end of the range.
                             let last = &rows[pixels - 1];
                             total[0] += equations.mean(last)[0] * len as f32 / 4.0;
                             total[1] += equations.estimate(last, &beta)[0] * len as f32 / 4.0;

@@ -1,6 +1,6 @@
 //! The numerics of Lumiris: numbers in, numbers out. Nothing here depends on scenes, rays, files, or foreign code.
 //!
-//! | module | what it holds |
+//! | module | content |
 //! |---|---|
 //! | [`math`] | vectors, frames, colour, warps with their densities, tabulated distributions, robust ray origins |
 //! | [`estimators`] | Monte Carlo, MIS, RIS, OCV and their relatives; running moments and statistical tests |

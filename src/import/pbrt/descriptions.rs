@@ -214,7 +214,7 @@ pub struct EnvironmentDesc {
     pub index: usize,
 }
 
-/// An object: what `ObjectBegin` … `ObjectEnd` define.
+/// An object, defined by `ObjectBegin` … `ObjectEnd`.
 #[derive(Clone, Debug)]
 pub struct ObjectDesc {
     /// Name.

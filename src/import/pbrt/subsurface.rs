@@ -17,7 +17,7 @@ use lumiris_numbers::math::Rgb;
 const COLORS: [&str; 4] = ["sigma_a", "sigma_s", "reflectance", "mfp"];
 /// Default index of refraction.
 const ETA: f32 = 1.33;
-/// Default σ_a and σ_s, as in pbrt-v4 (1/mm): those of milk.
+/// Default σ_a and σ_s, as in pbrt-v4 (1/mm): milk.
 const DEFAULT: [Rgb; 2] = [Rgb::new(0.0011, 0.0024, 0.014), Rgb::new(2.55, 3.21, 3.77)];
 
 impl Builder<'_> {

@@ -57,7 +57,7 @@ pub enum BsdfFileError {
     Wrong {
         /// The file.
         path: PathBuf,
-        /// What is wrong.
+        /// The error.
         error: TensorError,
     },
 }

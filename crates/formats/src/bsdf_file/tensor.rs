@@ -1,6 +1,6 @@
 //! The container: named arrays of little-endian numbers.
 //!
-//! | bytes | what |
+//! | bytes | content |
 //! |---|---|
 //! | 12 | `tensor_file` and a zero |
 //! | 1, 1 | version: 1, 0 |

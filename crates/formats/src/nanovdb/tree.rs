@@ -2,7 +2,7 @@
 //!
 //! | | bytes |
 //! |---|---|
-//! | grid | magic number 0..8, version 16, size 32, name 40, matrix 384 (64 bits each), what is added 528, box 560, class 632, type 636 |
+//! | grid | magic number 0..8, version 16, size 32, name 40, matrix 384 (64 bits each), translation 528, box 560, class 632, type 636 |
 //! | tree, at 672 | offsets from here: leaves 0, nodes of 16³ 8, of 32³ 16, root 24 |
 //! | root | active voxels: first 0, last 12; number of entries 24, background; then entries of 32 bytes |
 //! | entry of it | key 0, child 8 (from the root; 0 for a tile), value |

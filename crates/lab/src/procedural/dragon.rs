@@ -1,6 +1,6 @@
 //! A dragon that winds up a carved column on a pedestal: the parts of the statue.
 //!
-//! z is up and the head looks towards −y. Lengths are in units of space (about metres); angles count from +x to +y.
+//! z is up and the head faces −y. Lengths are in units of space (about metres); angles are measured from +x to +y.
 
 use super::head::{Head, head_parts};
 use super::limbs::{knot, limb, part, tuft};
@@ -20,9 +20,9 @@ pub const HIGH: Vec3 = Vec3::new(1.06, 1.06, HEIGHT);
 const FLOOR: f32 = 0.46;
 /// Radius of the shaft.
 const SHAFT: f32 = 0.3;
-/// Turns of the body around the shaft.
+/// Number of windings of the body around the shaft.
 const TURNS: f32 = 3.25;
-/// Angle of the last turn's end.
+/// Angle of the end of the last winding.
 const END_ANGLE: f32 = 0.36 * PI;
 
 /// The point at an angle, a distance from the axis, and a height.
@@ -30,7 +30,7 @@ fn around(angle: f32, radius: f32, z: f32) -> Vec3 {
     Vec3::new(radius * angle.cos(), radius * angle.sin(), z)
 }
 
-/// All parts, in the order in which they are joined.
+/// All parts, in the order of their union.
 pub fn parts() -> Vec<Part> {
     let body = body();
     let tip = body[body.len() - 1];
@@ -45,7 +45,7 @@ pub fn parts() -> Vec<Part> {
         part(tail_tuft(&body), Relief::Strands { around: 5.0, height: 0.004 }, 0.012),
         part(mane(&body), Relief::Strands { around: 5.0, height: 0.004 }, 0.012),
     ];
-    // Where the legs leave the body, as parts of its winding, and whether they reach ahead
+    // Positions of the legs, as fractions of the winding, and whether they reach forward
     for (at, direction) in [(0.44, 1.0), (0.5, -1.0), (0.77, 1.0), (0.83, -1.0)] {
         let [limb, claws, flames] = leg(&body, at, direction);
         parts.push(part(limb, Relief::Scales { around: 13.0, height: 0.1 }, 0.025));
@@ -114,7 +114,7 @@ fn body() -> Vec<Knot> {
         let t = i as f32 / windings as f32;
         let angle = END_ANGLE - TAU * TURNS * (1.0 - t);
         let radius = 0.022 + 0.13 * (1.0 - (1.0 - (t / 0.6).min(1.0)).powi(2)) - 0.012 * (t - 0.6).max(0.0);
-        // On the floor first, then up
+        // On the floor first, then upwards
         let lying = (1.0 - t / 0.3).clamp(0.0, 1.0);
         let lying = lying * lying * (3.0 - 2.0 * lying);
         let wave = 0.05 * (4.0 * angle).sin() * lying;
@@ -137,7 +137,7 @@ fn body() -> Vec<Knot> {
     spline(&points, 5)
 }
 
-/// The knot of the body at a part of its winding, and its direction.
+/// The knot of the body at a fraction of its winding, and its direction.
 fn body_at(body: &[Knot], t: f32) -> (Knot, Vec3) {
     let i = ((body.len() - 1) as f32 * t) as usize;
     let (low, high) = (i.saturating_sub(1), (i + 1).min(body.len() - 1));

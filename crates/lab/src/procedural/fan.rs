@@ -1,4 +1,4 @@
-//! The scenes of `scenes/fan`, after those of [Fan et al. 2006]: a glossy board under a large light and a small one, a
+//! The scenes of `scenes/fan`, after [Fan et al. 2006]: a glossy board under a large light and a small one, a
 //! statue with narrow highlights, a room with small lights, a box for irradiance caching.
 
 use super::files::{ProceduralError, Written, write_statue, write_texts};

@@ -8,7 +8,7 @@ use lumiris_formats::output::write_text;
 use std::io;
 use std::path::{Path, PathBuf};
 
-/// What kept content from being made.
+/// Errors of generated content.
 #[derive(Debug, thiserror::Error)]
 pub enum ProceduralError {
     /// An option is out of range.
@@ -19,7 +19,7 @@ pub enum ProceduralError {
     Io {
         /// The file.
         path: PathBuf,
-        /// Why.
+        /// The reason.
         cause: io::Error,
     },
     /// An image cannot be written.
@@ -27,7 +27,7 @@ pub enum ProceduralError {
     Image(#[from] ImageError),
 }
 
-/// What was written.
+/// Statistics of the written files.
 #[derive(Clone, Copy, Debug)]
 pub struct Written {
     /// Triangles of the statue.
@@ -48,7 +48,7 @@ pub fn write_sky(path: &Path, options: &SkyOptions) -> Result<(), ProceduralErro
     Ok(write_image(path, &[part])?)
 }
 
-/// Writes files, by name and text, into a folder, which is made if there is none.
+/// Writes files, by name and text, into a folder, which is created if necessary.
 pub(super) fn write_texts(folder: &Path, texts: &[(&str, &str)]) -> Result<(), ProceduralError> {
     let failed = |path: &Path| {
         let path = path.to_owned();

@@ -5,7 +5,7 @@ use super::relief::Relief;
 use super::solids::{Part, Stroke};
 use lumiris_numbers::math::Vec3;
 
-/// Where the head is. Its parts are placed by (forward, sideways, up) in units of `size`.
+/// The frame of the head. Its parts are positioned by (forward, sideways, up) in units of `size`.
 pub(super) struct Head {
     origin: Vec3,
     forward: Vec3,
@@ -15,7 +15,7 @@ pub(super) struct Head {
 }
 
 impl Head {
-    /// A head at `origin` that looks along `forward`.
+    /// A head at `origin` that faces `forward`.
     pub(super) fn new(origin: Vec3, forward: Vec3, up: Vec3, size: f32) -> Self {
         let forward = forward.normalize();
         let up = (up - forward * forward.dot(up)).normalize();
@@ -37,7 +37,7 @@ impl Head {
         limb(&points, self.up, steps)
     }
 
-    /// The same on both sides.
+    /// The same stroke on both sides.
     fn both(&self, points: &[[f32; 4]], steps: usize) -> Vec<Stroke> {
         let mirrored: Vec<[f32; 4]> = points.iter().map(|&[f, s, u, r]| [f, -s, u, r]).collect();
         [self.stroke(points, steps), self.stroke(&mirrored, steps)].concat()
@@ -55,7 +55,7 @@ impl Head {
     }
 }
 
-/// The parts of a head, in the order in which they are joined.
+/// The parts of a head, in the order of their union.
 pub(super) fn head_parts(head: &Head) -> Vec<Part> {
     vec![
         part(skull(head), Relief::Skin { height: 0.004 }, 0.03),

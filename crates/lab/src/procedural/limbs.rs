@@ -1,10 +1,10 @@
-//! Strokes and parts that the dragon and its head are put together from.
+//! Strokes and parts of the dragon and its head.
 
 use super::relief::Relief;
 use super::solids::{Knot, Part, Shape, Stroke, spline, strokes};
 use lumiris_numbers::math::Vec3;
 
-/// A knot of a curve that is not finished: dorsal vectors need not be perpendicular.
+/// A knot of an unfinished curve: dorsal vectors need not be perpendicular.
 pub(super) fn knot(center: Vec3, radius: f32, dorsal: Vec3) -> Knot {
     Knot { center, radius, dorsal, along: 0.0 }
 }

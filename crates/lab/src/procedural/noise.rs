@@ -29,7 +29,7 @@ fn gradient(hash: u32, v: Vec3) -> f32 {
 
 /// Gradient noise: continuous to the second derivative, 0 at lattice points.
 pub fn noise(p: Vec3, seed: u32) -> f32 {
-    // `floor` is a call of a library where there is no SSE 4.1.
+    // `floor` is a library call without SSE 4.1.
     let floor = |x: f32| x as i32 - i32::from(x < 0.0);
     let (x, y, z) = (floor(p.x), floor(p.y), floor(p.z));
     let f = p - Vec3::new(x as f32, y as f32, z as f32);
@@ -59,7 +59,7 @@ fn octave_sum(p: Vec3, octaves: u32, seed: u32, shape: impl Fn(f32) -> f32) -> f
         sum += weight * shape(noise(q, seed.wrapping_add(octave)));
         weights += weight;
         weight *= 0.5;
-        // An offset keeps the lattice points, where all octaves vanish, apart.
+        // An offset separates the lattice points of the octaves, where they vanish.
         q = q * 2.0 + Vec3::new(17.31, 5.77, 11.93);
     }
     sum / weights

@@ -5,7 +5,7 @@ use lumiris_formats::output::write_whole;
 use std::io::{self, BufWriter, Write};
 use std::path::Path;
 
-/// Writes a mesh. Either the whole file appears under its name, or none.
+/// Writes a mesh. The file is written completely or not at all.
 pub fn write_ply(path: &Path, mesh: &TriangleMesh) -> io::Result<()> {
     write_whole(path, |file| {
         let mut file = BufWriter::with_capacity(1 << 20, file);

@@ -11,13 +11,13 @@ pub struct Spot {
     pub p: Vec3,
     /// Angle around the axis, −π..π; 0 is the back of an animal.
     pub angle: f32,
-    /// Coordinate along the axis: in radii for strokes, z for turned parts.
+    /// Coordinate along the axis: in radii for strokes, z for solids of revolution.
     pub along: f32,
     /// Radius.
     pub radius: f32,
 }
 
-/// What is carved.
+/// The kind of relief.
 #[derive(Clone, Copy, Debug)]
 pub enum Relief {
     /// Overlapping scales, and plates on the belly.
@@ -29,7 +29,7 @@ pub enum Relief {
     },
     /// Rings across, as on horns.
     Rings {
-        /// Rings per radius of way.
+        /// Rings per radius of length.
         frequency: f32,
         /// Height (units of space).
         height: f32,
@@ -203,7 +203,7 @@ fn key(x: f32, t: f32) -> f32 {
     low + (high - low) * fy
 }
 
-/// The bands of the pedestal by height; [`super::dragon`] turns its profile.
+/// The bands of the pedestal by height; [`super::dragon`] has its profile.
 fn pedestal(spot: &Spot) -> f32 {
     let (a, z) = (spot.angle, spot.along);
     if z > 0.445 {

@@ -1,14 +1,14 @@
-//! Solids for sculptures, as distance functions: strokes (round cones) and turned profiles.
+//! Solids for sculptures, as distance functions: strokes (round cones) and solids of revolution.
 //!
-//! The distance of a stroke is that to the sphere at the nearest point of its axis; it changes by at most √(1 +
-//! (Δr/l)²) per unit length, l being the length and Δr the change of the radius. Parts are joined by the smooth minimum
-//! min(a, b) − k h²/4, h = max(1 − |a − b|/k, 0) [Quilez 2013], which equals the minimum where they differ by k or
+//! The distance of a stroke is the distance to the sphere at the nearest point of its axis. It changes by at most √(1 +
+//! (Δr/l)²) per unit length, where l is the length and Δr the change of the radius. Parts are merged by the smooth
+//! minimum min(a, b) − k h²/4, h = max(1 − |a − b|/k, 0) [Quilez 2013], which equals the minimum if they differ by k or
 //! more.
 
 use super::relief::{Relief, Spot};
 use lumiris_numbers::math::{Vec2, Vec3};
 
-/// Largest change of any distance here per unit of way.
+/// Maximum change of any distance here per unit length.
 pub const LIPSCHITZ: f32 = 1.16;
 
 /// An end of a stroke.
@@ -32,7 +32,7 @@ pub struct Stroke {
 }
 
 impl Stroke {
-    /// Distance of a point from the surface (negative inside), and the place along the axis, 0..1.
+    /// Distance of a point from the surface (negative inside), and the position along the axis, 0..1.
     #[inline]
     pub fn distance(&self, p: Vec3) -> (f32, f32) {
         let [a, b] = &self.knots;
@@ -41,7 +41,7 @@ impl Stroke {
         ((p - a.center - axis * t).length() - (a.radius + (b.radius - a.radius) * t), t)
     }
 
-    /// What carvings may know of the point at `t`.
+    /// The coordinates at `t` for carving.
     fn spot(&self, p: Vec3, t: f32) -> Spot {
         let [a, b] = &self.knots;
         let axis = b.center - a.center;
@@ -54,7 +54,7 @@ impl Stroke {
     }
 }
 
-/// A polygon of (distance from the z axis, z), turned about the z axis.
+/// A solid of revolution: a polygon of (distance from the z axis, z), rotated about the z axis.
 #[derive(Clone, Debug)]
 pub struct Turned {
     /// The corners, counter-clockwise; the first and the last lie on the axis.
@@ -62,7 +62,7 @@ pub struct Turned {
 }
 
 impl Turned {
-    /// Distance from the surface, negative inside: exact. The side along the axis is no surface.
+    /// Distance from the surface, negative inside: exact. The side along the axis is not a surface.
     pub fn distance(&self, p: Vec3) -> f32 {
         let q = Vec2::new(p.truncate().length(), p.z);
         let (mut nearest, mut inside) = (f32::INFINITY, false);
@@ -80,29 +80,28 @@ impl Turned {
     }
 }
 
-/// What a part is made of.
+/// The shape of a part.
 #[derive(Clone, Debug)]
 pub enum Shape {
     /// The union of strokes.
     Strokes(Vec<Stroke>),
-    /// A turned profile.
+    /// A solid of revolution.
     Turned(Turned),
 }
 
 /// A carved solid.
 #[derive(Clone, Debug)]
 pub struct Part {
-    /// The solid before it is carved.
+    /// The solid before carving.
     pub shape: Shape,
-    /// What is carved into it.
+    /// The relief carved into it.
     pub relief: Relief,
-    /// Width of the fillet to the parts before it.
+    /// Width of the fillet to the previous parts.
     pub blend: f32,
 }
 
 impl Part {
-    /// Distance after carving, or `None` if it is certainly more than `limit`. Of strokes only those of `selected`
-    /// count.
+    /// Distance after carving; `None` if it is certainly more than `limit`. Only the `selected` strokes count.
     pub fn distance(&self, selected: &[u32], p: Vec3, limit: f32) -> Option<f32> {
         let amplitude = self.relief.amplitude();
         match &self.shape {
@@ -157,7 +156,7 @@ pub fn spline(points: &[Knot], steps: usize) -> Vec<Knot> {
     knots
 }
 
-/// Makes the dorsal vectors unit and perpendicular to the curve, and counts `along` in radii: ∫ ds/r.
+/// Makes the dorsal vectors unit and perpendicular to the curve, and computes `along` in radii: ∫ ds/r.
 fn finish(knots: &mut [Knot]) {
     let mut along = 0.0;
     for i in 0..knots.len() {

@@ -1,9 +1,9 @@
-//! A statue of fine detail: a dragon on a carved column ([`dragon`]), meshed at a resolution of choice.
+//! A finely detailed statue: a dragon on a carved column ([`dragon`]), meshed at a selectable resolution.
 //!
 //! The distance of the statue is the smooth minimum over its carved parts. In a ball of radius R, with L the bound of
-//! [`solids`](super::solids), only those strokes of a part can be the nearest whose distance from the centre is within
-//! 2LR of the least, and only those parts matter that are within 2LR + amplitudes + fillets of the nearest. Leaving
-//! the others out does not change a bit of the result.
+//! [`solids`](super::solids), only strokes of a part within 2LR of the minimum distance from the centre can be the
+//! nearest. Only parts within 2LR + amplitudes + fillets of the nearest one affect the result. Omitting the others
+//! leaves the result bit-identical.
 
 use super::dragon;
 use super::nets::{Ball, Field, Grid, largest_piece, mesh_field};
@@ -14,12 +14,12 @@ use lumiris_numbers::math::Vec3;
 /// Default of [`StatueOptions::detail`].
 pub const DEFAULT_DETAIL: u32 = 480;
 
-/// How the statue is made.
+/// Parameters of the statue.
 #[derive(Clone, Copy, Debug)]
 pub struct StatueOptions {
     /// Cells of the grid along its height, 8..=4096. The number of triangles grows with its square.
     pub detail: u32,
-    /// Whether vertices have normals.
+    /// True if vertices have normals.
     pub normals: bool,
 }
 
@@ -29,8 +29,9 @@ impl Default for StatueOptions {
     }
 }
 
-/// The mesh of the statue: closed, of one piece, z up, on the plane z = 0, [`dragon::HEIGHT`] high. `Err` with a
-/// message if the options are out of range.
+/// The mesh of the statue: closed, connected, z up, on the plane z = 0, [`dragon::HEIGHT`] high.
+///
+/// Returns `Err` with a message if the options are out of range.
 pub fn statue(options: &StatueOptions) -> Result<TriangleMesh, String> {
     if !(8..=4096).contains(&options.detail) {
         return Err(format!("the detail of the statue must be 8 to 4096, not {}", options.detail));
@@ -51,7 +52,7 @@ struct StatueField {
     parts: Vec<Part>,
 }
 
-/// A part and the strokes of it that matter.
+/// A part with its relevant strokes.
 struct NearPart {
     part: u32,
     strokes: Vec<u32>,
@@ -60,7 +61,7 @@ struct NearPart {
     high: f32,
 }
 
-/// What matters in a ball: parts in order, and bounds of the distance.
+/// The relevant parts in a ball, in order, and bounds of the distance.
 struct Near {
     parts: Vec<NearPart>,
     low: f32,

@@ -1,5 +1,5 @@
-//! The scenes of `scenes/talbot`: one statue, lit by a sky, by panels, or by both, after the test scenes of
-//! [Talbot et al. 2005]. Nearly every point sees part of each light.
+//! The scenes of `scenes/talbot`: a statue illuminated by a sky, by panels, or by both, after the test scenes of
+//! [Talbot et al. 2005]. At nearly every point each light is partly visible.
 
 use super::files::{ProceduralError, Written, write_sky, write_statue, write_texts};
 use super::sky::SkyOptions;
@@ -14,7 +14,7 @@ const SCENES: [(&str, &str); 4] = [
     ("statue-lights.pbrt", include_str!("../../../../scenes/talbot/statue-lights.pbrt")),
 ];
 
-/// How much work goes into the files of the scenes.
+/// Detail of the files of the scenes.
 #[derive(Clone, Copy, Debug)]
 pub struct TalbotOptions {
     /// The statue.
@@ -29,7 +29,7 @@ impl Default for TalbotOptions {
     }
 }
 
-/// A sun low enough for long shadows, a little widened, among broken clouds.
+/// A sun low enough for long shadows, slightly enlarged, among broken clouds.
 fn sky_of_the_scenes() -> SkyOptions {
     SkyOptions {
         elevation: 24_f32.to_radians(),
@@ -43,7 +43,7 @@ fn sky_of_the_scenes() -> SkyOptions {
     }
 }
 
-/// Writes the scenes, `statue.ply` and `sky.exr` into a folder, which is made if there is none.
+/// Writes the scenes, `statue.ply` and `sky.exr` into a folder, which is created if necessary.
 pub fn write_scenes(folder: &Path, options: &TalbotOptions) -> Result<Written, ProceduralError> {
     write_texts(folder, &SCENES)?;
     write_sky(&folder.join("sky.exr"), &options.sky)?;

@@ -1,9 +1,9 @@
 //! Sample counts for equal time.
 //!
 //! A rendering costs c + P·(M·T1 + N·T2), where P is the number of shading points. T1 is the cost of a proposal and its
-//! weight, T2 that of drawing, evaluating and tracing a sample: renderings of few and of many of both tell them. The
-//! counts are N = B/(2·T2), M = B/(2·T1) for a time of B per point: M/N = T2/T1 [Talbot 2005, Eq. 4.4]. Then M is
-//! corrected until renderings take as long as those of the baseline.
+//! weight, and T2 is the cost of drawing, evaluating and tracing a sample; both are measured by renderings with small
+//! and large counts. The counts are N = B/(2·T2), M = B/(2·T1) for a time of B per point: M/N = T2/T1 [Talbot 2005, Eq.
+//! 4.4]. Then M is corrected until renderings take as long as the baseline.
 
 use super::measure::{Measured, Seconds, Stage, View, turns};
 use super::method::Method;
@@ -12,26 +12,26 @@ use lumiris::lights::LightSamplerKind;
 use lumiris::settings::{SampleCounts, Strata};
 use lumiris_numbers::estimators::ris::choice::Costs;
 
-/// Turns of a measurement of times.
+/// Turns of a time measurement.
 const TURNS: u32 = 3;
-/// Most corrections of the number of proposals.
+/// Maximum number of corrections of the number of proposals.
 const CORRECTIONS: u32 = 4;
-/// Least time of a proposal or a sample (ns).
+/// Minimum time of a proposal or a sample (ns).
 const LEAST_TIME: f64 = 0.1;
-/// Good enough a match of times.
+/// Relative tolerance of equal times.
 const MATCH: f64 = 0.01;
-/// Most proposals: the buffers of a batch grow with them.
+/// Maximum number of proposals, which determine the size of batch buffers.
 const MAX_PROPOSALS: u32 = 1024;
 
-/// M and N of the estimates that are timed: few and many.
+/// M and N of the timed estimates: small and large.
 const TIMED: [[u32; 2]; 2] = [[8, 1], [40, 5]];
 
-/// Times of the stages, and sample counts that cost as much as the baseline.
+/// Times of the stages, and sample counts with the cost of the baseline.
 #[derive(Clone, Copy, Debug)]
 pub struct Calibration {
     /// T1 and T2 (ns).
     pub times: Costs,
-    /// Direct lighting of one point by the baseline (ns).
+    /// Time of direct lighting of one point by the baseline (ns).
     pub budget: f64,
     /// M and N.
     pub sample_counts: SampleCounts,
@@ -44,7 +44,7 @@ fn points(m: &Measured) -> f64 {
     (m.proposals as f64 / f64::from(m.method.proposals) / m.turns().max(1) as f64).max(1.0)
 }
 
-/// T1 and T2 (ns), with lights chosen in this way; `None` if nothing in the image is lit.
+/// T1 and T2 (ns), with this light sampler; `None` if nothing in the image is illuminated.
 fn stage_times(
     stage: &mut Stage,
     lights: LightSamplerKind,
@@ -64,7 +64,7 @@ fn stage_times(
     Ok(Some(Costs { t1, t2: (difference(|s| s.select + s.t2) / n).max(LEAST_TIME) }))
 }
 
-/// N and M for a time per point, of which half goes to samples; at least one sample, and no fewer proposals than
+/// N and M for a time per point, half of which is for samples; at least one sample, and at least as many proposals as
 /// samples.
 pub fn equal_halves(budget: f64, times: Costs) -> SampleCounts {
     let samples = (0.5 * budget / times.t2).round().max(1.0);
@@ -72,15 +72,15 @@ pub fn equal_halves(budget: f64, times: Costs) -> SampleCounts {
     counts_for_budget(budget, times, samples as u32)
 }
 
-/// The proposals that fit beside a number of samples.
+/// The number of proposals for the time that remains beside a number of samples.
 pub fn counts_for_budget(budget: f64, times: Costs, samples: u32) -> SampleCounts {
     let proposals = ((budget - f64::from(samples) * times.t2) / times.t1).round().clamp(1.0, f64::from(MAX_PROPOSALS));
     SampleCounts { samples, proposals: (proposals as u32).max(samples) }
 }
 
-/// Measures times, and finds sample counts that cost as much as the baseline, within about a percent.
+/// Measures times, and determines sample counts with the cost of the baseline, within about a percent.
 pub fn calibrate(stage: &mut Stage, base: &Method, observer: Observer<'_>) -> Result<Calibration, ReproduceError> {
-    // Times, and that of the baseline
+    // Times, including the baseline's
     let default = Costs { t1: 100.0, t2: 100.0 };
     let times = stage_times(stage, base.light_sampler, observer)?.unwrap_or(default);
     let ris = |proposals, samples| Method::ris(proposals, samples).lights_by(base.light_sampler).stratified();
@@ -91,7 +91,7 @@ pub fn calibrate(stage: &mut Stage, base: &Method, observer: Observer<'_>) -> Re
     let seconds = pilot[0].median_seconds(|s| s.wall);
     let mut found = Calibration { times, budget, sample_counts: equal_halves(budget, times), seconds };
 
-    // Alternates with the baseline; the number of proposals changes until times match
+    // Alternate with the baseline; adjust the number of proposals until times agree
     for step in 0..CORRECTIONS {
         let SampleCounts { samples, proposals } = found.sample_counts;
         let method = ris(proposals, samples);
@@ -101,7 +101,7 @@ pub fn calibrate(stage: &mut Stage, base: &Method, observer: Observer<'_>) -> Re
         if excess.abs() < MATCH {
             break;
         }
-        // The excess is a part of the whole time of the baseline; a proposal takes T1 of it at every point.
+        // The excess is a fraction of the total time of the baseline; a proposal takes T1 at every point.
         let surplus = excess * pair[0].median_seconds(|s| s.processor) * 1e9 / (points(&pair[1]) * found.times.t1);
         let corrected = (f64::from(proposals) - surplus).round().clamp(f64::from(samples), f64::from(MAX_PROPOSALS));
         found.sample_counts.proposals = corrected as u32;
@@ -109,7 +109,7 @@ pub fn calibrate(stage: &mut Stage, base: &Method, observer: Observer<'_>) -> Re
     Ok(found)
 }
 
-/// The number of samples of `method` with which a rendering of `spp` camera rays takes as long as one of the baseline.
+/// The number of samples of `method` for which a rendering of `spp` camera rays takes as long as the baseline.
 pub fn match_samples(
     stage: &mut Stage,
     base: &Method,
@@ -122,7 +122,7 @@ pub fn match_samples(
         let tried = Method { samples, proposals: samples, ..*method };
         let range = (step + 8) * TURNS..(step + 9) * TURNS;
         let pair = turns(stage, &[*base, tried], View::Centres, spp, range, observer)?;
-        // What an estimate takes grows with its samples, camera rays and materials do not
+        // The time of an estimate grows with its samples; the time of camera rays and materials does not
         let direct = pair[1].median_seconds(|s| s.direct() / s.stages().max(1e-12)).clamp(0.1, 1.0);
         let ratio = pair[1].time_ratio(&pair[0]);
         if (ratio - 1.0).abs() < MATCH {
@@ -147,7 +147,7 @@ mod tests {
         assert_eq!(sample_counts.proposals, 164);
         let spent = |s: SampleCounts| f64::from(s.proposals) * times.t1 + f64::from(s.samples) * times.t2;
         assert!((spent(sample_counts) - 3400.0).abs() < times.t1);
-        // One sample at least; proposals as dear as samples leave M = N.
+        // At least one sample; proposals as expensive as samples give M = N.
         assert_eq!(equal_halves(100.0, times).samples, 1);
         assert_eq!(equal_halves(2000.0, Costs { t1: 100.0, t2: 100.0 }), SampleCounts { samples: 10, proposals: 10 });
         assert_eq!(equal_halves(2000.0, Costs { t1: 100.0, t2: 10.0 }), SampleCounts { samples: 18, proposals: 18 });

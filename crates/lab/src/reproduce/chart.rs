@@ -42,7 +42,7 @@ impl Axis {
         (v / self.low).ln() / (self.high / self.low).ln()
     }
 
-    /// Values 1, 2, 5 times a power of ten inside; powers alone if those are many.
+    /// Values 1, 2, 5 times a power of ten within the range; only powers if there are many.
     fn ticks(&self) -> Vec<f64> {
         let decades = self.low.log10().floor() as i32..=self.high.log10().ceil() as i32;
         let of = |steps: &[f64]| -> Vec<f64> {
@@ -60,7 +60,7 @@ impl Chart {
         Chart { x: x.to_owned(), y: y.to_owned(), curves: Vec::new() }
     }
 
-    /// Adds a curve; points that are not positive cannot be shown.
+    /// Adds a curve; points that are not positive are omitted.
     #[must_use]
     pub fn with(mut self, name: &str, points: Vec<[f64; 2]>) -> Self {
         let points = points.into_iter().filter(|p| p.iter().all(|v| *v > 0.0 && v.is_finite())).collect();
@@ -118,7 +118,7 @@ impl Chart {
     }
 }
 
-/// The text with everything replaced that HTML would take for its own.
+/// Escapes HTML special characters.
 fn escape(text: &str) -> String {
     HtmlEscape(text).to_string()
 }
@@ -131,7 +131,7 @@ mod tests {
     fn points_lie_inside_and_odd_ones_are_left_out() {
         let points = vec![[1.0, 1e-5], [10.0, 3e-3], [0.0, 1.0], [5.0, f64::NAN], [100.0, -1.0]];
         let svg = Chart::new("x & y", "y").with("a<b", points).svg();
-        // Two points and the mark beside the name.
+        // Two points and the symbol beside the name.
         assert_eq!(svg.matches("<circle").count(), 3);
         assert!(svg.contains("x &amp; y") && svg.contains("a&lt;b") && !svg.contains("NaN") && !svg.contains("inf"));
         assert!(!Chart::new("x", "y").svg().contains("NaN"));

@@ -1,5 +1,5 @@
-//! Figures of a paper and their page: a table of the paper's results and the measured ones, the figures one after the
-//! other, and a file with all numbers.
+//! Figures of a paper and their page: a table of the paper's results and the measured ones, the figures in order, and a
+//! file with all numbers.
 
 use super::images::significant;
 use super::measure::Estimate;
@@ -9,7 +9,7 @@ use serde_json::{Value, json};
 use std::path::PathBuf;
 use std::time::Duration;
 
-/// What a figure gave.
+/// The result of a figure.
 pub struct Figure {
     /// Anchor on the page, and name in the file of numbers.
     pub id: &'static str,
@@ -17,35 +17,35 @@ pub struct Figure {
     pub title: &'static str,
     /// Its row in the table at the top.
     pub summary: Summary,
-    /// More rows: what they are about, and the row.
+    /// More rows: their subjects, and the rows.
     pub also: Vec<(&'static str, Summary)>,
     /// Its section.
     pub blocks: Vec<Block>,
-    /// Everything that was measured.
+    /// All measurements.
     pub numbers: Value,
 }
 
 /// A row of the table at the top.
 pub struct Summary {
-    /// What the paper says.
+    /// Result of the paper.
     pub paper: String,
-    /// What is to be reached here.
+    /// Target.
     pub target: String,
-    /// What was measured.
+    /// Measured result.
     pub measured: String,
-    /// Whether that is enough.
+    /// True if the target is reached.
     pub reached: bool,
-    /// Why, in numbers.
+    /// The reason, with numbers.
     pub reason: String,
 }
 
-/// What a page says around its figures.
+/// The text of a page around its figures.
 pub struct Study {
     /// Heading of the page.
     pub title: &'static str,
     /// First paragraph.
     pub intro: &'static str,
-    /// How it is measured.
+    /// Notes on the measurement.
     pub notes: &'static [&'static str],
     /// Name of the file with all numbers.
     pub numbers: &'static str,
@@ -56,7 +56,7 @@ pub fn plus_minus(e: Estimate) -> String {
     format!("{} ± {}", significant(e.value), significant(e.error))
 }
 
-/// What is left of 1, as a reduction in percent with its standard error.
+/// The reduction from 1 to `left`, in percent, with its standard error.
 pub fn percent(left: Estimate) -> String {
     format!("{:+.1} ± {:.1} %", (left.value - 1.0) * 100.0, left.error * 100.0)
 }
@@ -66,7 +66,7 @@ pub fn estimate_json(e: Estimate) -> Value {
     json!({ "value": e.value, "standard_error": e.error })
 }
 
-/// Writes `index.html` and the numbers into the folder of the page; the answer is the page.
+/// Writes `index.html` and the numbers into the folder of the page; returns the path of the page.
 pub fn write(
     study: &Study,
     options: &Options,
@@ -137,7 +137,7 @@ impl Figure {
     }
 }
 
-/// The name of the processor, if known.
+/// The name of the processor, if available.
 fn processor() -> String {
     let text = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
     let name =

@@ -1,11 +1,11 @@
-//! Images for a page: tone-mapped radiance, and values as colours.
+//! Images for a page: tone-mapped radiance, and colour-coded values.
 
 use lumiris::imaging::color::linear_to_srgb;
 pub use lumiris::imaging::heat::{HEAT, RED_GREEN, Scale, significant};
 use lumiris::imaging::oiio::{ImageError, Part, write_image};
 use std::path::Path;
 
-/// Values for a display, RGB interleaved, row-major from the top left.
+/// Display values, RGB interleaved, row-major from the top left.
 #[derive(Clone, Debug)]
 pub struct Image {
     width: usize,
@@ -14,7 +14,7 @@ pub struct Image {
 }
 
 impl Image {
-    /// Radiance times `gain`, through the sRGB curve.
+    /// Radiance times `gain`, with the sRGB curve.
     pub fn tone_mapped(size: [u32; 2], radiance: &[[f32; 3]], gain: f32) -> Self {
         let encode = |v: f32| linear_to_srgb((v * gain).clamp(0.0, 1.0));
         Image {
@@ -24,7 +24,7 @@ impl Image {
         }
     }
 
-    /// Values as they are shown, RGB interleaved.
+    /// From display values, RGB interleaved.
     pub fn from_display(size: [u32; 2], data: Vec<f32>) -> Self {
         Image { width: size[0] as usize, height: size[1] as usize, data }
     }
@@ -35,7 +35,7 @@ impl Image {
         Image { width: size[0] as usize, height: size[1] as usize, data }
     }
 
-    /// Writes `name`.png into `folder` and says what the file is called.
+    /// Writes `name`.png into `folder` and returns the name of the file.
     pub fn write(self, folder: &Path, name: &str) -> Result<String, ImageError> {
         let file = format!("{name}.png");
         let channels = ["R", "G", "B"].map(str::to_owned).to_vec();
@@ -54,7 +54,7 @@ pub fn crop(size: [u32; 2], image: &[[f32; 3]], [l, t, r, b]: [f64; 4]) -> ([u32
     ([(r - l) as u32, (b - t) as u32], pixels)
 }
 
-/// The gain that maps the value which one pixel in twenty exceeds to 0.8.
+/// The gain that maps the 95th percentile to 0.8.
 pub fn gain(radiance: &[[f32; 3]]) -> f32 {
     let mut maxima: Vec<f32> = radiance.iter().map(|p| p[0].max(p[1]).max(p[2])).filter(|v| *v > 0.0).collect();
     maxima.sort_by(f32::total_cmp);

@@ -1,11 +1,11 @@
 //! Alternating measurement of methods on one scene: variance and time of each, in the same run.
 //!
-//! A *turn* renders the image once with each method, each with its own seed; the order of the methods rotates by one
-//! from turn to turn, so that a machine that slows down slows all of them. The variance of a method is that of its
-//! pixel estimates over the turns (luminance; unbiased; no reference image is needed), averaged over pixels. Its time
-//! is the processor time of the rendering over all threads, which excludes other load on the machine; times of two
+//! A *turn* renders the image once with each method, each with its own seed. The order of the methods rotates by one
+//! from turn to turn, so that a machine that slows down affects all of them. The variance of a method is the variance
+//! of its pixel estimates over the turns (luminance; unbiased; no reference image is needed), averaged over pixels. Its
+//! time is the processor time of the rendering over all threads, which excludes other load on the machine. Times of two
 //! methods are compared turn by turn, by the median of the ratios. Camera rays pass through pixel centres, so that the
-//! variance is that of lighting and not of antialiasing.
+//! variance is due to lighting and not to antialiasing.
 
 use super::method::Method;
 use super::{Observer, ReproduceError};
@@ -27,7 +27,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-/// A ray tracer whose shadows can be turned off.
+/// A ray tracer whose shadows can be disabled.
 struct Shadows {
     inner: Box<dyn Accel>,
     cast: Arc<AtomicBool>,
@@ -55,23 +55,23 @@ impl Accel for Shadows {
 /// Half the edge of the square around the pixel's centre through which camera rays pass, in pixels.
 const CENTRE: f32 = 1e-3;
 
-/// A scene, ready to be rendered by many methods.
+/// A scene that is ready to be rendered by many methods.
 pub struct Stage {
     job: RenderJob,
     shadows: Arc<AtomicBool>,
     threads: Option<usize>,
-    /// Bounces that the scene file asks for.
+    /// Number of bounces in the scene file.
     depth: u32,
 }
 
-/// What an image shall show.
+/// The kind of image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum View {
     /// Rays through the centres of pixels.
     Centres,
-    /// Rays all over each pixel.
+    /// Antialiased: rays over the whole area of each pixel.
     Antialiased,
-    /// Rays through the centres, and light that nothing hides.
+    /// Rays through the centres, without shadows.
     Unshadowed,
 }
 
@@ -94,7 +94,7 @@ impl Stage {
         &self.job
     }
 
-    /// Says which lights are seen from where, until it says otherwise.
+    /// Sets the visibility cache of later renderings.
     pub fn set_visibility_cache(&mut self, visibility_cache: Option<VisibilityCache>) {
         self.job.lights.set_visibility_cache(visibility_cache);
     }
@@ -104,7 +104,7 @@ impl Stage {
         self.job.world.scene.film.resolution
     }
 
-    /// Triangles and lights, for the page.
+    /// Numbers of triangles and lights, for the page.
     pub fn facts(&self) -> (usize, usize) {
         let scene = &self.job.world.scene;
         (scene.geometry.primitive_counts().0, scene.lights.lights.len())
@@ -114,8 +114,8 @@ impl Stage {
         self.job.change(|settings| method.apply(settings, self.depth));
     }
 
-    /// Finds the best allocation of an estimate's time to proposals and samples in each pixel, by the renderer's own
-    /// pilot. The answer is M/N of every pixel, and the processor time that it took (s).
+    /// Determines the best allocation of an estimate's time to proposals and samples in each pixel, by the renderer's
+    /// own pilot. Returns M/N of every pixel, and the processor time (s).
     pub fn plan_per_pixel(&mut self, times: Costs, budget: f64) -> Result<(Vec<f32>, f64), ReproduceError> {
         let start = processor_time::of_process();
         self.set(&Method { per_pixel: true, ..Method::ris(1, 1) });
@@ -141,7 +141,7 @@ impl Stage {
         self.set(method);
         let radius = if view == View::Antialiased { 0.5 } else { CENTRE };
         self.job.world.scene.film.filter = PixelFilter::Box { rx: radius, ry: radius };
-        // One footprint for short and long renderings, which estimate the same image
+        // The same footprint for short and long renderings, which estimate the same image
         self.job.change(|s| {
             (s.sampling.seed, s.sampling.spp, s.sampling.footprint_spp) = (seed, spp, Some(1));
         });
@@ -152,12 +152,12 @@ impl Stage {
     }
 }
 
-/// Seconds of a rendering. Those of the stages are by the clock on the wall, summed over threads.
+/// Times of a rendering (s). Times of the stages are wall-clock times, summed over threads.
 #[derive(Clone, Copy, Debug, Default, Serialize)]
 pub struct Seconds {
     /// Processor time of all threads.
     pub processor: f64,
-    /// From start to end.
+    /// Wall-clock time.
     pub wall: f64,
     /// Tracing camera rays.
     pub camera: f64,
@@ -165,14 +165,14 @@ pub struct Seconds {
     pub shade: f64,
     /// Proposals.
     pub t1: f64,
-    /// Drawing samples from them, and adding up.
+    /// Drawing samples from them, and summation.
     pub select: f64,
     /// Shadow segments.
     pub t2: f64,
 }
 
 impl Seconds {
-    /// Those of a rendering that took so much processor time.
+    /// Times of a rendering with this processor time.
     fn new(rendering: &Rendering, processor: Duration) -> Self {
         let s = &rendering.stats;
         Seconds {
@@ -206,7 +206,7 @@ pub struct Estimate {
     pub error: f64,
 }
 
-/// What the turns of a method gave.
+/// Measurements over the turns of a method.
 #[derive(Clone, Debug)]
 pub struct Measured {
     /// The method.
@@ -223,7 +223,7 @@ pub struct Measured {
     pub segments: u64,
     /// Proposals of all turns.
     pub proposals: u64,
-    /// Samples that were not finite, of all turns.
+    /// Number of non-finite samples of all turns.
     pub invalid: u64,
 }
 
@@ -241,7 +241,7 @@ impl Measured {
         }
     }
 
-    /// Takes a turn.
+    /// Adds a turn.
     fn add(&mut self, rendering: &Rendering, processor: Duration) {
         let means = radiance(&rendering.film);
         self.segments += rendering.stats.direct.segments;
@@ -269,7 +269,7 @@ impl Measured {
         self.sum.iter().map(|p| p.map(|v| v / turns)).collect()
     }
 
-    /// Grey images of these luminances, rendered in no time.
+    /// Grey images with these luminances and zero times.
     #[cfg(test)]
     pub fn from_luminances(method: Method, turns: Vec<Vec<f32>>) -> Self {
         let mut m = Measured::new(method);
@@ -298,7 +298,7 @@ impl Measured {
     }
 
     /// Mean over the pixels of `mask` (all without one) of the variance of the pixel's estimate. Its standard error is
-    /// from how the turns differ.
+    /// estimated from the differences between turns.
     pub fn variance(&self, mask: Option<&[bool]>) -> Estimate {
         let turns = self.turns() as f64;
         let chosen: Vec<usize> = (0..self.sum.len()).filter(|&i| mask.is_none_or(|m| m[i])).collect();
@@ -319,7 +319,7 @@ impl Measured {
         Estimate { value, error: (self.variance(None).value / (turns * pixels)).sqrt() }
     }
 
-    /// Median over the turns of some time.
+    /// Median over the turns of a time.
     pub fn median_seconds(&self, of: impl Fn(&Seconds) -> f64) -> f64 {
         median(self.seconds.iter().map(of))
     }
@@ -340,8 +340,8 @@ impl Measured {
     }
 }
 
-/// Probability that the mean of a method differs from that of all others (weighted by their errors) at least as much as
-/// it does, if all have the same expectation.
+/// Probability that the mean of a method differs from the mean of all others (weighted by their errors) at least as
+/// much as measured, if all have the same expectation.
 pub fn same_mean(all: &[Measured], method: usize) -> f64 {
     let (mut weights, mut sum) = (0.0, 0.0);
     for (_, m) in all.iter().enumerate().filter(|(i, _)| *i != method) {
@@ -359,7 +359,7 @@ pub fn radiance(film: &Film) -> Vec<[f64; 3]> {
     film.pixels().iter().map(|p| p.mean()).collect()
 }
 
-/// Renders `turns` turns of all methods, the first of each with seed `first_seed` and on.
+/// Renders `turns` turns of all methods; the seeds of each method start at `first_seed`.
 pub fn turns(
     stage: &mut Stage,
     methods: &[Method],

@@ -1,4 +1,4 @@
-//! Methods to compare: ways to estimate direct light.
+//! The compared methods: estimators of direct light with their settings.
 
 use lumiris::lights::LightSamplerKind;
 use lumiris::settings::{
@@ -8,26 +8,26 @@ use lumiris::settings::{
 use lumiris_numbers::estimators::mis::Heuristic;
 use lumiris_numbers::samplers::SamplerKind;
 
-/// Light that is computed.
+/// Light transport.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Transport {
-    /// Direct light alone.
+    /// Direct light only.
     Direct,
-    /// Paths as long as the scene file says.
+    /// Paths with the depth of the scene file.
     Path,
-    /// The same, with everything that diffuse surfaces reflect interpolated between records.
+    /// The same, with the light reflected by diffuse surfaces interpolated between records.
     Cached,
 }
 
-/// How the random numbers of a pixel are distributed.
+/// Distribution of the random numbers of a pixel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Points {
-    /// All are independent.
+    /// Independent.
     Independent,
-    /// Samples of an estimate, or the proposals of `ris`, are well distributed over the lights; camera rays have
-    /// nothing to do with each other.
+    /// Samples of an estimate, or proposals of `ris`, are well distributed over the lights; camera rays are
+    /// independent.
     PerEstimate,
-    /// They are well distributed over the camera rays of the pixel, too.
+    /// Well distributed over the camera rays of the pixel, too.
     PerPixel,
 }
 
@@ -45,32 +45,31 @@ impl Points {
 /// A method: an estimator of direct light with its settings.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Method {
-    /// Light that is computed.
+    /// Light transport.
     pub transport: Transport,
     /// Estimator of direct light.
     pub estimator: EstimatorKind,
-    /// How a light is chosen.
+    /// Light sampler.
     pub light_sampler: LightSamplerKind,
-    /// Weights of the techniques; the estimator's own if `None`.
+    /// Weights of the techniques; `None` for the estimator's default.
     pub heuristic: Option<Heuristic>,
-    /// How `ocv` finds its coefficients.
+    /// Source of the coefficients of `ocv`.
     pub form: OcvForm,
-    /// How `optimal-mis` finds its weights.
+    /// Source of the weights of `optimal-mis`.
     pub optimal: OptimalForm,
     /// N.
     pub samples: u32,
     /// M, for `ris`.
     pub proposals: u32,
-    /// What `ris` draws samples in proportion to.
+    /// Target density of `ris`.
     pub target: Target,
     /// Samples of `contributing` on the non-contributing lights.
     pub noncontributing_samples: u32,
     /// Samples over proposals, for `ris`.
     pub strata: Strata,
-    /// True if `ris` chooses M and N in each pixel as [`Stage::plan_per_pixel`](super::measure::Stage::plan_per_pixel)
-    /// found.
+    /// True if `ris` uses M and N of each pixel from [`Stage::plan_per_pixel`](super::measure::Stage::plan_per_pixel).
     pub per_pixel: bool,
-    /// How random numbers are distributed.
+    /// Distribution of random numbers.
     pub points: Points,
 }
 
@@ -115,7 +114,7 @@ impl Method {
         Method { estimator: EstimatorKind::Correlated, ..Method::mc(samples) }
     }
 
-    /// Sampling of the lights that photons came from, and of the others, with independent random numbers.
+    /// Separate sampling of the lights with photons and of the others, with independent random numbers.
     pub fn contributing(samples: u32, noncontributing_samples: u32) -> Self {
         Method { estimator: EstimatorKind::Contributing, noncontributing_samples, ..Method::mc(samples) }
     }
@@ -130,7 +129,7 @@ impl Method {
         Method { points: Points::PerPixel, ..self }
     }
 
-    /// The same with another choice of lights.
+    /// The same with another light sampler.
     pub fn lights_by(self, light_sampler: LightSamplerKind) -> Self {
         Method { light_sampler, ..self }
     }
@@ -145,12 +144,12 @@ impl Method {
         Method { strata, ..self }
     }
 
-    /// The same for other light.
+    /// The same with another light transport.
     pub fn of(self, transport: Transport) -> Self {
         Method { transport, ..self }
     }
 
-    /// Sets what the method says, where the file says `depth` bounces.
+    /// Applies the method to the settings; `depth` is the number of bounces in the scene file.
     pub(super) fn apply(&self, settings: &mut Settings, depth: u32) {
         let (kind, max_depth) = match self.transport {
             Transport::Direct => (IntegratorKind::Direct, 1),

@@ -2,8 +2,8 @@
 //!
 //! Reading order: [`method`] (an estimator of light), [`measure`] (alternating methods on one scene, variances and
 //! times), [`calibrate`] (sample counts for equal time), [`talbot`] (resampled importance sampling), [`fan`]
-//! (optimizing control variates), [`keller_wald`] (photon maps), [`verdicts`] (when a figure counts as reproduced);
-//! then the parts of a page: [`figure`], [`page`], [`images`], [`chart`].
+//! (optimizing control variates), [`keller_wald`] (photon maps), [`verdicts`] (criteria of reproduction); then the
+//! parts of a page: [`figure`], [`page`], [`images`], [`chart`].
 
 pub mod calibrate;
 pub mod chart;
@@ -23,18 +23,18 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
 
-/// What to reproduce, and how long it may take.
+/// Options of a reproduction.
 #[derive(Clone, Debug)]
 pub struct Options {
-    /// Folder that takes the page.
+    /// Output folder of the page.
     pub out: PathBuf,
-    /// Folder with scenes in place of those that are made for the purpose.
+    /// Folder with scenes that replace the generated ones.
     pub scenes: Option<PathBuf>,
-    /// A tenth of the time.
+    /// True for a tenth of the time.
     pub quick: bool,
-    /// Threads; all cores if `None`.
+    /// Number of threads; `None` for all cores.
     pub threads: Option<usize>,
-    /// Most pixels along an edge of an image.
+    /// Maximum number of pixels along an edge of an image.
     pub size: Option<u32>,
     /// The command as it was typed, for the page.
     pub command: String,
@@ -47,16 +47,16 @@ impl Options {
     }
 }
 
-/// Who is told how far it is, and may end it.
+/// Receives progress, and may stop the reproduction.
 #[derive(Clone, Copy)]
 pub struct Observer<'a> {
-    /// Takes a line for a person.
+    /// Receives a line of progress.
     pub say: &'a (dyn Fn(&str) + Sync),
-    /// Ends everything once it is true.
+    /// Stops everything once it is true.
     pub stop: &'a AtomicBool,
 }
 
-/// Why there is no page.
+/// Errors of a reproduction.
 #[derive(Debug, thiserror::Error)]
 pub enum ReproduceError {
     /// A scene could not be read.
@@ -67,7 +67,7 @@ pub enum ReproduceError {
         /// Errors and warnings.
         report: Box<lumiris_formats::diagnostic::Report>,
     },
-    /// A scene could not be made.
+    /// A scene could not be generated.
     #[error(transparent)]
     Procedural(#[from] ProceduralError),
     /// A ray tracer could not be built.
@@ -76,7 +76,7 @@ pub enum ReproduceError {
     /// A rendering ended without an image.
     #[error(transparent)]
     Render(#[from] lumiris::render::RenderError),
-    /// There is no photon map.
+    /// A photon map could not be built.
     #[error(transparent)]
     Photons(#[from] lumiris::photons::PhotonError),
     /// An image could not be written.
@@ -85,38 +85,38 @@ pub enum ReproduceError {
     /// A file could not be written.
     #[error("{path}: {cause}")]
     File {
-        /// Which.
+        /// Its path.
         path: PathBuf,
-        /// Why.
+        /// The reason.
         cause: std::io::Error,
     },
-    /// The observer ended it.
+    /// The observer stopped it.
     #[error("ended before it was done")]
     Stopped,
 }
 
-/// Width and height of an image of a shape whose longer edge has `size` pixels.
+/// Size (width, height) of an image with the aspect ratio of `shape`, whose longer edge has `size` pixels.
 fn scaled(shape: [u32; 2], size: u32) -> [u32; 2] {
     let longer = shape[0].max(shape[1]).max(1);
     shape.map(|s| (s * size / longer).max(1))
 }
 
-/// Writes a file, with its name in the error.
+/// Writes a file; errors contain its path.
 pub(crate) fn write_file(path: PathBuf, text: &str) -> Result<(), ReproduceError> {
     write_text(&path, text).map_err(|cause| ReproduceError::File { path, cause })
 }
 
-/// Makes a folder, with its name in the error.
+/// Creates a folder; errors contain its path.
 pub(crate) fn make_folder(path: &std::path::Path) -> Result<(), ReproduceError> {
     std::fs::create_dir_all(path).map_err(|cause| ReproduceError::File { path: path.to_owned(), cause })
 }
 
-/// Time that is shared out among parts.
+/// A time budget that is divided among parts.
 #[derive(Clone, Copy, Debug)]
 pub struct Budget {
     start: Instant,
     total: Duration,
-    /// Weights of the parts that are still to come; those of all parts add up to 100.
+    /// Weights of the remaining parts; the weights of all parts add up to 100.
     left: f64,
 }
 
@@ -126,12 +126,12 @@ impl Budget {
         Budget { start: Instant::now(), total, left: 100.0 }
     }
 
-    /// Since the start.
+    /// Elapsed time.
     pub fn elapsed(&self) -> Duration {
         self.start.elapsed()
     }
 
-    /// What the next part may take, whose weight is `weight` of 100: its share of the time that is left.
+    /// Time for the next part, whose weight is `weight` of 100: its fraction of the remaining time.
     pub fn share(&mut self, weight: f64) -> Duration {
         let share = (weight / self.left.max(1e-9)).clamp(0.0, 1.0);
         self.left -= weight;
@@ -139,7 +139,7 @@ impl Budget {
     }
 }
 
-/// The folder of the scenes: that of the options, or one inside the page's, which `make` fills.
+/// The folder of the scenes: from the options, or inside the page's folder, filled by `make`.
 fn scenes_folder(
     options: &Options,
     make: impl FnOnce(&Path) -> Result<(), ProceduralError>,

@@ -30,7 +30,7 @@ pub enum Block {
     Table(Table),
     /// Images side by side.
     Images(Vec<Shown>),
-    /// What the colours of images above mean.
+    /// The legend of the images above.
     Legend {
         /// Quantity and unit.
         title: String,
@@ -68,16 +68,16 @@ pub struct Cell {
     tone: Tone,
 }
 
-/// How an entry looks.
+/// Style of an entry.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Tone {
     /// As text.
     Plain,
-    /// A number: to the right.
+    /// A number, right-aligned.
     Number,
-    /// Good news.
+    /// A positive result.
     Good,
-    /// Bad news.
+    /// A negative result.
     Bad,
 }
 
@@ -87,12 +87,12 @@ impl Cell {
         Cell { text: text.into(), tone: Tone::Plain }
     }
 
-    /// A number, as it shall be written.
+    /// A number, as text.
     pub fn number(text: impl Into<String>) -> Self {
         Cell { text: text.into(), tone: Tone::Number }
     }
 
-    /// Yes or no.
+    /// A positive or negative result.
     pub fn verdict(good: bool, text: impl Into<String>) -> Self {
         Cell { text: text.into(), tone: if good { Tone::Good } else { Tone::Bad } }
     }
@@ -134,7 +134,7 @@ impl Page {
         let blocks: Vec<Value> = self.blocks.iter().map(Block::context).collect();
         let page =
             context! { title => self.title.as_str(), style => Value::from_safe_string(STYLE.to_owned()), blocks };
-        // What it shows is escaped, since its name ends in html
+        // The template engine escapes the values, since the name ends in html
         let html = Environment::new().render_named_str("page.html", TEMPLATE, page);
         html.expect("the template knows the blocks") + "\n"
     }
@@ -146,7 +146,7 @@ impl Block {
         Block::Section { id: id.to_owned(), title: title.into() }
     }
 
-    /// What the template makes the block of.
+    /// The data of the block for the template.
     fn context(&self) -> Value {
         match self {
             Block::Section { id, title } => context! { kind => "section", id => id.as_str(), title => title.as_str() },

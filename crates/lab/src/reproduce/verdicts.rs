@@ -1,36 +1,35 @@
-//! When a figure counts as reproduced, judged by the measurements alone.
+//! Criteria for the reproduction of a figure, based on the measurements only.
 
 use super::measure::Estimate;
 
-/// Standard errors by which two numbers must differ for the difference to count.
+/// Number of standard errors by which two numbers must differ to be significantly different.
 const ERRORS: f64 = 2.0;
-/// Largest relative change of a mean luminance that counts as hardly perceivable: the threshold of contrast of the eye
-/// is one to two percent.
+/// Maximum relative change of a mean luminance that is hardly perceivable: the contrast threshold of the eye is one to
+/// two percent.
 const PERCEIVABLE: f64 = 0.02;
 
-/// True if what is left of 1 is less by `percent` or more; nothing was measured where the number is 0.
+/// True if the reduction from 1 to `left` is at least `percent`; false for 0, which means no measurement.
 pub fn reduced_by(left: Estimate, percent: f64) -> bool {
     left.value > 0.0 && (1.0 - left.value) * 100.0 >= percent
 }
 
-/// The same for resampling of `proposals` to `samples`: with as many of both nothing is resampled, and nothing is
-/// reached.
+/// The same for resampling of `proposals` to `samples`; false if they are equal, since nothing is resampled.
 pub fn reduced_by_resampling([proposals, samples]: [u32; 2], left: Estimate, percent: f64) -> bool {
     proposals > samples && reduced_by(left, percent)
 }
 
-/// True if each number is lower than the one before it, by more than chance explains.
+/// True if each number is significantly lower than the one before it.
 pub fn falls(steps: &[Estimate]) -> bool {
     let is_lower = |a: Estimate, b: Estimate| b.value + ERRORS * a.error.hypot(b.error) < a.value;
     steps.len() > 1 && steps.windows(2).all(|pair| is_lower(pair[0], pair[1]))
 }
 
-/// True if what a change leaves of the variance in lit pixels is more than what it leaves in penumbra and in shadow.
+/// True if the remaining fraction of the variance is greater in lit pixels than in penumbra and in shadow.
 pub fn helps_most_in_shadow([lit, penumbra, shadow]: [f64; 3]) -> bool {
     penumbra < lit && shadow < lit
 }
 
-/// True if a relative bias, with the uncertainty that it was measured with, is below what the eye perceives.
+/// True if a relative bias, including its uncertainty, is below the perception threshold.
 pub fn hardly_perceivable(bias: Estimate) -> bool {
     bias.value.abs() + ERRORS * bias.error < PERCEIVABLE
 }
@@ -49,7 +48,7 @@ mod tests {
 
     #[test]
     fn a_reduction_of_just_less_than_was_asked_for_is_not_enough() {
-        // Figure 5.3 of the thesis with its own M and N: 43 % where 45 % are asked for
+        // Figure 5.3 of the thesis with its own M and N: 43 % with a target of 45 %
         assert!(!reduced_by(of(0.567, 0.011), 45.0));
         assert!(reduced_by(of(0.5499, 0.011), 45.0));
         assert!(!reduced_by(of(1.049, 0.021), 45.0));
@@ -68,7 +67,7 @@ mod tests {
     fn every_step_has_to_fall_and_not_only_below_the_first() {
         let error = 0.001;
         assert!(falls(&steps(&[1.0, 0.72, 0.36, 0.33, 0.29], error)));
-        // Equal weights above equal proposals: both are below stratified proposals
+        // Equal weights are worse than equal proposals; both are better than stratified proposals
         assert!(!falls(&steps(&[1.0, 0.72, 0.33, 0.36, 0.29], error)));
         assert!(!falls(&steps(&[1.0, 0.72, 0.36, 0.33, 0.34], error)));
         assert!(!falls(&steps(&[1.0, 1.0], 0.0)));
@@ -95,7 +94,7 @@ mod tests {
         assert!(!hardly_perceivable(of(-0.358, 0.011)));
         assert!(!hardly_perceivable(of(0.358, 0.011)));
         assert!(hardly_perceivable(of(-0.0009, 0.0005)));
-        // Nobody can say whether this is
+        // Too uncertain
         assert!(!hardly_perceivable(of(0.0, 0.011)));
         assert!(!hardly_perceivable(of(f64::NAN, 0.0)));
     }

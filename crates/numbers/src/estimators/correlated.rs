@@ -1,22 +1,21 @@
-//! Combined correlated and importance sampling [Szécsi, Sbert and Szirmay-Kalos 2004]: two estimates from the same N
-//! samples of one density p, combined linearly.
+//! Combined correlated and importance sampling [Szécsi, Sbert and Szirmay-Kalos 2004]: a linear combination of two
+//! estimates from the same N samples of one density p.
 //!
-//! With y = f/p, a function g of known integral G and the control c = g/p − G, whose expectation is 0, these are
-//! importance sampling ȳ and correlated sampling ȳ − c̄. Their combination (1 − λ) ȳ + λ (ȳ − c̄) = ȳ − λ c̄ has the
-//! variance (V(y) − 2λ Cov(c, y) + λ² V(c))/N, whose minimum V(y)(1 − ρ²)/N is at λ = Cov(c, y)/V(c), where ρ is their
-//! correlation. λ is estimated per channel: from the same samples (bias O(1/N)), or from the other half of them
-//! (unbiased).
+//! With y = f/p, a function g of known integral G and the control c = g/p − G, whose expectation is 0, the two
+//! estimates are importance sampling ȳ and correlated sampling ȳ − c̄. Their combination (1 − λ) ȳ + λ (ȳ − c̄) = ȳ − λ
+//! c̄ has the variance (V(y) − 2λ Cov(c, y) + λ² V(c))/N. Its minimum V(y)(1 − ρ²)/N is at λ = Cov(c, y)/V(c), where ρ
+//! is their correlation. λ is estimated per channel: from the same samples (bias O(1/N)), or from the other half of
+//! them (unbiased).
 
 use super::mc;
 
 /// Number of sums: n, and Σ c, Σ c², Σ c y, Σ y of three channels.
 pub const SUMS: usize = 13;
 
-/// Part of Σ c² below which the variance of the control is rounding, and λ = 0.
+/// Fraction of Σ c² below which the variance of the control is rounding, and λ = 0.
 const CONSTANT: f64 = 1e-6;
 
-/// Adds a sample of control g/p − G and value f/p. One that is not finite is counted as a sample of value and control
-/// 0.
+/// Adds a sample of control g/p − G and value f/p. A non-finite sample counts as value and control 0.
 #[inline]
 pub fn add(sums: &mut [f32; SUMS], control: [f32; 3], y: [f32; 3]) {
     sums[0] += 1.0;
@@ -31,7 +30,7 @@ pub fn add(sums: &mut [f32; SUMS], control: [f32; 3], y: [f32; 3]) {
     }
 }
 
-/// λ of each channel; 0 where the control does not vary or anything is not finite.
+/// λ of each channel; 0 if the control is constant or anything is not finite.
 pub fn weight(sums: &[f32; SUMS]) -> [f32; 3] {
     let n = f64::from(sums[0]);
     std::array::from_fn(|i| {
@@ -51,13 +50,12 @@ pub fn estimate(sums: &[f32; SUMS], lambda: [f32; 3]) -> [f32; 3] {
     std::array::from_fn(|i| (sums[4 * i + 4] - lambda[i] * sums[4 * i + 1]) / n)
 }
 
-/// The estimate with λ from the same samples. Bias O(1/N).
+/// The estimate with λ from the same samples; bias O(1/N).
 pub fn combined(sums: &[f32; SUMS]) -> [f32; 3] {
     estimate(sums, weight(sums))
 }
 
-/// The estimate of each of two independent halves with λ of the other, and the mean of both by numbers of samples.
-/// Unbiased.
+/// The mean, weighted by numbers of samples, of two independent halves, each with λ from the other half. Unbiased.
 pub fn crossfit(halves: [&[f32; SUMS]; 2]) -> [f32; 3] {
     mc::pooled(halves.map(|sums| sums[0]), [0, 1].map(|k| estimate(halves[k], weight(halves[1 - k]))))
 }

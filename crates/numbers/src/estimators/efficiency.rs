@@ -1,15 +1,17 @@
-//! How many samples are most efficient: a model of cost and variance of a path by its numbers of samples.
+//! Optimal numbers of samples: a model of the cost and variance of a path as functions of its sample counts.
 //!
-//! A camera sample costs a + Σ_k b_k n_k, where n_k samples of kind k are drawn (of lights at first and at later vertices, and
-//! of the BSDF), and has the variance A + Σ_k B_k/n_k^p_k: A is that of the camera sample and the path, the rest what samples
-//! of lights and their visibility add. Efficiency is the inverse of the product. With one kind of independent samples (p = 1) it is greatest for
-//! n² = (a B)/(A b), as in the choice of M and N of resampling [Talbot 2005, §4.3]. Samples that are points of a net have
-//! p > 1, up to 3 where what they integrate is smooth [Owen 1997].
+//! A camera sample costs a + Σ_k b_k n_k, with n_k samples of kind k: light samples at the first vertex and at later
+//! ones, and BSDF samples. Its variance is A + Σ_k B_k/n_k^p_k. A is the variance of the camera sample and the path;
+//! the other terms are the variance of the samples of kind k, including visibility. Efficiency is the inverse of cost
+//! times variance. For one kind of independent samples (p = 1) its maximum is at n² = (a B)/(A b), as in the choice of
+//! M and N of resampling [Talbot 2005, §4.3]. Samples that are points of a net have p > 1, up to 3 for smooth
+//! integrands [Owen 1997].
 
-/// Kinds of samples: of lights at the first vertex of a path, of lights at all later ones, and of the BSDF at the first one.
+/// Kinds of samples: light samples at the first vertex of a path, light samples at all later vertices, and BSDF samples
+/// at the first vertex.
 pub const KINDS: usize = 3;
 
-/// What was measured with some numbers of samples.
+/// A measurement with given sample counts.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Measured {
     /// n_k.
@@ -32,9 +34,10 @@ pub struct Model {
 }
 
 impl Model {
-    /// The model through `base`, and through one measurement for each kind that has more samples of this kind only; `None`
-    /// for kinds that do not occur, which then have no part. What noise makes negative is taken as 0. The `powers` are given,
-    /// but where there are no later vertices and more independent light samples leave less of the variance than they explain.
+    /// The model through `base`, and through one measurement for each kind with more samples of this kind only; `None`
+    /// for kinds that do not occur, whose terms are 0. Terms that noise makes negative are set to 0. The `powers` are
+    /// given. Exception: without later vertices, the power of light samples is fitted if more of them leave less
+    /// variance than independent samples would.
     pub fn fit(base: &Measured, more: [Option<Measured>; KINDS], powers: [f64; KINDS]) -> Model {
         let only = |a: f64| std::array::from_fn(|k| if k == 0 { a } else { 0.0 });
         let mut model = Model { cost: only(base.cost), variance: only(base.variance), powers };
@@ -49,12 +52,12 @@ impl Model {
             model.cost[0] -= b * n0;
             model.variance[0] -= v * left[0];
         }
-        // What a camera sample costs, and how it varies, without any light sample is not nothing
+        // Cost and variance of a camera sample without any light sample are positive
         model.cost[0] = model.cost[0].max(FLOOR * base.cost);
         let least = FLOOR * base.variance;
         let of_light = model.variance[1] * base.samples[0].powf(-powers[0]);
         if let ([Some(more), None, _], true) = (more, powers[0] <= 1.0 && base.variance - of_light < least) {
-            // BSDF samples keep their part, but where noise says more than there is
+            // The BSDF term is kept, unless noise makes it exceed the measured variance
             let of_bsdf = (model.variance[3] * base.samples[2].powf(-powers[2])).min(0.5 * more.variance);
             model.variance[3] = of_bsdf * base.samples[2].powf(powers[2]);
             let rest = least + of_bsdf;
@@ -83,9 +86,9 @@ impl Model {
         1.0 / (self.variance(samples) * self.cost(samples))
     }
 
-    /// The cheapest numbers among `choices` of each kind that `are_allowed` together, of which the efficiency is at least `share`
-    /// of the greatest. Near its maximum efficiency hardly depends on numbers, and the maximum of a model that was measured is
-    /// uncertain.
+    /// The cheapest combination of `choices` of each kind that `are_allowed` together and has at least the fraction
+    /// `share` of the maximum efficiency. Near its maximum the efficiency is nearly constant, and the maximum of a
+    /// measured model is uncertain.
     pub fn best(
         &self,
         choices: [&[u32]; KINDS],
@@ -107,10 +110,10 @@ impl Model {
     }
 }
 
-/// Smallest share of what was measured that remains without light samples: a model that noise leaves with less would ask
-/// for numbers beyond all measure.
+/// Minimum fraction of the measured cost and variance that remains without light samples: a smaller remainder, caused
+/// by noise, would ask for excessive sample counts.
 const FLOOR: f64 = 0.02;
-/// Greatest power that is fitted: edges of shadows leave nets little more, and noise may show any.
+/// Maximum fitted power: shadow edges reduce the benefit of nets to little more, and noise may suggest any.
 const MAX_POWER: f64 = 1.75;
 
 #[cfg(test)]
@@ -143,10 +146,10 @@ mod tests {
         let model = Model::fit(&at(1.0), [Some(at(16.0)), None, None], [1.0; KINDS]);
         assert!((model.powers[0] - 1.5).abs() < 1e-9, "{model:?}");
         assert!((model.variance([64.0, 1.0, 1.0]) / net.variance([64.0, 1.0, 1.0]) - 1.0).abs() < 1e-9, "{model:?}");
-        // Less than nothing is noise
+        // A negative term is noise
         let none = Measured { variance: 0.0, ..at(16.0) };
         assert_eq!(Model::fit(&at(1.0), [Some(none), None, None], [1.0; KINDS]).powers, [MAX_POWER, 1.0, 1.0]);
-        // BSDF samples, which are not all that is left, keep their part
+        // BSDF samples, which are only a part of the rest, keep their term
         let both = Model { variance: [0.02, 0.9, 0.0, 0.02], ..net };
         let at = |samples| Measured { samples, cost: both.cost(samples), variance: both.variance(samples) };
         let more = [Some(at([16.0, 1.0, 1.0])), None, Some(at([1.0, 1.0, 4.0]))];
@@ -154,7 +157,7 @@ mod tests {
         for samples in [[16.0, 1.0, 1.0], [1.0, 1.0, 4.0], [4.0, 1.0, 2.0]] {
             assert!((model.variance(samples) / both.variance(samples) - 1.0).abs() < 0.05, "{samples:?} {model:?}");
         }
-        // Where nearly all is of BSDF samples, noise leaves nothing for the rest, and does not make it that of lights
+        // If BSDF samples cause nearly all variance, noise must not attribute the rest to light samples
         let noisy = |samples, variance| Measured { variance, ..at(samples) };
         let more = [Some(noisy([16.0, 1.0, 1.0], 0.98)), None, Some(noisy([1.0, 1.0, 4.0], 0.24))];
         let model = Model::fit(&noisy([1.0; KINDS], 1.0), more, [1.0; KINDS]);

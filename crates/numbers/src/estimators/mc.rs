@@ -1,12 +1,13 @@
 //! Plain Monte Carlo: E[f/p] = ∫ f for any density p that is positive where f is not zero. Unbiased.
 
-/// The weight 1/(n·p) of one of `n` samples of density `p`; 0 if the sample cannot have been drawn (p ≤ 0, NaN).
+/// The weight 1/(n·p) of one of `n` samples of density `p`; 0 for densities that are impossible for a sample (p ≤ 0,
+/// NaN).
 #[inline]
 pub fn weight(n: f32, p: f32) -> f32 {
     if p > 0.0 { 1.0 / (n * p) } else { 0.0 }
 }
 
-/// The mean of two estimates of the same integral by their numbers of samples `n`; 0 without samples.
+/// The mean of two estimates of the same integral, weighted by their numbers of samples `n`; 0 without samples.
 #[inline]
 pub fn pooled(n: [f32; 2], [a, b]: [[f32; 3]; 2]) -> [f32; 3] {
     let sum = n[0] + n[1];

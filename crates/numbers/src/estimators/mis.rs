@@ -8,7 +8,7 @@ use super::mc;
 use crate::math::number::Number;
 use strum::{EnumString, IntoStaticStr, VariantNames};
 
-/// How the weights of techniques are chosen.
+/// Heuristics for the weights of techniques.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, EnumString, IntoStaticStr, VariantNames)]
 #[strum(serialize_all = "kebab-case")]
 pub enum Heuristic {
@@ -17,11 +17,11 @@ pub enum Heuristic {
     /// w_i = (n_i p_i)² / Σ (n_k p_k)².
     #[default]
     Power,
-    /// w_i = 1 where n_i p_i is largest, else 0; ties, which rounding must not decide, share.
+    /// w_i = 1 if n_i p_i is maximal, else 0; ties share, since rounding must not decide them.
     Maximum,
 }
 
-/// A technique at a sample: how many samples it has, and its density there.
+/// A technique at a sample: its number of samples, and its density.
 #[derive(Clone, Copy, Debug)]
 pub struct Technique {
     /// Number of samples n_i; may be the expected number of a random choice.
@@ -30,25 +30,25 @@ pub struct Technique {
     pub p: f32,
 }
 
-/// Part of the larger of two densities from which on the maximum heuristic takes the smaller for equal to it: the same
-/// density, computed on the way of one technique and of the other, differs by rounding. Nothing but the two values
-/// decides, and not which of them is whose, so that both techniques agree on what is a tie.
+/// Ratio of two densities above which the maximum heuristic treats them as equal: the same density, computed by
+/// different techniques, differs by rounding. The decision depends only on the two values, not on their order, so that
+/// both techniques agree about ties.
 const TIE: f32 = 0.999;
 
 impl Heuristic {
-    /// Weight of technique `a` against `b` at a sample that `a` drew. In 0..=1; finite for any densities.
+    /// Weight of technique `a` against `b` at a sample drawn by `a`. In 0..=1; finite for any densities.
     #[inline]
     pub fn weight(self, a: Technique, b: Technique) -> f32 {
         let (x, y) = (a.n * a.p, b.n * b.p);
         if x > 0.0 { self.weight_of_expected(x, y) } else { 0.0 }
     }
 
-    /// [`weight`](Self::weight) of expected numbers of samples x = n_a p_a > 0 and y = n_b p_b, of one sample or of
+    /// [`weight`](Self::weight) for expected numbers of samples x = n_a p_a > 0 and y = n_b p_b, for one sample or for
     /// lanes.
     #[inline(always)]
     pub fn weight_of_expected<N: Number>(self, x: N, y: N) -> N {
         let (zero, half, one, max) = (x.constant(0.0), x.constant(0.5), x.constant(1.0), x.constant(f32::MAX));
-        // The ratio y/x, and not the products, so that neither squares overflow nor inf/inf appears
+        // The ratio y/x instead of the products, so that neither squares overflow nor inf/inf occurs
         let ratio = y / x;
         let weight = match self {
             Heuristic::Balance => one / (one + ratio),
@@ -63,8 +63,8 @@ impl Heuristic {
         x.if_above(max, y.if_above(max, half, weight), weight)
     }
 
-    /// The factor w/(n·p) of f in the estimate over the samples of both techniques, of a sample that `a` drew; 0 where
-    /// `a` cannot have drawn it.
+    /// The factor w/(n·p) of f in the estimate over the samples of both techniques, for a sample drawn by `a`; 0 if `a`
+    /// cannot have drawn it.
     #[inline]
     pub fn factor(self, a: Technique, b: Technique) -> f32 {
         self.weight(a, b) * mc::weight(a.n, a.p)
@@ -92,7 +92,7 @@ mod tests {
 
     #[test]
     fn weights_of_two_techniques_sum_to_one_at_the_edges_of_a_tie() {
-        // 0.5 where y/x was 1.0010005, whose reciprocal counted as a tie
+        // Weight 0.5 although y/x was 1.0010005: the reciprocal counted as a tie
         for x in [1e-40, 3e-7, 0.3, 1.0, 7.0, 3e38_f32] {
             for of_tie in [0.998_999, 0.999, 0.999_000_1, 1.0, 1.001, 1.001_000_5, 1.001_001] {
                 for ulps in -40_i32..=40 {

@@ -1,36 +1,36 @@
-//! Optimal multiple importance sampling [Kondapaneni et al. 2019]: the weights of m techniques, not confined to 0..1,
-//! of least variance for given numbers of samples n_j.
+//! Optimal multiple importance sampling [Kondapaneni et al. 2019]: the weights of m techniques with the least variance
+//! for given numbers of samples n_j, not confined to 0..1.
 //!
 //! With p_α = Σ (n_j/N) p_j, r_j = p_j/p_α and y = f/p_α, all N samples estimate
 //!
 //! - the technique matrix A_jk = ∫ p_j p_k/p_α ≈ (1/N) Σ r_j r_k, and
 //! - the contribution vector b_j = ∫ f p_j/p_α ≈ (1/N) Σ r_j y.
 //!
-//! (Both are N times those of the paper, which cancels.) The coefficients solve A α = b, and the estimate with the
-//! optimal weights is Σ_j α_j ∫p_j + (1/N) Σ (f − Σ_j α_j p_j)/p_α.
+//! (Both are N times the quantities of the paper, which cancels.) The coefficients solve A α = b, and the estimate with
+//! the optimal weights is Σ_j α_j ∫p_j + (1/N) Σ (f − Σ_j α_j p_j)/p_α.
 //!
 //! - [`direct`]: α from the same samples. The second term is then 0, and the estimate is Σ α_j ∫p_j. Bias O(1/N).
 //! - progressive, [`coefficients`] and [`estimate`]: α from earlier, independent samples. Unbiased.
 //!
-//! This is the regression of optimizing control variates without penalty: since Σ (n_j/N) r_j = 1, the columns r_j
-//! include the intercept, and α_j differs from β_j there by a multiple of n_j.
+//! This is the regression of optimizing control variates without penalty: since Σ (n_j/N) r_j = 1, the columns r_j span
+//! the intercept, and α_j differs from β_j by a multiple of n_j.
 
 use super::ocv::ldlt::{Columns, Factors, Matrix};
 use super::ocv::{IllConditioned, MAX_COMPONENTS, NormalEquations};
 
-/// An estimate, and whether its system was ill-conditioned.
+/// An estimate, and a flag for an ill-conditioned system.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Outcome {
     /// The estimate of ∫f by channel.
     pub estimate: [f32; 3],
-    /// There was no solution, where the estimate is that of MIS, or techniques were dropped.
+    /// True if there was no solution (the estimate is then MIS), or if techniques were dropped.
     pub is_ill_conditioned: bool,
 }
 
 /// α of A α = b from `sums` of columns that are **not** centred, r_j = p_j/p_α: `alpha[3 j + channel]`; all 0 on error.
 ///
-/// Returns the number of techniques that were dropped because they depend on the others: the solution is one of many
-/// then. An error if anything is not finite, or if there are no more samples than independent techniques.
+/// Returns the number of techniques that were dropped since they are linearly dependent on the others; the solution is
+/// then not unique. An error if anything is not finite, or if there are no more samples than independent techniques.
 pub fn coefficients(equations: NormalEquations, sums: &[f32], alpha: &mut [f32]) -> Result<usize, IllConditioned> {
     let alpha = &mut alpha[..equations.coefficients()];
     let result = try_coefficients(equations, sums, alpha);

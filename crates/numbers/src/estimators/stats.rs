@@ -1,4 +1,4 @@
-//! Running moments and tests of hypotheses, in f64.
+//! Running moments and hypothesis tests, in f64.
 //!
 //! - χ²: Σ (observed − expected)² / expected against the χ² distribution [Pearson 1900]; bins with few expected counts
 //!   are pooled, since the approximation needs about five of them [Cochran 1954].
@@ -21,19 +21,19 @@ pub struct ChiSquared {
     pub dof: usize,
     /// Probability of a statistic at least as large if the model is true.
     pub p_value: f64,
-    /// `p_value` is below the significance asked for, or counts fell where none can fall.
+    /// True if `p_value` is below the significance, or if counts occurred in a bin of expectation 0.
     pub rejected: bool,
 }
 
-/// Pearson's χ² test of `observed` counts against `expected` counts. Bins are taken in the order of their expected
-/// count and those below [`MIN_EXPECTED`] are added up until they reach it. A count in a bin whose expectation is 0
-/// rejects the model outright. Panics if the slices differ in length.
+/// Pearson's χ² test of `observed` counts against `expected` counts. Bins are processed in the order of their expected
+/// counts; bins below [`MIN_EXPECTED`] are pooled until they reach it. A count in a bin whose expectation is 0 rejects
+/// the model. Panics if the slices differ in length.
 pub fn chi_squared_test(observed: &[f64], expected: &[f64], significance: f64) -> ChiSquared {
     assert_eq!(observed.len(), expected.len(), "one expectation per bin");
     let mut order: Vec<usize> = (0..expected.len()).collect();
     order.sort_by(|&a, &b| expected[a].total_cmp(&expected[b]));
 
-    // Pool bins until each pool expects enough.
+    // Pool bins until the expectation of each pool is large enough.
     let mut pools: Vec<(f64, f64)> = Vec::new();
     let mut open = (0.0, 0.0);
     let mut impossible = false;
@@ -45,7 +45,7 @@ pub fn chi_squared_test(observed: &[f64], expected: &[f64], significance: f64) -
             open = (0.0, 0.0);
         }
     }
-    // Bins come in rising order, so what stays open at the end is all there is: give it to the last pool.
+    // Bins are in ascending order, so an incomplete pool at the end is small: add it to the last pool.
     match pools.last_mut() {
         Some(last) => *last = (last.0 + open.0, last.1 + open.1),
         None => pools.push(open),
@@ -57,8 +57,8 @@ pub fn chi_squared_test(observed: &[f64], expected: &[f64], significance: f64) -
     ChiSquared { statistic, dof, p_value, rejected: p_value < significance }
 }
 
-/// Probability of a χ² of `dof` degrees of freedom that is at least `statistic`; 1 without degrees of freedom. Above
-/// a hundred thousand degrees, where the incomplete gamma function takes long, the cube root of χ² / dof is taken as
+/// Probability that χ² with `dof` degrees of freedom is at least `statistic`; 1 without degrees of freedom. Above a
+/// hundred thousand degrees, where the incomplete gamma function is slow, the cube root of χ² / dof is approximated as
 /// normal [Wilson and Hilferty 1931].
 pub fn chi_squared_tail(statistic: f64, dof: usize) -> f64 {
     if dof == 0 || statistic <= 0.0 {
@@ -76,8 +76,8 @@ pub fn chi_squared_tail(statistic: f64, dof: usize) -> f64 {
     0.5 * erfc(z * std::f64::consts::FRAC_1_SQRT_2)
 }
 
-/// Significance of each of `tests` independent tests so that all of them together reject a true model with
-/// probability `familywise` [Šidák 1967].
+/// Significance of each of `tests` independent tests such that together they reject a true model with probability
+/// `familywise` [Šidák 1967].
 pub fn sidak(familywise: f64, tests: usize) -> f64 {
     -((-familywise).ln_1p() / tests as f64).exp_m1()
 }
@@ -97,8 +97,8 @@ pub fn z_test(mean: f64, expected: f64, standard_error: f64) -> MeanTest {
     MeanTest { statistic, p_value: erfc(statistic.abs() * std::f64::consts::FRAC_1_SQRT_2) }
 }
 
-/// Two-sided Student test of the mean of `samples` against `expected`. With fewer than two samples nothing can be
-/// rejected and the p-value is 1.
+/// Two-sided Student test of the mean of `samples` against `expected`. With fewer than two samples nothing is rejected,
+/// and the p-value is 1.
 pub fn t_test(samples: &Welford, expected: f64) -> MeanTest {
     if samples.count() < 2 {
         return MeanTest { statistic: 0.0, p_value: 1.0 };
@@ -115,12 +115,12 @@ pub fn two_sample_z_test(a: &Welford, b: &Welford) -> MeanTest {
     z_test(a.mean(), b.mean(), a.standard_error().hypot(b.standard_error()))
 }
 
-/// `difference / standard_error`, where an exact match of constants is 0 and not NaN.
+/// `difference / standard_error`; 0 instead of NaN for an exact match of constants.
 fn standardised(difference: f64, standard_error: f64) -> f64 {
     if difference == 0.0 { 0.0 } else { difference / standard_error }
 }
 
-/// The median: the middle value, or the mean of the middle two; 0 of none.
+/// The median: the middle value, or the mean of the middle two; 0 without values.
 pub fn median(values: impl IntoIterator<Item = f64>) -> f64 {
     let mut sorted: Vec<f64> = values.into_iter().collect();
     sorted.sort_by(f64::total_cmp);
@@ -297,12 +297,12 @@ mod tests {
 
     #[test]
     fn pools_hold_what_they_must_and_the_statistic_is_their_sum() {
-        // The two small bins make one pool of 6, at exactly the minimum a bin stands alone
+        // The two small bins form one pool of 6; a bin at exactly the minimum remains alone
         let chi = chi_squared_test(&[6.0, 3.0, 1.0, 20.0], &[5.0, 4.0, 2.0, 16.0], 0.3);
         assert_eq!(chi.dof, 2);
         assert!((chi.statistic - (4.0 / 6.0 + 1.0 / 5.0 + 1.0)).abs() < 1e-12, "{chi:?}");
         assert!(!chi.rejected && chi_squared_test(&[6.0, 3.0, 1.0, 40.0], &[5.0, 4.0, 2.0, 16.0], 0.3).rejected);
-        // What expects nothing and has nothing counts for nothing
+        // A bin without expectation and without counts has no effect
         assert_eq!(chi_squared_test(&[0.0], &[0.0], 0.5).statistic, 0.0);
     }
 }

@@ -7,7 +7,7 @@ use super::ONE_MINUS_EPSILON;
 /// A choice made by [`AliasTable::sample`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DiscreteSample {
-    /// What was chosen.
+    /// The chosen index.
     pub index: usize,
     /// Probability of the choice.
     pub pmf: f32,
@@ -39,7 +39,7 @@ impl AliasTable {
         }
         let pmf: Vec<f32> = weights.iter().map(|&w| (weight(w) / sum) as f32).collect();
 
-        // Mean weight 1: bins below it are filled up by bins above it.
+        // Mean weight 1: bins below it are filled up from bins above it.
         let scale = weights.len() as f64 / sum;
         let mut scaled: Vec<f64> = weights.iter().map(|&w| weight(w) * scale).collect();
         let (mut under, mut over): (Vec<u32>, Vec<u32>) =
@@ -55,7 +55,7 @@ impl AliasTable {
             }
         }
 
-        // Rounding leaves bins of weight 1; were one of them impossible, it must stay impossible.
+        // Rounding leaves bins of weight 1; an impossible entry among them must remain impossible.
         let likeliest = (0..pmf.len()).fold(0, |best, i| if pmf[i] > pmf[best] { i } else { best }) as u32;
         for i in under.into_iter().chain(over) {
             let possible = pmf[i as usize] > 0.0;

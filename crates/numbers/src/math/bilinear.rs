@@ -1,14 +1,14 @@
-//! Functions over [0, 1]² that are bilinear between the points of a grid, and densities of that form, sampled by
-//! inversion: of the marginal over rows first, then of what is given within the row [Dupuy and Jakob 2018, §4].
+//! Bilinear functions on a grid over [0, 1]², and bilinear densities, sampled by inversion: first the marginal over
+//! rows, then the conditional within the row [Dupuy and Jakob 2018, §4].
 //!
-//! They come as families: one table at each point of a grid of two parameters. Between these points tables are blended
-//! linearly. Every table of a density is normalised by itself, so that a blend of them integrates to 1 as well, and its
-//! running integrals are the blend of theirs.
+//! They form families: one table at each point of a grid of two parameters, with linear blending between these points.
+//! Every table of a density is normalised, so that a blend integrates to 1 as well, and the running integrals of the
+//! blend are the blend of the running integrals.
 
 use super::{Rgb, Sample2D, Vec2};
 use std::ops::{Add, Mul};
 
-/// The values of two parameters where there are tables.
+/// The grid of the two parameters of a family.
 #[derive(Clone, Debug)]
 pub struct ParameterGrid {
     axes: [Vec<f32>; 2],
@@ -22,7 +22,7 @@ pub struct Blend {
 }
 
 impl Blend {
-    /// A table as it is.
+    /// A single table.
     pub fn only(table: usize) -> Self {
         Blend { tables: [(table, 1.0); 4], count: 1 }
     }
@@ -37,18 +37,18 @@ impl Blend {
 }
 
 impl ParameterGrid {
-    /// From the values along both axes; `None` unless there are some, and they increase.
+    /// From the values along both axes; `None` if they are empty or not increasing.
     pub fn new(axes: [Vec<f32>; 2]) -> Option<Self> {
         let increases = |axis: &Vec<f32>| !axis.is_empty() && axis.windows(2).all(|w| w[0] < w[1]);
         axes.iter().all(increases).then_some(ParameterGrid { axes })
     }
 
-    /// Number of tables: that of [i, j] is i · (length of the second axis) + j.
+    /// Number of tables; the index of table [i, j] is i · (length of the second axis) + j.
     pub fn tables(&self) -> usize {
         self.axes[0].len() * self.axes[1].len()
     }
 
-    /// The tables around a point, which is moved into the grid.
+    /// The tables around a point, which is clamped to the grid.
     #[inline]
     pub fn at(&self, parameters: [f32; 2]) -> Blend {
         let [(i, s), (j, t)] = [0, 1].map(|a| place(&self.axes[a], parameters[a]));
@@ -69,7 +69,8 @@ impl ParameterGrid {
     }
 }
 
-/// The value below `x` of those that increase, and how far the way to the next one `x` is, which is 0 at the last.
+/// Index of the greatest value up to `x` among increasing values, and the relative position of `x` between it and the
+/// next one (0 at the last value).
 #[inline]
 fn place(axis: &[f32], x: f32) -> (usize, f32) {
     let last = axis.len() - 1;
@@ -77,11 +78,11 @@ fn place(axis: &[f32], x: f32) -> (usize, f32) {
     if i == last {
         return (last, 0.0);
     }
-    // NaN is at the first value
+    // NaN is treated as the first value
     (i, ((x - axis[i]) / (axis[i + 1] - axis[i])).max(0.0))
 }
 
-/// What can be interpolated.
+/// A type that can be interpolated linearly.
 pub trait Linear: Copy + Add<Output = Self> + Mul<f32, Output = Self> {}
 
 impl Linear for f32 {}
@@ -92,19 +93,18 @@ fn lerp<T: Linear>(a: T, b: T, t: f32) -> T {
     a * (1.0 - t) + b * t
 }
 
-/// A family of functions over [0, 1]² by their values at the points of a grid, of which the first and the last are on
-/// the edge.
+/// A family of functions over [0, 1]², given by values at the points of a grid that includes the edges.
 #[derive(Clone, Debug)]
 pub struct BilinearTables<T> {
     /// Columns and rows.
     size: [usize; 2],
-    /// Rows of columns, table by table.
+    /// Values row by row, table by table.
     values: Vec<T>,
 }
 
 impl<T: Linear> BilinearTables<T> {
-    /// From the values, row by row and table by table, of so many columns and rows; `None` unless there are 2 or more of
-    /// both, and as many values as whole tables have.
+    /// From the values, row by row and table by table; `None` unless there are at least 2 columns and 2 rows, and a
+    /// whole number of tables.
     pub fn new([columns, rows]: [usize; 2], values: Vec<T>) -> Option<Self> {
         let is_whole = columns.checked_mul(rows).is_some_and(|n| n > 0 && values.len().is_multiple_of(n));
         (columns >= 2 && rows >= 2 && is_whole).then_some(BilinearTables { size: [columns, rows], values })
@@ -125,7 +125,7 @@ impl<T: Linear> BilinearTables<T> {
     }
 }
 
-/// The cell among n − 1 that holds `x` of [0, 1], and how far in it.
+/// The cell among n − 1 that contains `x` in [0, 1], and the relative position in it.
 #[inline]
 fn cell(x: f32, n: usize) -> (usize, f32) {
     let x = x.clamp(0.0, 1.0) * (n - 1) as f32;
@@ -136,7 +136,7 @@ fn cell(x: f32, n: usize) -> (usize, f32) {
 /// A family of densities over [0, 1]².
 #[derive(Clone, Debug)]
 pub struct PiecewiseBilinear2D {
-    /// Per unit area.
+    /// Densities per unit area.
     density: BilinearTables<f32>,
     /// Integral along each row up to each column.
     within: Vec<f32>,
@@ -145,8 +145,8 @@ pub struct PiecewiseBilinear2D {
 }
 
 impl PiecewiseBilinear2D {
-    /// From what the densities are proportional to, as [`BilinearTables::new`]. Values below 0 and NaN count as 0; a
-    /// table that is 0 everywhere becomes the uniform density.
+    /// From unnormalised densities, in the layout of [`BilinearTables::new`]. Negative values and NaN count as 0; a
+    /// table of zeros becomes the uniform density.
     pub fn new(size: [usize; 2], values: Vec<f32>) -> Option<Self> {
         let mut density = BilinearTables::new(size, values)?;
         let [columns, rows] = size;
@@ -161,7 +161,7 @@ impl PiecewiseBilinear2D {
             } else {
                 table.iter_mut().for_each(|v| *v = (f64::from(*v) / total) as f32);
             }
-            // Of the normalised values, lest rounding leaves a difference
+            // Computed from the normalised values, so that rounding is consistent
             let along: Vec<Vec<f64>> = table.chunks_exact(columns).map(|row| running(row.iter().copied())).collect();
             within.extend(along.iter().flatten().map(|&c| c as f32));
             marginal.extend(running(along.iter().map(integral)).iter().map(|&c| c as f32));
@@ -169,11 +169,11 @@ impl PiecewiseBilinear2D {
         Some(PiecewiseBilinear2D { density, within, rows: marginal })
     }
 
-    /// A point by inversion of `u`: by its second number among the rows, by the first within the row.
+    /// Samples a point by inversion of `u`: the second number selects the row, the first the column.
     #[inline]
     pub fn sample(&self, blend: &Blend, u: Vec2) -> Sample2D {
         let [columns, rows] = self.density.size;
-        // Above 0, so that what is found has a density
+        // Positive, so that the result has a density
         let u = u.clamp(Vec2::splat(f32::MIN_POSITIVE), Vec2::ONE);
 
         // Find the row
@@ -200,7 +200,7 @@ impl PiecewiseBilinear2D {
         self.density.at(blend, p)
     }
 
-    /// The u whose point is `p`.
+    /// Inverse of [`Self::sample`]: the u that maps to `p`.
     #[inline]
     pub fn invert(&self, blend: &Blend, p: Vec2) -> Vec2 {
         let [columns, rows] = self.density.size;
@@ -228,7 +228,7 @@ impl PiecewiseBilinear2D {
     }
 }
 
-/// Integrals of what is linear between values that are evenly spaced over [0, 1], up to each of them.
+/// Integrals of the piecewise linear function through evenly spaced values over [0, 1], up to each of them.
 fn running(values: impl ExactSizeIterator<Item = f32>) -> Vec<f64> {
     let step = 0.5 / (values.len() - 1) as f64;
     let mut before: Option<f64> = None;
@@ -242,7 +242,7 @@ fn running(values: impl ExactSizeIterator<Item = f32>) -> Vec<f64> {
     values.map(next).collect()
 }
 
-/// The last of n − 1 cells that begins below `target`, and what is left of `target` there; `begin` increases.
+/// The last of n − 1 cells that begins below `target`, and the rest of `target` in it; `begin` must increase.
 #[inline]
 fn find(n: usize, target: f32, begin: impl Fn(usize) -> f32) -> (usize, f32) {
     let (mut low, mut high) = (0, n - 1);
@@ -253,16 +253,16 @@ fn find(n: usize, target: f32, begin: impl Fn(usize) -> f32) -> (usize, f32) {
     (low, (target - begin(low)).max(0.0))
 }
 
-/// ∫ from 0 to t of what goes linearly from `a` at 0 to `b` at 1.
+/// ∫ from 0 to t of the linear function with the values `a` at 0 and `b` at 1.
 #[inline]
 fn integral_linear(a: f32, b: f32, t: f32) -> f32 {
     t * (a + 0.5 * t * (b - a))
 }
 
-/// The t of [`integral_linear`].
+/// Inverse of [`integral_linear`].
 #[inline]
 fn invert_linear(a: f32, b: f32, integral: f32) -> f32 {
-    // The solution without cancellation
+    // The form without cancellation
     let sum = a + (a * a + 2.0 * integral * (b - a)).max(0.0).sqrt();
     if sum > 0.0 { (2.0 * integral / sum).min(1.0) } else { 0.0 }
 }
@@ -314,7 +314,7 @@ mod tests {
 
     #[test]
     fn tables_are_bilinear() {
-        // x + 10 y + 100 x y is its own interpolation
+        // x + 10 y + 100 x y is reproduced exactly by interpolation
         let f = |p: Vec2| p.x + 10.0 * p.y + 100.0 * p.x * p.y;
         let points = (0..12).map(|i| Vec2::new((i % 4) as f32 / 3.0, (i / 4) as f32 / 2.0));
         let table = BilinearTables::new([4, 3], points.map(f).collect()).unwrap();

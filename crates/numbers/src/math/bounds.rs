@@ -18,7 +18,7 @@ impl Default for Bounds3 {
 }
 
 impl Bounds3 {
-    /// The box that contains nothing.
+    /// The empty box.
     pub const EMPTY: Bounds3 = Bounds3 { min: Vec3::splat(f32::INFINITY), max: Vec3::splat(f32::NEG_INFINITY) };
 
     /// The smallest box of the points.
@@ -26,21 +26,21 @@ impl Bounds3 {
         points.into_iter().fold(Bounds3::EMPTY, |b, p| b.union_point(p))
     }
 
-    /// The smallest box that holds `self` and `p`.
+    /// The smallest box that contains `self` and `p`.
     #[inline]
     #[must_use]
     pub fn union_point(self, p: Vec3) -> Self {
         Bounds3 { min: self.min.min(p), max: self.max.max(p) }
     }
 
-    /// The smallest box that holds both.
+    /// The smallest box that contains both.
     #[inline]
     #[must_use]
     pub fn union(self, other: Bounds3) -> Self {
         Bounds3 { min: self.min.min(other.min), max: self.max.max(other.max) }
     }
 
-    /// True if it holds no point.
+    /// True if it contains no point.
     #[inline]
     pub fn is_empty(&self) -> bool {
         self.min.cmpgt(self.max).any()
@@ -58,7 +58,7 @@ impl Bounds3 {
         self.max - self.min
     }
 
-    /// Half the surface area, the quantity that the surface-area heuristic compares.
+    /// Half the surface area, as used by the surface-area heuristic.
     #[inline]
     pub fn half_area(&self) -> f32 {
         if self.is_empty() {

@@ -1,15 +1,15 @@
-//! Choice by inversion from the running sums of weights: S_i = w_0 + … + w_i.
+//! Discrete choice by inversion of running sums of weights: S_i = w_0 + … + w_i.
 //!
 //! The sums of a table may be normalised or not, and are kept in whatever type suits their owner: f64 where many
 //! weights are summed, f32 for a few at a point, whole numbers where things are counted. A table is a slice, so that it
 //! can be a part of a longer one.
 
-/// A running sum.
+/// A type of running sums.
 pub trait RunningSum: Copy {
-    /// What sums are compared and subtracted as.
+    /// The type in which sums are compared and subtracted.
     type Number: Copy + Default + PartialOrd + std::ops::Sub<Output = Self::Number>;
 
-    /// The sum as such a number.
+    /// Converts the sum to that type.
     fn number(self) -> Self::Number;
 }
 
@@ -40,14 +40,14 @@ impl RunningSum for u32 {
     }
 }
 
-/// The first place whose sum is more than `x`, so that places without weight are never found; `sums.len()` if there is
+/// The first index whose sum exceeds `x`, so that indices without weight are never chosen; `sums.len()` if there is
 /// none.
 #[inline]
 pub fn find<S: RunningSum>(sums: &[S], x: S::Number) -> usize {
     sums.partition_point(|sum| sum.number() <= x)
 }
 
-/// As [`find`], of `count` sums that are computed: `sum(i)` must not fall.
+/// As [`find`], for `count` computed sums; `sum(i)` must not decrease.
 pub fn find_computed<N: PartialOrd>(count: usize, sum: impl Fn(usize) -> N, x: N) -> usize {
     let (mut low, mut high) = (0, count);
     while low < high {
@@ -57,13 +57,13 @@ pub fn find_computed<N: PartialOrd>(count: usize, sum: impl Fn(usize) -> N, x: N
     low
 }
 
-/// The sum of the weights before place `i`.
+/// The sum of the weights before index `i`.
 #[inline]
 pub fn sum_before<S: RunningSum>(sums: &[S], i: usize) -> S::Number {
     if i == 0 { S::Number::default() } else { sums[i - 1].number() }
 }
 
-/// The weight of place `i`, as rounding has left it: the chance with which [`find`] finds it, in the unit of the sums.
+/// The weight of index `i` including rounding: the probability with which [`find`] chooses it, in units of the sums.
 #[inline]
 pub fn weight<S: RunningSum>(sums: &[S], i: usize) -> S::Number {
     sums[i].number() - sum_before(sums, i)

@@ -1,11 +1,9 @@
 //! Piecewise-constant densities over [0, 1] and [0, 1]², sampled by inversion [Pharr et al. 2023, §A.4.7, §A.5.6].
 //!
-//! Sums are in f64; the tables are f32. A bin of value 0 is never sampled, a function that is 0 everywhere has no
-//! samples.
+//! Sums are in f64; the tables are f32. A bin of value 0 is never sampled; a function of zeros has no samples.
 //!
-//! Where to look in a running integral is told by a guide [Chen and Asau 1974]: for each of G equal parts of [0, 1),
-//! the bin of its beginning. From there bins are passed eight at a time, on average ⌈n/8G⌉ times whatever the values
-//! are.
+//! A guide table [Chen and Asau 1974] accelerates the inversion: for each of G equal parts of [0, 1), it stores the bin
+//! of its beginning. From there, bins are skipped eight at a time, on average ⌈n/8G⌉ times for any values.
 
 use super::{ONE_MINUS_EPSILON, Vec2};
 
@@ -35,15 +33,15 @@ pub(super) fn bin_of(x: f32, n: usize) -> usize {
     ((x * n as f32) as usize).min(n - 1)
 }
 
-/// Bins that are passed at a time.
+/// Number of bins skipped at a time.
 pub const STEP: usize = 8;
 
-/// Length of the table of a running integral over `n` bins: n + 1 values, and as many as may be read behind them.
+/// Length of the table of a running integral over `n` bins: n + 1 values, and padding for reads beyond the end.
 const fn cdf_len(n: usize) -> usize {
     n + 1 + STEP
 }
 
-/// Length of the guide over `n` bins: a power of two, by which u is multiplied without rounding.
+/// Length of the guide over `n` bins: a power of two, so that the multiplication by it is exact.
 const fn guide_len(n: usize) -> usize {
     n.div_ceil(4).next_power_of_two()
 }
@@ -65,13 +63,13 @@ fn fill_cdf(values: &[f32], cdf: &mut [f32], guide: &mut [u16]) -> f64 {
         while bin + 1 < n && cdf[bin + 1] <= part as f32 / parts {
             bin += 1;
         }
-        // A bin too low costs steps and is no error.
+        // A bin that is too low costs steps but is correct.
         *first = bin.min(usize::from(u16::MAX)) as u16;
     }
     sum / n as f64
 }
 
-/// A bin of a running integral that was found for a number.
+/// The bin of a running integral that contains a number.
 #[derive(Clone, Copy, Debug)]
 pub struct Bin {
     /// Index.
@@ -83,7 +81,7 @@ pub struct Bin {
 }
 
 impl Bin {
-    /// How far the number is from the beginning to the end, in [0, 1).
+    /// Relative position of the number in the bin, in [0, 1).
     #[inline(always)]
     pub fn fraction(&self, u: f32) -> f32 {
         ((u - self.begin) / (self.end - self.begin)).min(ONE_MINUS_EPSILON)
@@ -93,9 +91,9 @@ impl Bin {
 /// A running integral and its guide.
 #[derive(Clone, Copy, Debug)]
 pub struct Running<'a> {
-    /// The integral at the bounds of the bins, and behind them infinity, [`STEP`] times.
+    /// The integral at the bounds of the bins, followed by [`STEP`] infinities.
     pub cdf: &'a [f32],
-    /// For each equal part of [0, 1), a power of two, at most the bin of its beginning.
+    /// For each part of [0, 1), a power of two in number, a bin that is at most the bin of its beginning.
     pub guide: &'a [u16],
 }
 
@@ -122,13 +120,13 @@ impl Running<'_> {
     }
 }
 
-/// The number clamped to those that have a bin.
+/// The number, clamped to the range that has bins.
 #[inline(always)]
 pub fn clamped(u: f32) -> f32 {
     u.clamp(0.0, ONE_MINUS_EPSILON)
 }
 
-/// The point of [0, 1) at a `fraction` of bin `i`, one of `n`.
+/// The point of [0, 1) at the relative position `fraction` in bin `i` of `n`.
 #[inline]
 pub(super) fn place_in_bin(i: usize, fraction: f32, n: usize) -> f32 {
     let mut x = (i as f32 + fraction) / n as f32;
@@ -142,7 +140,7 @@ pub(super) fn place_in_bin(i: usize, fraction: f32, n: usize) -> f32 {
     x
 }
 
-/// The u whose place is `x`.
+/// The u that maps to `x`.
 #[inline]
 fn apply_cdf(cdf: &[f32], x: f32, n: usize) -> f32 {
     let i = bin_of(x, n);
@@ -150,7 +148,7 @@ fn apply_cdf(cdf: &[f32], x: f32, n: usize) -> f32 {
     cdf[i] + within * (cdf[i + 1] - cdf[i])
 }
 
-/// Values that can be a density: negative and non-finite ones become 0.
+/// Valid values of a density: negative and non-finite ones become 0.
 pub(super) fn cleaned(values: &[f32]) -> Vec<f32> {
     values.iter().map(|&v| if v.is_finite() { v.max(0.0) } else { 0.0 }).collect()
 }
@@ -165,7 +163,7 @@ pub struct PiecewiseConstant1D {
 }
 
 impl PiecewiseConstant1D {
-    /// The density proportional to `values` (at least one), which negative or non-finite ones enter as 0.
+    /// The density proportional to `values` (at least one). Negative or non-finite values count as 0.
     pub fn new(values: &[f32]) -> Self {
         let values = if values.is_empty() { vec![0.0] } else { cleaned(values) };
         let mut cdf = vec![0.0; cdf_len(values.len())];
@@ -234,13 +232,13 @@ pub struct PiecewiseConstant2D {
     marginal: PiecewiseConstant1D,
     width: usize,
     height: usize,
-    /// Length of the guide of a row.
+    /// Length of the guide table of a row.
     guide_len: usize,
 }
 
 impl PiecewiseConstant2D {
-    /// The density proportional to `values`, row-major from y = 0, of a grid `width` wide; rows that are not complete
-    /// are dropped. Negative or non-finite values enter as 0.
+    /// The density proportional to `values`, row-major from y = 0, of a grid `width` wide; incomplete rows are ignored.
+    /// Negative or non-finite values count as 0.
     pub fn new(values: &[f32], width: usize) -> Self {
         let width = width.max(1);
         let height = (values.len() / width).max(1);
@@ -290,7 +288,7 @@ impl PiecewiseConstant2D {
         Running { cdf: self.row_cdf(y), guide }
     }
 
-    /// The bins in x and y of `u`, which is clamped to [0, 1), and the clamped u; of the last row if the function is 0.
+    /// The bins in x and y of `u`, which is clamped to [0, 1), and the clamped u; the last row if the function is 0.
     #[inline]
     pub fn bins(&self, u: [f32; 2]) -> ([Bin; 2], [f32; 2]) {
         let u = u.map(clamped);
@@ -318,7 +316,7 @@ impl PiecewiseConstant2D {
         self.pdf_of_cell([bin_of(p.x, self.width), bin_of(p.y, self.height)])
     }
 
-    /// Density in the cell of column and row, per unit area.
+    /// Density in the cell [column, row], per unit area.
     #[inline]
     pub fn pdf_of_cell(&self, [x, y]: [usize; 2]) -> f32 {
         if self.marginal.integral <= 0.0 {

@@ -1,5 +1,5 @@
-//! Elementary functions of single samples and of vectors of them: additions and multiplications in one order, so that the
-//! bits are the same for both.
+//! Elementary functions of single samples and of vectors: a fixed order of additions and multiplications, so that both
+//! are bit-identical.
 
 use super::number::Number;
 use super::v3::V3;
@@ -17,7 +17,7 @@ pub fn sin_cos_eighth<N: Number>(x: N) -> (N, N) {
 /// sin 2πt and cos 2πt for 0 ≤ t ≤ 1; errors below 2⁻²³.
 #[inline(always)]
 pub fn sin_cos_turn<N: Number>(t: N) -> (N, N) {
-    // The nearest quarter turn, and the rest, which is exact.
+    // The nearest quarter turn, and the exact remainder.
     let quarters = (t * 4.0).nearest();
     let (sin, cos) = sin_cos_eighth((t - quarters * 0.25) * TAU);
     let (half, later) = (t.constant(0.5), t.constant(2.5));
@@ -50,14 +50,14 @@ pub fn arctangent<N: Number>(short: N, long: N) -> N {
 pub fn exp<N: Number>(x: N) -> N {
     let bounded = x.greater(x.constant(-87.0)).lesser(x.constant(88.0));
     let powers = (bounded * LOG2_E).nearest();
-    // ln 2 in two parts, of which the first has few digits.
+    // ln 2 as a sum of two numbers, the first with few digits.
     let r = bounded - powers * 0.693_359_375 + powers * 2.121_944_4e-4;
     let series =
         (((((r * (1.0 / 720.0) + 1.0 / 120.0) * r + 1.0 / 24.0) * r + 1.0 / 6.0) * r + 0.5) * r + 1.0) * r + 1.0;
     (series * powers.power_of_two()).or_zero(x.above(x.constant(-86.0)))
 }
 
-/// ln x for x > 0 that is not denormal, by the series of the area tangent; errors below 2⁻²² of the larger of ln x and 1.
+/// ln x for normal x > 0, by the area tangent series; errors below 2⁻²² of the larger of ln x and 1.
 #[inline(always)]
 pub fn ln<N: Number>(x: N) -> N {
     let (exponent, m) = x.parts();
@@ -76,7 +76,7 @@ pub fn power_of_fraction<N: Number>(x: N, y: N) -> N {
     exp(ln(x.greater(least)) * y).or_zero(x.above(x.constant(0.0)))
 }
 
-/// The disk under the square 0..1 [Shirley and Chiu 1997].
+/// Maps the square 0..1 to the disk [Shirley and Chiu 1997].
 #[inline(always)]
 pub fn concentric_disk<N: Number>(u: [N; 2]) -> (N, N) {
     let (x, y) = (u[0] * 2.0 - 1.0, u[1] * 2.0 - 1.0);
@@ -88,7 +88,7 @@ pub fn concentric_disk<N: Number>(u: [N; 2]) -> (N, N) {
     (radius * N::choose(is_x, cos, sin), radius * N::choose(is_x, sin, cos))
 }
 
-/// A direction of the upper hemisphere by the cosine.
+/// A cosine-weighted direction of the upper hemisphere.
 #[inline(always)]
 pub fn cosine_hemisphere<N: Number>(u: [N; 2]) -> V3<N> {
     let (x, y) = concentric_disk(u);

@@ -25,8 +25,8 @@ impl Frame {
         Frame { x, y, z }
     }
 
-    /// The frame about the unit vector `z` whose x is as near to `x` as can be;
-    /// any frame if `x` is zero or parallel to `z`.
+    /// The frame about the unit vector `z` whose x axis is nearest to `x`; some frame if `x` is zero or parallel to
+    /// `z`.
     #[inline]
     pub fn from_xz(x: Vec3, z: Vec3) -> Self {
         let tangent = x - z * z.dot(x);

@@ -26,7 +26,7 @@ pub fn unit_f32(bits: u32) -> f32 {
     (bits >> 8) as f32 * (1.0 / 16_777_216.0)
 }
 
-/// Hash of a byte-exact tuple of floats, for decisions that must depend on geometry only.
+/// Hash of the bits of a tuple of floats, for decisions that must depend on geometry only.
 #[inline]
 pub fn hash_floats(values: &[f32]) -> u32 {
     let mut state = [0x9e37_79b9, 0x85eb_ca6b, 0xc2b2_ae35, values.len() as u32];

@@ -1,27 +1,31 @@
-//! What lights within a common bound may contribute at a point [Conty Estévez and Kulla 2018; Pharr et al. 2023, §12.6.3].
+//! Upper bounds of the contribution of lights with common bounds at a point [Conty Estévez and Kulla 2018; Pharr et al.
+//! 2023, §12.6.3].
 //!
-//! The importance at p is I·cos θ′·cos θi′/max(d², r²): I the summed intensity, d the distance to the centre of the bounding
-//! sphere, r that sphere's radius, θ′ the minimum angle between an emitter's normal and the direction to p, θi′ the minimum
-//! angle between the surface normal and a direction to the lights. Both sides of the maximum are squared lengths, so the
-//! result does not depend on the unit of length. On glossy surfaces, cos θi′ gives way to [`GlossyLobe::reflected`].
+//! The importance at p is I·cos θ′·cos θi′/max(d², r²). I is the total intensity, d the distance to the centre of the
+//! bounding sphere, r its radius, θ′ the minimum angle between an emitter's normal and the direction to p, and θi′ the
+//! minimum angle between the surface normal and a direction to the lights. Both arguments of the maximum are squared
+//! lengths, so the result does not depend on the unit of length. On glossy surfaces, [`GlossyLobe::reflected`] replaces
+//! cos θi′.
 //!
-//! The lobe is about the mirror direction of the viewer, as in many-light sampling that follows the BRDF [Liu et al. 2019].
-//! For lights of the irradiance E on a plane towards them, the light that reaches the viewer is nearly
-//! E·((1 − s) cos θi + s·π D(h) G₁(wo)/(4 cos θo)), where s is the part of the albedo that is the lobe's and D the density
-//! of isotropic GGX microfacets. The mean over lights within the angle b of wi is that of wi with α² + sin²b/4 instead of
-//! α², since half vectors turn half as far as directions: no larger than 1/b², whatever α is.
+//! The lobe is about the mirror direction of the viewer, as in BRDF-aware many-light sampling [Liu et al. 2019]. For
+//! lights with the irradiance E on a plane facing them, the radiance reflected to the viewer is approximately
+//! proportional to E·((1 − s) cos θi + s·π D(h) G₁(wo)/(4 cos θo)), where s is the lobe's fraction of the albedo and D
+//! the density of isotropic GGX microfacets. The mean over lights within the angle b of wi is the value at wi with α² +
+//! sin²b/4 instead of α², since half vectors rotate by half the angle of directions. It is at most of order 1/b², for
+//! any α.
 
 use super::number::Number;
 use super::{Vec3, safe_sqrt, sqr};
 
 /// Slack of the cosines, for rounding: a light that can contribute never has importance 0.
 const COSINE_SLACK: f32 = 1e-3;
-/// Minimum probability of a child that can contribute; f32 uniforms and 1 − p do not resolve much less.
+/// Minimum probability of a child that can contribute; smaller ones are not resolved by f32 uniforms and 1 − p.
 const MIN_PROBABILITY: f32 = 1.0 / (1 << 20) as f32;
-/// Greatest part of the lobe: what it leaves out, anisotropy and light reflected several times, keeps a chance.
+/// Maximum fraction of the lobe: effects outside the model, such as anisotropy and multiple reflections, keep some
+/// probability.
 const MAX_SHARE: f32 = 0.95;
 
-/// A vector by component.
+/// A vector, by component.
 type Three<N> = [N; 3];
 
 /// Lights within a sphere and a cone of normals.
@@ -41,14 +45,14 @@ pub struct LightBound {
     two_sided: bool,
 }
 
-/// What the choice of a light knows of a point.
+/// The data of a point for the choice of a light.
 #[derive(Clone, Copy, Debug)]
 pub struct Receiver<N> {
     /// Position.
     pub p: Three<N>,
     /// Shading normal, unit; zero if there is none.
     pub ns: Three<N>,
-    /// What is reflected more than by a diffuse surface, if anything is.
+    /// The glossy lobe, if any.
     pub lobe: Option<GlossyLobe<N>>,
 }
 
@@ -57,7 +61,7 @@ pub struct Receiver<N> {
 pub struct GlossyLobe<N = f32> {
     /// Direction to the viewer, unit.
     pub wo: Three<N>,
-    /// Its cosine, signed, to the shading normal.
+    /// Signed cosine of `wo` to the shading normal.
     pub cos_o: N,
     /// α² of the microfacets.
     pub alpha_squared: N,
@@ -67,7 +71,7 @@ pub struct GlossyLobe<N = f32> {
     pub diffuse: N,
 }
 
-// No closures: in kernels their code would be compiled without the vectors
+// No closures: in kernels their code would be compiled without vector instructions
 
 #[inline(always)]
 fn three<N: Number>(number: N, v: Vec3) -> Three<N> {
@@ -79,13 +83,13 @@ fn dot<N: Number>(a: Three<N>, b: Three<N>) -> N {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
-/// The sine or cosine that goes with x.
+/// The sine that belongs to the cosine x, or vice versa.
 #[inline(always)]
 fn other<N: Number>(x: N) -> N {
     (x.constant(1.0) - x * x).greater(x.constant(0.0)).root()
 }
 
-/// cos(max(0, a − b)) by [sin, cos] of both.
+/// cos(max(0, a − b)), by [sin, cos] of both.
 #[inline(always)]
 fn cos_of_difference<N: Number>([sin_a, cos_a]: [N; 2], [sin_b, cos_b]: [N; 2]) -> N {
     cos_a.if_above(cos_b, cos_a.constant(1.0), cos_a * cos_b + sin_a * sin_b)
@@ -98,8 +102,8 @@ fn sin_of_difference<N: Number>([sin_a, cos_a]: [N; 2], [sin_b, cos_b]: [N; 2]) 
 }
 
 impl LightBound {
-    /// Lights within the sphere of the given `center` and `radius`, whose normals lie in the cone of the angle θo about `axis`
-    /// and which shine within the angle θe of them; on both sides if `two_sided`.
+    /// Lights within the sphere of the given `center` and `radius`, with normals in the cone of half-angle θo about
+    /// `axis`, and emission within the angle θe of the normals; on both sides if `two_sided`.
     pub fn new(
         (center, radius): (Vec3, f32),
         axis: Vec3,
@@ -111,7 +115,7 @@ impl LightBound {
         LightBound { center, radius_squared, axis, cos_theta_o, sin_theta_o, cos_theta_e, intensity, two_sided }
     }
 
-    /// Upper bound, up to a common factor, of what the lights contribute; 0 if none can.
+    /// Upper bound, up to a common factor, of the contribution of the lights; 0 if none can contribute.
     #[inline(always)]
     pub fn importance<N: Number>(&self, at: &Receiver<N>) -> N {
         let number = at.p[0];
@@ -130,7 +134,7 @@ impl LightBound {
         let sin2_b = radius_squared / d2;
         let b = [sin2_b.root(), (one - sin2_b).greater(zero).root()];
 
-        // Angle between the axis and the direction to p, less the cone of normals, less the extent
+        // Angle between the axis and the direction to p, minus the cone of normals, minus the angular extent
         let cos_axis = zero - dot(wi, axis);
         let cos_w = if self.two_sided { cos_axis.magnitude() } else { cos_axis };
         let w = [other(cos_w), cos_w];
@@ -144,7 +148,7 @@ impl LightBound {
         let importance = number.constant(self.intensity) * cos_light.greater(slack) / d2;
         let importance = cos_light.if_at_least(is_seen, importance, zero);
 
-        // The surface may transmit, so light from its back counts too
+        // The surface may transmit, so light from behind counts too
         let cos = dot(wi, at.ns);
         let cos_i = cos.magnitude().lesser(one);
         let cos_max = cos_of_difference([other(cos_i), cos_i], b).greater(slack);
@@ -163,11 +167,11 @@ pub fn first_probability<N: Number>([a, b]: [N; 2], [first, second]: [&LightBoun
 }
 
 impl GlossyLobe {
-    /// No lobe: all is diffuse.
+    /// No lobe: purely diffuse.
     pub const NONE: GlossyLobe = GlossyLobe { wo: [0.0; 3], cos_o: 0.0, alpha_squared: 0.0, scale: 0.0, diffuse: 1.0 };
 
-    /// The lobe of microfacets of roughness `alpha`, about the shading normal `ns`, that has `share` (0 to 1) of the
-    /// albedo seen from `wo`; all vectors unit.
+    /// The lobe of microfacets of roughness `alpha` about the shading normal `ns`, with the fraction `share` (0 to 1)
+    /// of the albedo for the direction `wo`; all vectors unit.
     pub fn new(wo: Vec3, ns: Vec3, alpha: f32, share: f32) -> Self {
         let (cos_o, alpha_squared, share) = (wo.dot(ns), sqr(alpha), share.min(MAX_SHARE));
         // G₁/|cos θo| of GGX, finite at the horizon
@@ -180,8 +184,8 @@ impl GlossyLobe {
 }
 
 impl<N: Number> GlossyLobe<N> {
-    /// π·f·|cos θi| over the albedo, for lights within an angle of the sine √`sin2_b` of the direction `wi`, whose cosine to
-    /// the shading normal is `cos_i`, and whose greatest absolute cosine among these lights is `cos_max`.
+    /// π·f·|cos θi| over the albedo, for lights within an angle of the sine √`sin2_b` of the direction `wi`. `cos_i` is
+    /// its cosine to the shading normal; `cos_max` is the maximum absolute cosine among these lights.
     #[inline(always)]
     pub fn reflected(&self, wi: Three<N>, cos_i: N, sin2_b: N, cos_max: N) -> N {
         let (zero, one, quarter) = (cos_i.constant(0.0), cos_i.constant(1.0), cos_i.constant(0.25));
@@ -192,7 +196,7 @@ impl<N: Number> GlossyLobe<N> {
         let alpha_squared = self.alpha_squared + quarter * sin2_b;
         let denominator = one - cos2_h * (one - alpha_squared);
         let lobe = diffuse + self.scale * alpha_squared / (denominator * denominator);
-        // On the other side, as far as all of them are there
+        // No lobe if all lights are on the other side
         let beyond = (cos_i * cos_i).if_at_least(sin2_b, diffuse, lobe);
         self.scale.if_above(zero, (cos_i * self.cos_o).if_above(zero, lobe, beyond), diffuse)
     }

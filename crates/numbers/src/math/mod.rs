@@ -1,8 +1,8 @@
-//! Numbers that know nothing of scenes: vectors, frames, colour, warps, distributions, rays.
+//! Scene-independent numerics: vectors, frames, colour, warps, distributions, rays.
 //!
-//! Conventions that hold in the whole program: `wo` points to the viewer and `wi` to the light,
-//! both unit and both away from the surface; the shading frame has n = +z; transforms are named
-//! `to_from`; colour is linear Rec.709; angles are radians; f32 for light.
+//! Conventions of the whole program: `wo` points to the viewer and `wi` to the light, both unit and away from the
+//! surface; the shading frame has n = +z; transforms are named `to_from`; colour is linear Rec.709; angles are in
+//! radians; light is in f32.
 //!
 //! Reading order: [`rgb`], [`frame`], [`transform`], [`origin`], [`ray`], [`bounds`], [`warp`], [`sphere_map`], [`octahedral`],
 //! [`cumulative`], [`distribution`], [`texel_distribution`], [`bilinear`], [`alias`], [`hash`], [`noise`],
@@ -50,7 +50,7 @@ pub fn sqr(x: f32) -> f32 {
     x * x
 }
 
-/// `sqrt(max(x, 0))`: for expressions that are non-negative but for rounding.
+/// `sqrt(max(x, 0))`: for expressions that are non-negative except for rounding.
 #[inline]
 pub fn safe_sqrt(x: f32) -> f32 {
     x.max(0.0).sqrt()

@@ -1,5 +1,5 @@
-//! Gradient noise in three dimensions [Perlin 2002], with the permutation of that paper, so that clouds are those of
-//! other renderers.
+//! Gradient noise in three dimensions [Perlin 2002], with the permutation of that paper, so that clouds match other
+//! renderers.
 
 use super::{DVec3, Vec3};
 
@@ -18,7 +18,7 @@ const PERMUTATION: [u8; 256] = [
     78, 66, 215, 61, 156, 180,
 ];
 
-/// Distance over which [`gradient`] takes differences.
+/// Step of the differences of [`gradient`].
 const DELTA: f32 = 0.01;
 
 #[inline]
@@ -26,7 +26,7 @@ fn permuted(i: usize) -> usize {
     usize::from(PERMUTATION[i & 255])
 }
 
-/// The gradient of a corner of the lattice, times the vector from there.
+/// Dot product of the gradient at a lattice corner and the offset from it.
 #[inline]
 fn corner(cell: [usize; 3], offset: Vec3) -> f32 {
     let hash = permuted(permuted(permuted(cell[0]) + cell[1]) + cell[2]) & 15;
@@ -36,7 +36,7 @@ fn corner(cell: [usize; 3], offset: Vec3) -> f32 {
     (if hash & 1 == 0 { u } else { -u }) + if hash & 2 == 0 { v } else { -v }
 }
 
-/// Noise of the frequency 1, about −1..1, which is 0 at all integer points.
+/// Noise of frequency 1 in about −1..1; it is 0 at all integer points.
 pub fn noise(p: DVec3) -> f32 {
     let base = p.floor();
     let f = (p - base).as_vec3();

@@ -1,13 +1,13 @@
-//! Formulas that are written once for single samples and for vectors of them.
+//! Formulas that are written once, for single samples and vectors.
 
 use std::ops::{Add, BitAnd, BitOr, Div, Mul, Neg, Not, Sub};
 
-/// Truth of one sample or of a vector of them.
+/// A truth value of one sample, or of a vector.
 pub trait Mask: Copy + BitAnd<Output = Self> + BitOr<Output = Self> + Not<Output = Self> {
-    /// True if any lane is.
+    /// True if any lane is true.
     fn any(self) -> bool;
 
-    /// True if all lanes are.
+    /// True if all lanes are true.
     fn all(self) -> bool;
 }
 
@@ -23,11 +23,11 @@ impl Mask for bool {
     }
 }
 
-/// Added to a number below 2²², the sum has no digits after the point.
+/// Adding this to a number below 2²² rounds it to an integer.
 pub const ROUNDS: f32 = 12_582_912.0;
 
-/// A number of one sample or of a vector of them: what a single sample and a kernel both need is written once over it,
-/// and has the same bits for both. NaN compares as false.
+/// A number of one sample, or of a vector. Formulas shared by single samples and kernels are written over it once and
+/// are bit-identical for both. Comparisons with NaN are false.
 pub trait Number:
     Copy
     + Add<Output = Self>
@@ -39,16 +39,16 @@ pub trait Number:
     + Sub<f32, Output = Self>
     + Mul<f32, Output = Self>
 {
-    /// What comparisons give.
+    /// Result of comparisons.
     type Mask: Mask;
 
     /// `v`, in all lanes.
     fn constant(self, v: f32) -> Self;
 
-    /// The smaller of both; `other` if one of them is NaN.
+    /// The minimum; `other` if either is NaN.
     fn lesser(self, other: Self) -> Self;
 
-    /// The larger of both; `other` if one of them is NaN.
+    /// The maximum; `other` if either is NaN.
     fn greater(self, other: Self) -> Self;
 
     /// `self > bound`.
@@ -72,19 +72,19 @@ pub trait Number:
     /// The absolute value, with the sign of `sign`.
     fn signed_as(self, sign: Self) -> Self;
 
-    /// The nearest whole number, the even one of two, below 2²².
+    /// The nearest integer, ties to even, below 2²².
     fn nearest(self) -> Self;
 
-    /// Without what follows the point.
+    /// The integer part.
     fn whole(self) -> Self;
 
-    /// 2 to the power of a whole number from −126 to 127.
+    /// 2 to the power of an integer from −126 to 127.
     fn power_of_two(self) -> Self;
 
-    /// Exponent e and significand m of a positive number m·2^e that is not denormal, 1 ≤ m < 2.
+    /// Exponent e and significand m of a normal positive number m·2^e, 1 ≤ m < 2.
     fn parts(self) -> (Self, Self);
 
-    /// The numbers of a table at `row`·`stride` + `column`, which are whole; 0 beyond its end.
+    /// The table entries at `row`·`stride` + `column`, which are integers; 0 beyond its end.
     fn entry(table: &[f32], row: Self, stride: usize, column: Self) -> Self;
 
     /// `self` where the mask is true, else 0.
@@ -105,13 +105,13 @@ pub trait Number:
         Self::choose(self.at_least(bound), yes, no)
     }
 
-    /// True if `self > bound` in all lanes: what else is computed is in vain then.
+    /// True if `self > bound` in all lanes: other results are then unused.
     #[inline(always)]
     fn is_above(self, bound: Self) -> bool {
         self.above(bound).all()
     }
 
-    /// `other` where it is infinite or NaN.
+    /// Replaces infinities and NaN by `other`.
     #[inline(always)]
     fn finite_or(self, other: Self) -> Self {
         Self::choose(self.finite(), self, other)
@@ -138,7 +138,7 @@ impl Number for f32 {
         v
     }
 
-    // The comparison of vector instructions, which `f32::min` is not.
+    // As vector instructions compare, unlike `f32::min`.
     #[inline(always)]
     fn lesser(self, other: f32) -> f32 {
         if self < other { self } else { other }

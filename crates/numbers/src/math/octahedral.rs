@@ -1,9 +1,9 @@
-//! Unit vectors in few bits: the sphere is projected onto the octahedron |x| + |y| + |z| = 1, whose lower half is
-//! folded over the upper one to fill the square [−1, 1]², quantised to 2^b − 1 points a side [Meyer et al. 2010;
-//! Cigolle et al. 2014].
+//! Compact unit vectors: the sphere is projected onto the octahedron |x| + |y| + |z| = 1, whose lower half is folded
+//! over the upper one to fill the square [−1, 1]², quantised to 2^b − 1 points per side [Meyer et al. 2010; Cigolle et
+//! al. 2014].
 //!
-//! No trigonometry, unlike the equal-area map of [`super::sphere_map`]. The number of grid points is odd, so that the
-//! axes, which are the normals of most walls, are reproduced exactly.
+//! It needs no trigonometry, unlike the equal-area map of [`super::sphere_map`]. The number of grid points is odd, so
+//! that the axes, which are the normals of most walls, are exact.
 
 use super::Vec3;
 
@@ -12,10 +12,10 @@ const BITS: u32 = 14;
 /// Grid points on each side of 0.
 const HALF: f32 = ((1 << (BITS - 1)) - 1) as f32;
 
-/// Bits of a packed vector; the others of the word are 0.
+/// Bits of a packed vector; the other bits of the word are 0.
 pub const PACKED_BITS: u32 = 2 * BITS;
 
-/// The largest angle between a vector and what comes back of it (radians).
+/// Maximum angle between a vector and its unpacked value (radians).
 pub const MAX_ERROR: f32 = 2.7e-4;
 
 /// Packs the unit vector `v`.
@@ -28,13 +28,13 @@ pub fn pack_unit(v: Vec3) -> u32 {
     quantise(x) as u32 | (quantise(y) as u32) << BITS
 }
 
-/// The unit vector that [`pack_unit`] packed; bits above [`PACKED_BITS`] do not matter.
+/// Inverse of [`pack_unit`]; bits above [`PACKED_BITS`] are ignored.
 #[inline]
 pub fn unpack_unit(bits: u32) -> Vec3 {
     let mask = (1 << BITS) - 1;
     let coordinate = |q: u32| (q & mask) as f32 * (1.0 / HALF) - 1.0;
     let (x, y) = (coordinate(bits), coordinate(bits >> BITS));
-    // 1/HALF is rounded, which the middle must not see
+    // 1/HALF is rounded, but the centre must be exact
     let exact = |c: f32| if c.abs() < 0.5 / HALF { 0.0 } else { c };
     let (x, y) = (exact(x), exact(y));
     let z = 1.0 - x.abs() - y.abs();

@@ -1,33 +1,33 @@
-//! Origins near to points that are far from the origin of the world.
+//! Local origins for points far from the world's origin.
 //!
-//! An f32 has 24 bits: 10⁷ units from the origin neighbouring numbers are a unit apart. Coordinates and transformations
-//! are therefore f64 until an origin near to them is subtracted. Origins are on a grid of 128 units: what is within 64
-//! units of the origin of the world stays as it is, bit for bit; elsewhere what is near to an origin has coordinates of
-//! up to 64 units, which f32 resolves to 4·10⁻⁶; and short decimals and powers of two stay short.
+//! An f32 has 24 bits: at 10⁷ units from the origin the spacing of numbers is one unit. Coordinates and transforms are
+//! therefore f64 until a nearby origin is subtracted. Origins are on a grid of 128 units. Points within 64 units of the
+//! world's origin are unchanged, bit for bit. Elsewhere, points near an origin have coordinates of up to 64 units,
+//! which f32 resolves to 4·10⁻⁶. Short decimals and powers of two remain short.
 
 use super::{DAffine3, DVec3, Vec3};
 
-/// Distance of the origins along each axis.
+/// Spacing of the origins along each axis.
 const GRID: f64 = 128.0;
 
-/// The origin that is nearest to a point; that of the world if the point is not finite.
+/// The nearest origin to a point; the world's origin if the point is not finite.
 pub fn near_origin(p: DVec3) -> DVec3 {
-    // Adding zero makes −0 positive
+    // Adding zero normalises −0
     let origin = (p / GRID).round() * GRID + 0.0;
     if origin.is_finite() { origin } else { DVec3::ZERO }
 }
 
-/// Points relative to an origin near to them, and this origin. Whatever its place, the point in the middle of the list
-/// chooses it: the first is for some programs a point that no face uses.
+/// Points relative to a nearby origin, and this origin. It is chosen by the middle point of the list, since some
+/// programs write an unused first point.
 pub fn relative(points: impl ExactSizeIterator<Item = DVec3> + Clone) -> (Vec<Vec3>, DVec3) {
     let origin = points.clone().nth(points.len() / 2).map_or(DVec3::ZERO, near_origin);
-    // Room for the element that a mesh adds
+    // Space for the element that a mesh appends
     let mut out = Vec::with_capacity(points.len() + 1);
     out.extend(points.map(|p| (p - origin).as_vec3()));
     (out, origin)
 }
 
-/// The map between two spaces whose points are relative to the origins `to` and `from`.
+/// Rebases a map between two spaces to points relative to the origins `to` and `from`.
 pub fn rebased(to_from: &DAffine3, to: DVec3, from: DVec3) -> DAffine3 {
     DAffine3 { matrix3: to_from.matrix3, translation: to_from.transform_point3(from) - to }
 }

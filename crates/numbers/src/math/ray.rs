@@ -24,24 +24,24 @@ impl Ray {
     }
 }
 
-/// The part of a segment `o + t·(end − o)` that is tested for occlusion: its end is offset off its surface already, and
-/// what remains is the rounding of `o + t·d` at t = 1.
+/// The part of a segment `o + t·(end − o)` that is tested for occlusion. Its end is already offset from its surface;
+/// the margin covers the rounding of `o + t·d` at t = 1.
 pub const SEGMENT_END: f32 = 1.0 - 8.0 * f32::EPSILON;
 
-/// Bound of the distance between surfaces that are meant to be in the same place, relative to the largest coordinate of
-/// a point there: each is rounded on its own, by its placement, and a placement that turns mixes the axes.
+/// Bound of the distance between surfaces meant to coincide, relative to the maximum coordinate of a point there: each
+/// is rounded separately by its transform, and rotations mix the axes.
 pub const COINCIDENCE: f32 = gamma(8);
 
-/// Moves `p` off its surface along the geometric normal `n`, to the side that `w` points to: by the bound `p_error` of
-/// its rounding error, so that a ray from there cannot hit the surface that it leaves [Pharr et al. 2023, §6.8.6], and
-/// by no less than [`COINCIDENCE`], so that it cannot hit another one in the same place either. `n` is unit, or zero
-/// where there is no surface; `p_error` is per axis and non-negative.
+/// Offsets `p` from its surface along the geometric normal `n`, to the side of `w`. The offset is at least the bound
+/// `p_error` of its rounding error, so that a ray from there cannot hit its own surface [Pharr et al. 2023, §6.8.6]. It
+/// is also at least [`COINCIDENCE`], so that the ray cannot hit a coincident surface. `n` is unit, or zero without a
+/// surface; `p_error` is per axis and non-negative.
 #[inline]
 pub fn offset_origin(p: Vec3, p_error: Vec3, n: Vec3, w: Vec3) -> Vec3 {
     let distance = n.abs().dot(p_error).max(p.abs().max_element() * COINCIDENCE);
     let offset = if w.dot(n) < 0.0 { -n * distance } else { n * distance };
     let moved = p + offset;
-    // Round away from the surface, so that the addition cannot fall back onto it.
+    // Round away from the surface, so that the addition cannot return to it.
     let round = |moved: f32, offset: f32| {
         if offset > 0.0 {
             moved.next_up()
@@ -81,17 +81,17 @@ mod tests {
                 let moved = offset_origin(p, e, axis, w) - p;
                 let exact = e * axis * side * axis.abs();
                 assert!((moved - exact).abs().max_element() < 1e-6, "{axis} {w}: {moved} {exact}");
-                // Axes that it does not move along keep their bits
+                // Other axes are unchanged, bit for bit
                 assert_eq!(moved * (Vec3::ONE - axis.abs()), Vec3::ZERO);
             }
         }
         // An error far below the spacing of floats still moves to the next one
         assert_eq!(offset_origin(Vec3::X, Vec3::splat(1e-20), Vec3::X, Vec3::X).x, (1.0 + COINCIDENCE).next_up());
-        // Another surface may be in the same place, even in a plane through the origin
+        // A coincident surface, even in a plane through the origin
         assert!(offset_origin(p.with_x(0.0), Vec3::ZERO, Vec3::X, Vec3::X).x >= 4.0 * COINCIDENCE);
-        // Without a surface, a point stays where it is
+        // Without a surface, the point is unchanged
         assert_eq!(offset_origin(p, e, Vec3::ZERO, Vec3::X), p);
-        // On the plane, the side of the normal
+        // For directions in the plane, the side of the normal
         assert!(offset_origin(p, e, Vec3::X, Vec3::Y).x > p.x);
     }
 }

@@ -3,13 +3,13 @@
 use std::iter::Sum;
 use std::ops::{Add, AddAssign, Div, Index, Mul, MulAssign, Sub};
 
-/// What red, green and blue add to the relative luminance: the Y row of the Rec.709 matrix [ITU-R BT.709].
+/// Contributions of red, green and blue to the relative luminance: the Y row of the Rec.709 matrix [ITU-R BT.709].
 const WEIGHTS: [f64; 3] = [0.212_671, 0.715_160, 0.072_169];
 
-/// What red, green and blue add to the luminance of a colour.
+/// Contributions of red, green and blue to the luminance of a colour.
 pub const LUMINANCE: [f32; 3] = [WEIGHTS[0] as f32, WEIGHTS[1] as f32, WEIGHTS[2] as f32];
 
-/// Relative luminance of sums and means, which are f64.
+/// Relative luminance of f64 sums and means.
 #[inline]
 pub fn luminance([r, g, b]: [f64; 3]) -> f64 {
     WEIGHTS[0] * r + WEIGHTS[1] * g + WEIGHTS[2] * b
@@ -250,7 +250,7 @@ mod tests {
         for turned in [a, Rgb::new(9.0, 1.0, 4.0), Rgb::new(4.0, 9.0, 1.0)] {
             assert_eq!(turned.max_component(), 9.0);
         }
-        // A known luminance, by different weights
+        // A luminance computed from the weights
         let y = 0.212_671 + 4.0 * 0.715_160 + 9.0 * 0.072_169;
         assert!((a.luminance() - y as f32).abs() < 1e-6 && (luminance([1.0, 4.0, 9.0]) - y).abs() < 1e-12);
     }

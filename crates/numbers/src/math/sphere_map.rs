@@ -1,5 +1,5 @@
 //! Maps between the unit square and the sphere of directions: the equal-area octahedral map [Clarberg 2008] in the
-//! orientation of pbrt-v4, and the map of latitude and longitude. z is up in both.
+//! orientation of pbrt-v4, and the latitude-longitude map. z is up in both.
 
 use super::elementary::arctangent;
 use super::number::Number;
@@ -13,7 +13,7 @@ use std::f32::consts::{FRAC_2_PI, FRAC_PI_4, PI, TAU};
 pub fn equal_area_square_to_sphere(p: Vec2) -> Vec3 {
     let (u, v) = (2.0 * p.x - 1.0, 2.0 * p.y - 1.0);
     let (u_abs, v_abs) = (u.abs(), v.abs());
-    // Distance to the diagonal that is the equator, positive on the upper hemisphere.
+    // Distance to the diagonal of the equator, positive on the upper hemisphere.
     let signed_distance = 1.0 - (u_abs + v_abs);
     let r = 1.0 - signed_distance.abs();
     let phi = if r == 0.0 { FRAC_PI_4 } else { ((v_abs - u_abs) / r + 1.0) * FRAC_PI_4 };
@@ -26,7 +26,7 @@ pub fn equal_area_square_to_sphere(p: Vec2) -> Vec3 {
     )
 }
 
-/// Density of [`equal_area_square_to_sphere`] of a uniform point, per steradian: 1/4π.
+/// Density of [`equal_area_square_to_sphere`] for a uniform point, per steradian: 1/4π.
 #[inline]
 pub fn pdf_equal_area_square_to_sphere() -> f32 {
     0.5 / TAU
@@ -54,8 +54,8 @@ pub fn equal_area_squares<N: Number>(w: V3<N>) -> (N, N) {
     ((u.signed_as(w.x) + 1.0) * 0.5, (v.signed_as(w.y) + 1.0) * 0.5)
 }
 
-/// The point of [0, 1]² that stands for the same direction as `p`, which may lie outside by less than 1:
-/// each edge of the octahedral square is glued to itself, reversed about its middle.
+/// The point of [0, 1]² with the same direction as `p`, which may be outside by less than 1: each edge of the
+/// octahedral square is identified with its own reflection about its middle.
 #[inline]
 pub fn wrap_equal_area_square(p: Vec2) -> Vec2 {
     let mut p = p;
@@ -72,7 +72,7 @@ pub fn wrap_equal_area_square(p: Vec2) -> Vec2 {
     p
 }
 
-/// [`wrap_equal_area_square`] for texels of an image of `size`² texels; indices may lie outside by at most `size`.
+/// [`wrap_equal_area_square`] for texels of an image of `size`² texels; indices may be out of range by at most `size`.
 #[inline]
 pub fn wrap_equal_area_texel(x: isize, y: isize, size: isize) -> (isize, isize) {
     let (mut x, mut y) = (x, y);
@@ -97,7 +97,7 @@ pub fn lat_long_to_sphere(p: Vec2) -> Vec3 {
     Vec3::new(sin_theta * cos_phi, sin_theta * sin_phi, cos_theta)
 }
 
-/// Density of [`lat_long_to_sphere`] of a uniform point, per steradian: 1/(2π² sin θ); infinite at the poles.
+/// Density of [`lat_long_to_sphere`] for a uniform point, per steradian: 1/(2π² sin θ); infinite at the poles.
 #[inline]
 pub fn pdf_lat_long_to_sphere(w: Vec3) -> f32 {
     1.0 / (TAU * PI * (sqr(w.x) + sqr(w.y)).sqrt())
@@ -178,7 +178,7 @@ mod tests {
                 assert!((a - b).length() < 0.02, "{inside} {outside} {a} {b}");
             }
         }
-        // The centres of outer texels wrap to the centres of the texels that they are wrapped to.
+        // The centres of outer texels map to the centres of their wrapped texels.
         let size = 5;
         for k in 0..size {
             for (x, y) in [(-1, k), (size, k), (k, -1), (k, size)] {

@@ -1,21 +1,22 @@
-//! A piecewise-constant density over the texels of an image, which tells texels apart only where they differ.
+//! A piecewise-constant density over the texels of an image, with adaptive resolution.
 //!
-//! Large images are divided into blocks of 4 × 4 texels. A block is chosen by inversion, and in most of them the density is
-//! constant: running integrals of blocks fit a cache where those of texels do not. In a block whose values vary by more than
-//! [`MAX_VARIATION`], running integrals of its own choose the texel. Numbers stay ordered as far as blocks go, so points of
-//! nets stay well spread.
+//! Large images are divided into blocks of 4 × 4 texels. A block is chosen by inversion, and in most blocks the density
+//! is constant: running integrals of blocks fit into a cache, unlike those of texels. In a block whose values vary by
+//! more than [`MAX_VARIATION`], local running integrals choose the texel. The order of numbers is preserved at block
+//! level, so points of nets remain well distributed.
 
 use super::distribution::{Bin, Running, bin_of, cleaned, place_in_bin};
 use super::{ONE_MINUS_EPSILON, PiecewiseConstant2D, Vec2};
 
 /// Texels of a block along each axis.
 const EDGE: usize = 4;
-/// Texels from which on there are blocks.
+/// Minimum number of texels for blocks.
 const MANY: usize = 1 << 18;
-/// Relative variance of the values of a block up to which they have one density. It is what the second moment of an estimate
-/// grows by where the integrand is proportional to the values.
+/// Maximum relative variance of the values of a block with a constant density: the relative increase of the second
+/// moment of an estimate whose integrand is proportional to the values.
 pub const MAX_VARIATION: f64 = 0.01;
-/// Least value of a texel of a block that is not 0, relative to their mean: smaller ones would be lost by rounding.
+/// Minimum value of a non-zero texel of a block, relative to the mean of the block: smaller ones would be lost by
+/// rounding.
 const LEAST: f64 = 1.0 / 65536.0;
 
 /// The density.
@@ -26,13 +27,13 @@ pub struct TexelDistribution {
     edge: usize,
     width: usize,
     height: usize,
-    /// For each 64 blocks, which of them have texels that differ, and how many of those there are before.
+    /// For each 64 blocks, a bit mask of blocks with varying texels, and the number of such blocks before.
     varied: Vec<(u64, u32)>,
     within: Vec<WithinBlock>,
 }
 
-/// The choice of a texel in a block, of a cache line: inner bounds of the running integral over rows, and of those along each
-/// row.
+/// The choice of a texel in a block, in a cache line: inner bounds of the running integral over rows, and of the
+/// running integrals along each row.
 #[derive(Clone, Copy, Debug)]
 #[repr(align(64))]
 pub struct WithinBlock {
@@ -40,12 +41,12 @@ pub struct WithinBlock {
     columns: [[f32; EDGE - 1]; EDGE],
 }
 
-/// A texel, and the place in it, in [0, 1)².
+/// A texel, and the position in it, in [0, 1)².
 #[derive(Clone, Copy, Debug)]
 pub struct TexelPlace {
     /// Column and row.
     pub texel: [usize; 2],
-    /// Where the point is between the edges of the texel.
+    /// Relative position in the texel.
     pub within: [f32; 2],
 }
 
@@ -77,7 +78,7 @@ impl WithinBlock {
         WithinBlock { rows: bounds(values.map(|row| row.iter().sum())), columns: values.map(bounds) }
     }
 
-    /// The texel of the block for a place in it, both in [0, 1)².
+    /// The texel of the block for a position in it, both in [0, 1)².
     #[inline(always)]
     pub fn choose(&self, [x, y]: [f32; 2]) -> TexelPlace {
         let row = bin_between(&self.rows, y);
@@ -85,21 +86,21 @@ impl WithinBlock {
         TexelPlace { texel: [column.index, row.index], within: [column.fraction(x), row.fraction(y)] }
     }
 
-    /// Density of a texel, relative to that of the block.
+    /// Density of a texel, relative to the density of the block.
     fn density(&self, [x, y]: [usize; 2]) -> f32 {
         (EDGE * EDGE) as f32 * probability(&self.rows, y) * probability(&self.columns[y], x)
     }
 }
 
 impl TexelDistribution {
-    /// The density proportional to `values`, but for blocks of nearly equal ones, row-major from y = 0, of an image `width` wide;
-    /// rows that are not complete are dropped. Negative or non-finite values enter as 0. There are blocks if sizes are multiples
-    /// of 4 and there are many texels.
+    /// The density proportional to `values`, row-major from y = 0, of an image `width` wide, but constant in blocks of
+    /// nearly equal values. Incomplete rows are ignored. Negative or non-finite values count as 0. There are blocks if
+    /// sizes are multiples of 4 and there are at least 2¹⁸ texels.
     pub fn new(values: &[f32], width: usize) -> Self {
         Self::of_blocks(values, width, if values.len() >= MANY { EDGE } else { 1 })
     }
 
-    /// The same with blocks wherever sizes are multiples of 4.
+    /// The same with blocks whenever sizes are multiples of 4.
     pub fn with_blocks(values: &[f32], width: usize) -> Self {
         Self::of_blocks(values, width, EDGE)
     }
@@ -154,7 +155,7 @@ impl TexelDistribution {
         self.edge
     }
 
-    /// True if texels of some block differ.
+    /// True if any block has varying texels.
     #[inline(always)]
     pub fn has_varied(&self) -> bool {
         !self.within.is_empty()
@@ -172,7 +173,7 @@ impl TexelDistribution {
         self.blocks.row(y)
     }
 
-    /// The choice of a texel in a block, given by column and row; `None` if it has one density.
+    /// The choice of a texel in the block [column, row]; `None` for a constant density.
     #[inline(always)]
     pub fn within(&self, [x, y]: [usize; 2]) -> Option<&WithinBlock> {
         let i = y * (self.width / EDGE) + x;
@@ -196,7 +197,7 @@ impl TexelDistribution {
         Some((texel, Vec2::new(at(0, self.width), at(1, self.height))))
     }
 
-    /// The texel at a place in a block of one density.
+    /// The texel at a position in a block of constant density.
     #[inline]
     fn in_constant(&self, place: [f32; 2]) -> TexelPlace {
         let scaled = place.map(|x| x * self.edge as f32);
@@ -210,7 +211,7 @@ impl TexelDistribution {
         self.pdf_of_texel([bin_of(p.x, self.width), bin_of(p.y, self.height)])
     }
 
-    /// Density in the texel of column and row, per unit area.
+    /// Density in the texel [column, row], per unit area.
     #[inline]
     pub fn pdf_of_texel(&self, texel: [usize; 2]) -> f32 {
         let block = texel.map(|i| i / self.edge);
@@ -316,7 +317,7 @@ mod tests {
 
     #[test]
     fn many_blocks_are_told_apart() {
-        // 16 × 12 blocks, every third of which is noise
+        // 16 × 12 blocks, a third of them noise
         let (width, height) = (64, 48);
         let mut s = pcg32([2, 6, 3]);
         let mut value = |i: usize| {

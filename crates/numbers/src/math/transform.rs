@@ -5,29 +5,28 @@ use glam::{Affine3A, DAffine3, Mat3A, Vec3};
 /// Transforms a normal by the inverse transpose of `to_from`; the result is unit, or zero if the map is singular.
 #[inline]
 pub fn transform_normal(to_from: &Affine3A, n: Vec3) -> Vec3 {
-    // The cofactor matrix is det·(inverse transpose): no division, and right for singular maps of full rank 2.
+    // The cofactor matrix is det·(inverse transpose): no division, and correct for singular maps of rank 2.
     let m = &to_from.matrix3;
     let cofactor = Mat3A::from_cols(m.y_axis.cross(m.z_axis), m.z_axis.cross(m.x_axis), m.x_axis.cross(m.y_axis));
     let sign = 1.0_f32.copysign(m.determinant());
     (Vec3::from(cofactor * glam::Vec3A::from(n)) * sign).normalize_or_zero()
 }
 
-/// True if the map mirrors: it turns right-handed frames into left-handed ones.
+/// True if the map reflects: it maps right-handed frames to left-handed ones.
 #[inline]
 pub fn swaps_handedness(to_from: &Affine3A) -> bool {
     to_from.matrix3.determinant() < 0.0
 }
 
-/// The componentwise linear blend of two maps at `t` in 0..1, which is what both ray tracers use between the
-/// time samples of a moving instance.
+/// The componentwise linear blend of two maps at `t` in 0..1, which both ray tracers use between the time samples of a
+/// moving instance.
 #[inline]
 pub fn lerp_affine(a: &Affine3A, b: &Affine3A, t: f32) -> Affine3A {
     let s = 1.0 - t;
     Affine3A { matrix3: a.matrix3 * s + b.matrix3 * t, translation: a.translation * s + b.translation * t }
 }
 
-/// The placement at `time` in 0..=1 of something that has `samples` at equidistant times, and moves linearly between them. There
-/// is at least one sample.
+/// The transform at `time` in 0..=1, linear between `samples` at equidistant times. There must be at least one sample.
 #[inline]
 pub fn placement_at(samples: &[Affine3A], time: f32) -> Affine3A {
     match segment_at(samples.len(), time) {
@@ -36,8 +35,8 @@ pub fn placement_at(samples: &[Affine3A], time: f32) -> Affine3A {
     }
 }
 
-/// Of `count` samples at equidistant times 0..=1, the last one before `time`, and the fraction of the way to the next; `None` of
-/// a single sample.
+/// The last of `count` samples at equidistant times 0..=1 before `time`, and the relative position towards the next;
+/// `None` for a single sample.
 #[inline]
 fn segment_at(count: usize, time: f32) -> Option<(usize, f32)> {
     let last = count - 1;
@@ -46,8 +45,8 @@ fn segment_at(count: usize, time: f32) -> Option<(usize, f32)> {
     Some((i, x - i as f32))
 }
 
-/// The placements of something that moves within something that moves. Between samples the product of both is no longer linear, so there
-/// are as many as the finer motion has.
+/// The transforms of a motion within a motion. Their product is not linear between samples; the result has the number
+/// of samples of the finer motion.
 pub fn compose_placements(outer: &[DAffine3], inner: &[DAffine3]) -> Vec<DAffine3> {
     let count = outer.len().max(inner.len());
     let time = |i: usize| if count == 1 { 0.0 } else { i as f32 / (count - 1) as f32 };

@@ -1,9 +1,9 @@
-//! Directions of single samples and of vectors of them.
+//! Directions of single samples and of vectors.
 
 use super::number::Number;
 use glam::Vec3;
 
-/// A direction, or many of them by component.
+/// A direction, or many by component.
 #[derive(Clone, Copy, Debug)]
 pub struct V3<N> {
     /// x.
@@ -41,25 +41,25 @@ impl<N: Number> V3<N> {
         V3 { x: self.y * o.z - o.y * self.z, y: self.z * o.x - o.z * self.x, z: self.x * o.y - o.x * self.y }
     }
 
-    /// Sum.
+    /// Vector sum.
     #[inline(always)]
     pub fn plus(self, o: Self) -> Self {
         V3 { x: self.x + o.x, y: self.y + o.y, z: self.z + o.z }
     }
 
-    /// Difference.
+    /// Vector difference.
     #[inline(always)]
     pub fn minus(self, o: Self) -> Self {
         V3 { x: self.x - o.x, y: self.y - o.y, z: self.z - o.z }
     }
 
-    /// Multiple.
+    /// Scalar multiple.
     #[inline(always)]
     pub fn times(self, s: N) -> Self {
         V3 { x: self.x * s, y: self.y * s, z: self.z * s }
     }
 
-    /// With another z.
+    /// Replaces z.
     #[inline(always)]
     pub fn with_z(self, z: N) -> Self {
         V3 { z, ..self }
@@ -71,7 +71,7 @@ impl<N: Number> V3<N> {
         V3 { x: N::choose(mask, yes.x, no.x), y: N::choose(mask, yes.y, no.y), z: N::choose(mask, yes.z, no.z) }
     }
 
-    /// Of unit length.
+    /// Normalised to unit length.
     #[inline(always)]
     pub fn unit(self) -> Self {
         self.times(self.x.constant(1.0) / self.dot(self).root())

@@ -4,7 +4,7 @@ use super::{safe_sqrt, sqr};
 use glam::{Vec2, Vec3};
 use std::f32::consts::{FRAC_1_PI, FRAC_PI_2, FRAC_PI_4, PI, TAU};
 
-/// Uniform over the unit disk by the concentric map [Shirley and Chiu 1997]; neighbours stay neighbours.
+/// Uniform over the unit disk by the concentric map [Shirley and Chiu 1997], which preserves neighbourhoods.
 #[inline]
 pub fn sample_uniform_disk_concentric(u: [f32; 2]) -> Vec2 {
     let (x, y) = (2.0 * u[0] - 1.0, 2.0 * u[1] - 1.0);
@@ -212,7 +212,7 @@ mod tests {
         (0..SAMPLES).map(move |_| stream.random::<[f32; 2]>())
     }
 
-    /// χ² over the cells of a square of parameters, with the density integrated over each cell. Five such tests at
+    /// χ² test over the cells of a square of parameters, with the density integrated over each cell. Five tests at
     /// 10⁻⁴.
     fn assert_density(place: impl Fn([f32; 2]) -> [f64; 2], density: impl Fn(f64, f64) -> f64) {
         let mut observed = vec![0.0; CELLS * CELLS];
@@ -233,7 +233,7 @@ mod tests {
         lumiris_test_support::assert_chi_squared(&observed, &expected, 1e-4);
     }
 
-    /// A direction as ((cos θ + 1)/2, φ/2π): a steradian is 1/4π of the square.
+    /// Parameters ((cos θ + 1)/2, φ/2π) of a direction: a steradian is 1/4π of the square.
     fn assert_direction_density(sample: impl Fn([f32; 2]) -> Vec3, pdf: impl Fn(Vec3) -> f32) {
         let place = |u| {
             let w = sample(u);
@@ -251,21 +251,21 @@ mod tests {
         assert_direction_density(sample_cosine_hemisphere, pdf_cosine_hemisphere);
         assert_direction_density(sample_uniform_hemisphere, pdf_uniform_hemisphere);
         assert_direction_density(sample_uniform_sphere, |_| pdf_uniform_sphere());
-        // A cone that ends on a border of cells: cos θ = 0.5.
+        // A cone that ends on a cell border: cos θ = 0.5.
         let in_cone = |w: Vec3| if w.z >= 0.5 { pdf_uniform_cone(0.5) } else { 0.0 };
         assert_direction_density(|u| sample_uniform_cone(u, 0.5), in_cone);
     }
 
     #[test]
     fn disk_triangle_and_tent_have_their_densities() {
-        // The disk as (r², φ/2π): a unit of area is 1/π of the square.
+        // Parameters (r², φ/2π) of the disk: a unit of area is 1/π of the square.
         let disk = |u| {
             let p = sample_uniform_disk_concentric(u);
             [f64::from(p.length_squared()), f64::from(azimuth(p.extend(0.0)) / TAU)]
         };
         assert_density(disk, |_, _| f64::from(pdf_uniform_disk_concentric()) * std::f64::consts::PI);
 
-        // The triangle as (b0/(1 − b1), b1), whose Jacobian is 1 − b1; uniform has density 2 in (b0, b1).
+        // Parameters (b0/(1 − b1), b1) of the triangle, whose Jacobian is 1 − b1; the uniform density in (b0, b1) is 2.
         let triangle = |u| {
             let [b0, b1] = sample_uniform_triangle(u).map(f64::from);
             [b0 / (1.0 - b1), b1]

@@ -1,11 +1,11 @@
-//! The same domain of many streams, one after another.
+//! The same domain of successive streams.
 //!
-//! Hashes know of the pixel, or of its block, and not of the sample. So consecutive streams, which belong to samples of one
-//! pixel for the most part, have the same ones, and these are computed once.
+//! Hashes depend on the pixel or its block, but not on the sample. Successive streams mostly belong to samples of one
+//! pixel and share the hashes, which are computed once.
 
 use super::{Kind, Net, SampleStream};
 
-/// The hash of a domain, and the hash in which it lies.
+/// The hash of a domain, and the hash of its parent.
 #[derive(Clone, Copy, Debug)]
 struct Hashed {
     outer: [u32; 2],
@@ -27,7 +27,7 @@ impl Hashed {
     }
 }
 
-/// [`SampleStream::domain`] of the same key for one stream after another.
+/// [`SampleStream::domain`] with the same key, for successive streams.
 #[derive(Clone, Copy, Debug)]
 pub struct Domain {
     key: u32,
@@ -35,7 +35,7 @@ pub struct Domain {
 }
 
 impl Domain {
-    /// Of this key.
+    /// For this key.
     pub fn new(key: u32) -> Self {
         Domain { key, last: Hashed::new(&Net { key: [0; 2], index: 0, pixel: [0; 2] }, key) }
     }
@@ -56,7 +56,7 @@ impl Domain {
     }
 }
 
-/// [`SampleStream::split`] of the same key for one stream after another.
+/// [`SampleStream::split`] with the same key, for successive streams.
 #[derive(Clone, Copy, Debug)]
 pub struct Split {
     domain: Domain,
@@ -100,7 +100,7 @@ mod tests {
     fn domains_and_points_of_streams_in_a_row_are_those_of_each_by_itself() {
         for kind in SamplerKind::iter() {
             let (mut domain, mut split) = (Domain::new(7), Split::new(3, 5, 4));
-            // Pixels by turns, so that hashes are kept and dropped; samples on both sides of the end of an index
+            // Alternating pixels, so that hashes are reused and replaced; samples on both sides of the end of an index
             for (pixel, sample) in [(3, 1), (3, 2), (3, 20_000), (40, 1), (40, 65_535), (40, 65_536), (3, 2), (0, 0)] {
                 let stream = SampleStream::new(kind, [pixel, 9], sample, 11);
                 assert_eq!(domain.of(&stream).draw::<4>(), stream.domain(7).draw::<4>(), "{kind:?} {pixel} {sample}");

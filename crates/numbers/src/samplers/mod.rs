@@ -1,12 +1,12 @@
-//! Stateless random numbers: `u(pixel, sample, domain)`, independent of the order in which they are drawn.
+//! Stateless random numbers: `u(pixel, sample, domain)`, independent of the order of use.
 //!
-//! A [`SampleStream`] is a small value. The root stream of a (pixel, sample) pair is split into *domains*, one for
-//! each decision (lens, light choice, BSDF, …); each domain gives up to four numbers that are well distributed
-//! over the samples of the pixel. [`SampleStream::split`] gives several points to one decision, and these are
-//! well distributed over both the points and the samples. The sequences are those of the `openqmc` crate:
-//! Owen-scrambled Sobol' [Burley 2020], and the same with its error made blue noise within blocks of pixels
-//! [Belcour and Heitz 2021]. Each is scrambled once more by a hash of all bits of the seed, the domains, and the pixel or
-//! block, so that no two of them have anything in common.
+//! A [`SampleStream`] is a small value. The root stream of a (pixel, sample) pair is split into *domains*, one for each
+//! decision (lens, light choice, BSDF, …). Each domain gives up to four numbers that are well distributed over the
+//! samples of the pixel. [`SampleStream::split`] gives several points to one decision, which are well distributed over
+//! both the points and the samples. The sequences are those of the `openqmc` crate: Owen-scrambled Sobol' [Burley
+//! 2020], and its variant with blue-noise errors within blocks of pixels [Belcour and Heitz 2021]. Each is scrambled
+//! once more by a hash of all bits of the seed, the domains, and the pixel or block, so that no two of them are
+//! correlated.
 
 mod domains;
 
@@ -27,12 +27,11 @@ use strum::{EnumIter, EnumString, IntoStaticStr, VariantNames};
 pub enum SamplerKind {
     /// Independent uniform numbers.
     Independent,
-    /// The points of each sample and decision an Owen-scrambled Sobol' net by themselves, samples independent of each
-    /// other.
+    /// For each sample and decision, a separate Owen-scrambled Sobol' net; samples are independent.
     Stratified,
-    /// Owen-scrambled Sobol', pixels independent of each other.
+    /// Owen-scrambled Sobol'; pixels are independent.
     Sobol,
-    /// Owen-scrambled Sobol' whose error is blue noise within blocks of 16 × 16 pixels, blocks independent of each other.
+    /// Owen-scrambled Sobol' with blue-noise errors within blocks of 16 × 16 pixels; blocks are independent.
     #[default]
     #[strum(serialize = "zsobol")]
     SobolBlueNoise,
@@ -48,14 +47,14 @@ impl SamplerKind {
     }
 }
 
-/// Domain of the numbers of roulette; any key, but of no other use.
+/// Domain of Russian roulette; an arbitrary reserved key.
 const ROULETTE: u32 = 0x9e37_79b9;
 
-/// Edge of the blocks of blue noise (pixels): small beside the table of openqmc (256 pixels), so that blocks have different
-/// parts of it.
+/// Edge of the blocks of blue noise (pixels): small relative to the table of openqmc (256 pixels), so that blocks use
+/// different parts of it.
 const BLOCK: u32 = 16;
 
-/// A place in the tree of domains of one sample.
+/// A node in the tree of domains of one sample.
 #[derive(Clone, Copy, Debug)]
 pub struct SampleStream(Kind);
 
@@ -97,14 +96,14 @@ impl Net {
         Net { index: all as u16, ..self.domain(key).domain(all >> 16) }
     }
 
-    /// A net of its own.
+    /// A separate net.
     #[inline]
     fn point(&self) -> NetPoint {
         NetPoint { index: u32::from(self.index), seed: self.key[0], scramble: self.key[1] }
     }
 
-    /// Neighbouring pixels of a block have errors of opposite signs: index and seed are those of a table, which begins
-    /// anywhere and may be mirrored, and the block has one scramble.
+    /// Neighbouring pixels of a block have errors of opposite signs. Index and seed refer to a table with a random
+    /// offset and reflection, and the block has a single scramble.
     #[inline]
     fn blue_noise_point(&self) -> NetPoint {
         let [first, scramble] = self.key;
@@ -132,7 +131,7 @@ impl Net {
     }
 }
 
-/// A point of an Owen-scrambled Sobol' sequence in four dimensions, which is Owen-scrambled once more.
+/// A point of an Owen-scrambled Sobol' sequence in four dimensions, with a second Owen scramble.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct NetPoint {
     /// Its index.
@@ -174,8 +173,8 @@ impl SampleStream {
         })
     }
 
-    /// Appends the root streams of some samples of a pixel, and the points of their domains `key`, if their numbers are those
-    /// of points: where samples share a net, its hashes are computed once.
+    /// Appends the root streams of some samples of a pixel, and the points of their domains `key`, if their numbers are
+    /// points of a sequence. Hashes of a net shared by samples are computed once.
     pub fn append(
         (kind, pixel, seed): (SamplerKind, [u32; 2], u32),
         samples: Range<u32>,
@@ -188,10 +187,11 @@ impl SampleStream {
             let point = root.domain(key).net_point();
             let end = match kind {
                 SamplerKind::Independent | SamplerKind::Stratified => start + 1,
-                // The index of a point has 16 digits
+                // The index of a point has 16 bits
                 SamplerKind::Sobol | SamplerKind::SobolBlueNoise => (start | 0xffff).saturating_add(1).min(samples.end),
             };
-            // Copies that differ in one number each: a processor waits where a whole is read that was just written in parts
+            // Copies that differ in one number: reading a whole value just after writing its parts would stall the
+            // processor
             let count = (end - start) as usize;
             let (first, first_point) = (roots.len(), points.len());
             roots.resize(first + count, root);
@@ -205,7 +205,7 @@ impl SampleStream {
         }
     }
 
-    /// Makes it the place of another point of its net.
+    /// Moves it to another point of its net.
     #[inline]
     fn set_index(&mut self, index: u16) {
         match &mut self.0 {
@@ -214,7 +214,7 @@ impl SampleStream {
         }
     }
 
-    /// The domain `key` below this place.
+    /// The domain `key` below this node.
     #[inline]
     pub fn domain(&self, key: u32) -> Self {
         SampleStream(match &self.0 {
@@ -227,7 +227,7 @@ impl SampleStream {
         })
     }
 
-    /// Point `index` of `count` points that the domain `key` gives to this one sample.
+    /// Point `index` of the `count` points of the domain `key` for this sample.
     #[inline]
     pub fn split(&self, key: u32, count: u32, index: u32) -> Self {
         SampleStream(match &self.0 {
@@ -254,7 +254,7 @@ impl SampleStream {
         u
     }
 
-    /// The point whose coordinates [`draw`](Self::draw) gives; `None` if the numbers are independent.
+    /// The point whose coordinates [`draw`](Self::draw) returns; `None` if the numbers are independent.
     #[inline]
     pub fn net_point(&self) -> Option<NetPoint> {
         match &self.0 {
@@ -264,7 +264,7 @@ impl SampleStream {
         }
     }
 
-    /// One number in [0, 1) of a sub-domain where stratification gains nothing (roulette).
+    /// One number in [0, 1) of a sub-domain, for decisions that do not benefit from stratification (Russian roulette).
     #[inline]
     pub fn draw_random(&self, key: u32) -> f32 {
         let domain = self.domain(key);
@@ -331,7 +331,7 @@ mod tests {
                     assert_ne!(draw([x, y], 5, 0), draw([x, y], 5 + sample, 0), "{kind:?} {sample}");
                     assert_ne!(draw([x, y], 5 + sample, 0), draw([x, y], 5, 1), "{kind:?} {sample}");
                 }
-                // Seeds whose multiples of the golden ratio are neighbours
+                // Seeds whose multiples of the golden ratio are close
                 assert_ne!(draw([x, y], 5, 0), draw([x, y], 5, 244_002_641), "{kind:?}");
             }
         }
@@ -354,7 +354,8 @@ mod tests {
         }
     }
 
-    /// The correlation of two streams over 64 pixels exceeds 0.65 in one of 10⁸ independent pairs, and their samples agree.
+    /// The correlation of two independent streams over 64 pixels exceeds 0.65 with probability 10⁻⁸; correlated streams
+    /// would have equal samples.
     #[test]
     fn random_domains_and_seeds_are_not_correlated() {
         for kind in SamplerKind::iter() {
@@ -373,9 +374,10 @@ mod tests {
         }
     }
 
-    /// The share of 256 × 256 numbers that lie in a disk: 64 seeds have the standard deviation of independent pixels, or up
-    /// to 1.6 times less where the errors of neighbours are of opposite signs. The standard deviation of 64 values has a
-    /// standard error of 9 %: bounds are 4 of them. The mean of all is the area, at 4 standard errors as well.
+    /// The fraction of 256 × 256 numbers inside a disk. Over 64 seeds it has the standard deviation of independent
+    /// pixels, or is up to 1.6 times smaller if neighbouring errors have opposite signs. The standard deviation of 64
+    /// values has a standard error of 9 %: the bounds are 4 of them. The mean of all is the area, within 4 standard
+    /// errors as well.
     #[test]
     fn means_of_images_of_different_seeds_are_independent() {
         let area = std::f64::consts::PI * 0.1;

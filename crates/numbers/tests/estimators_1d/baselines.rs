@@ -1,4 +1,4 @@
-//! Estimators that nothing renders with, each with its bias: what the others are measured against.
+//! Baseline estimators, used only for comparison, each with its bias.
 //!
 //! | function | estimate | bias |
 //! |---|---|---|
@@ -19,13 +19,13 @@ pub(crate) fn weighted(contributions: &[f32], weights: &[f32], integral: f32) ->
 }
 
 /// Defensive mixture [Hesterberg 1995]: the density α p₀ + (1 − α) p₁ of sampling p₀ with probability `alpha` and p₁
-/// otherwise, so that f/p is at most f/(α p₀) wherever p₁ misses f. Unbiased.
+/// otherwise. f/p is then at most f/(α p₀) where p₁ misses f. Unbiased.
 #[inline]
 pub(crate) fn defensive_pdf(alpha: f32, p0: f32, p1: f32) -> f32 {
     alpha * p0 + (1.0 - alpha) * p1
 }
 
-/// Choice of the defensive mixture: whether to sample p₀, and the number `u` made uniform again for that sampling.
+/// Choice of the defensive mixture: true for p₀, and the number `u`, remapped to be uniform again.
 #[inline]
 pub(crate) fn defensive_choice(alpha: f32, u: f32) -> (bool, f32) {
     if u < alpha { (true, u / alpha) } else { (false, ((u - alpha) / (1.0 - alpha)).min(ONE_MINUS_EPSILON)) }

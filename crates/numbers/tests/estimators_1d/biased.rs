@@ -1,4 +1,4 @@
-//! Biased baselines: the measured bias is the predicted one, and it is there.
+//! Biased baselines: the measured bias equals the predicted one and is significant.
 
 use super::baselines::{bidirectional, weighted};
 use super::{assert_means, level};

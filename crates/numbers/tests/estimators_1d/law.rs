@@ -9,18 +9,18 @@ use std::f64::consts::PI;
 
 const BINS: usize = 48;
 const RUNS: usize = 400_000;
-/// Points of the quadrature over θ per bin.
+/// Quadrature points over θ per bin.
 const POINTS: usize = 200;
-/// Steps of the grid of weights that the law of their sum is on.
+/// Grid size of the distribution of the sum of weights.
 const STEPS: usize = 1_200;
-/// At least the largest weight.
+/// Upper bound of the weights.
 const MAX_WEIGHT: f64 = 1.3;
 
 fn q_hat(theta: f64) -> f64 {
     (theta.cos() + theta.sin().powi(4)).max(0.0)
 }
 
-/// Law of one weight on the grid: each point is split between two grid points so that its mean stays.
+/// Distribution of one weight on the grid: each point is split between two grid points, which preserves its mean.
 fn law_of_weight() -> Vec<f64> {
     let mut law = vec![0.0; STEPS + 1];
     let total = BINS * POINTS;
@@ -41,7 +41,7 @@ fn convolve(a: &[f64], b: &[f64]) -> Vec<f64> {
     law
 }
 
-/// Probability of each bin, and last of no draw: ∫ p M E[w/(w + W)] dθ, W the sum of M − 1 other weights.
+/// Probability of each bin, and last of no draw: ∫ p M E[w/(w + W)] dθ, where W is the sum of M − 1 other weights.
 fn exact_law(m: usize) -> Vec<f64> {
     let one = law_of_weight();
     let others = (1..m).fold(vec![1.0], |law, _| convolve(&law, &one));

@@ -1,19 +1,19 @@
 //! Estimators on integrals in one and two dimensions whose values and variances are known by quadrature.
 //!
-//! Seeds are fixed. The hypotheses of all tests here together, less than [`HYPOTHESES`], reject a true model with
-//! probability 1 %; a run that passes once always passes.
+//! Seeds are fixed, so tests are deterministic. All hypotheses together, fewer than [`HYPOTHESES`], reject a true model
+//! with probability 1 %.
 //!
 //! The integrals are those of `lumiris_test_support::integrals`.
 //!
-//! - [`unbiased`]: mean and variance of every way of drawing (thesis 4.2, 4.6; paper 2)
+//! - [`unbiased`]: mean and variance of every drawing method (thesis 4.2, 4.6; paper 2)
 //! - [`law`]: the distribution of the resampled point
-//! - [`stratification`]: strata against none, and the strata of equal weights against their printed form
+//! - [`stratification`]: strata compared with none, and strata of equal weights compared with their printed form
 //! - [`parameters`]: the optimal numbers of proposals and samples
 //! - [`techniques`]: two techniques
-//! - [`mixtures`]: integrals that a deterministic mixture of densities samples
+//! - [`mixtures`]: integrals sampled by a deterministic mixture of densities
 //! - [`ocv`]: optimizing control variates, optimal multiple importance sampling, correlated sampling
-//! - [`oracle`]: slow versions in f64 of what ships in f32 and lanes
-//! - [`baselines`], [`biased`]: estimators that others are measured against have the bias that is predicted
+//! - [`oracle`]: slow f64 versions of the shipping f32 and vectorised code
+//! - [`baselines`], [`biased`]: baseline estimators have their predicted bias
 
 mod baselines;
 mod biased;
@@ -29,7 +29,7 @@ mod unbiased;
 
 use lumiris_numbers::estimators::stats::{Welford, sidak, z_test};
 
-/// At least the number of hypotheses that are tested in this module.
+/// Upper bound of the number of hypotheses tested in this module.
 const HYPOTHESES: usize = 1500;
 
 /// Significance of one hypothesis.
@@ -37,7 +37,7 @@ fn level() -> f64 {
     sidak(0.01, HYPOTHESES)
 }
 
-/// The mean of each channel is `expected`.
+/// Asserts that the mean of each channel is `expected`.
 fn assert_means(name: &str, channels: &[Welford; 3], expected: [f64; 3]) {
     for (i, (w, expected)) in channels.iter().zip(expected).enumerate() {
         let z = z_test(w.mean(), expected, w.standard_error());
@@ -45,7 +45,7 @@ fn assert_means(name: &str, channels: &[Welford; 3], expected: [f64; 3]) {
     }
 }
 
-/// The variance of each channel is `expected` within 2 %.
+/// Asserts that the variance of each channel is `expected` within 2 %.
 fn assert_variances(name: &str, channels: &[Welford; 3], expected: [f64; 3]) {
     for (i, (w, expected)) in channels.iter().zip(expected).enumerate() {
         let ratio = w.variance() / expected;

@@ -1,4 +1,4 @@
-//! Integrals on 0..1 that a deterministic mixture of several densities samples, and blocks of passes over them.
+//! Integrals on 0..1 sampled by a deterministic mixture of several densities, and blocks of passes over them.
 
 use lumiris_numbers::estimators::ocv::{Form, MAX_COMPONENTS, NormalEquations, block_of};
 use lumiris_test_support::random::{Pcg32, RngExt};
@@ -6,7 +6,7 @@ use lumiris_test_support::random::{Pcg32, RngExt};
 /// A density on 0..1.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Density {
-    /// Constant between two ends.
+    /// Uniform between two ends.
     Uniform(f64, f64),
     /// 4x up to ½, then 4(1 − x): a lobe.
     Tent,
@@ -53,15 +53,16 @@ pub(crate) enum Mixture {
     Table,
     /// The same; the occluder hides one of them and a little more.
     Occluded,
-    /// A steep lobe and a wide light, of which it reflects a part.
+    /// A steep lobe and a wide light, of which it reflects only a part.
     Peak,
-    /// f is the mixture itself, up to a ripple that no component resembles: nothing is to be gained.
+    /// f is the mixture itself, up to a ripple that no component resembles: control variates cannot reduce the
+    /// variance.
     Optimal,
     /// Diffuse and glossy lobes and two lights of different colours, partly hidden.
     Colour,
     /// A lobe and seven lights of different power, some of them hidden.
     Many,
-    /// A light that is seen through a narrow slit: most estimates are 0.
+    /// A light visible through a narrow slit: most estimates are 0.
     Slit,
     /// A lobe and one light.
     OneLight,
@@ -69,17 +70,17 @@ pub(crate) enum Mixture {
     NoLight,
     /// [`Mixture::Table`] with both lights twice.
     Duplicates,
-    /// [`Mixture::Table`] and a component outside of the part where f is not 0.
+    /// [`Mixture::Table`] and a component outside of the support of f.
     Useless,
     /// f = 0.
     Zero,
 }
 
-/// Those that bounds of variance hold for.
+/// Integrals for which the variance bounds hold.
 pub(crate) const PROPER: [Mixture; 7] =
     [Mixture::Table, Mixture::Occluded, Mixture::Peak, Mixture::Optimal, Mixture::Colour, Mixture::Many, Mixture::Slit];
 
-/// Those in which something is missing or too much.
+/// Degenerate mixtures, with missing or superfluous components.
 pub(crate) const DEGENERATE: [Mixture; 5] =
     [Mixture::OneLight, Mixture::NoLight, Mixture::Duplicates, Mixture::Useless, Mixture::Zero];
 
@@ -156,12 +157,12 @@ impl Mixture {
         }
     }
 
-    /// A channel of f without the occluder, for the integrals of lights of one power.
+    /// A channel of f without the occluder, for integrals whose lights have the same power.
     pub(crate) fn unshadowed(self, x: f64) -> f64 {
         8.0 * x * (1.0 - x) * (inside(x, 0.2, 0.5) + inside(x, 0.6, 0.9))
     }
 
-    /// ∫f by the midpoint rule, whose points are symmetric about every step of f.
+    /// ∫f by the midpoint rule, with points symmetric about every discontinuity of f.
     pub(crate) fn value(self) -> [f64; 3] {
         const POINTS: u32 = 1_000_000;
         let mut sum = [0.0; 3];
@@ -173,18 +174,18 @@ impl Mixture {
     }
 }
 
-/// Numbers of samples n_j of a deterministic mixture of weights `alpha`: Σ n_j = `n`, and each is as near to n α_j as
-/// whole numbers can be, but at least 1 where α_j > 0, if `n` suffices for that; else those of the largest α_j have one
-/// each.
+/// Numbers of samples n_j of a deterministic mixture with the weights `alpha`: Σ n_j = `n`, and each is the integer
+/// nearest to n α_j, but at least 1 where α_j > 0. If `n` is too small for that, the components with the largest α_j
+/// have one each.
 ///
-/// The mixture is that of the weights n_j/n, which are α_j only if all n α_j are whole: densities must be weighted by
-/// what is returned here, or the estimate is biased. Equal claims are settled in favour of the earlier component.
+/// The mixture has the weights n_j/n, which equal α_j only if all n α_j are integers. Densities must be weighted by the
+/// returned numbers, or the estimate is biased. Ties are settled in favour of the earlier component.
 fn allot(alpha: &[f32], n: u32, counts: &mut [u32]) {
     let counts = &mut counts[..alpha.len()];
     counts.fill(0);
     let total: f64 = alpha.iter().filter(|a| **a > 0.0).map(|a| f64::from(*a)).sum();
     for _ in 0..n {
-        // Who has none comes first, by weight; then who is farthest below its share.
+        // Components without samples come first, by weight; then the one farthest below its fraction.
         let claim = |j: usize, count: u32| match (alpha[j] > 0.0, count) {
             (false, _) => f64::NEG_INFINITY,
             (true, 0) => f64::from(n) + f64::from(alpha[j]) / total,
@@ -215,24 +216,24 @@ fn counts_of_a_mixture_are_its_shares_and_nobody_with_a_share_has_none() {
     assert_eq!((counts(&[0.0], 4), counts(&[], 4)), (vec![0], vec![]));
 }
 
-/// Samples of a mixture: for each component its number n_j per pass.
+/// Sampler of a mixture, with the number n_j per pass of each component.
 pub(crate) struct Sampler {
     pub mixture: Mixture,
     pub densities: Vec<Density>,
     pub counts: Vec<u32>,
-    /// Stratified samples: each component over its whole domain, in as many equal strata as it has samples in a block.
+    /// Stratified samples: each component over its whole domain, with one stratum per sample in a block.
     pub is_stratified: bool,
     /// Factor of f.
     pub scale: f64,
-    /// How far the occluder of [`Mixture::Table`] is moved.
+    /// Offset of the occluder of [`Mixture::Table`].
     pub shift: f64,
     pub equations: NormalEquations,
-    /// I_j of each component: 1, or 0 if it has no samples and is no column.
+    /// I_j of each component: 1, or 0 for a component without samples, which has no column.
     pub integrals: Vec<f32>,
     pub n: u32,
 }
 
-/// A sample: where, of which component, all densities there, and p_α.
+/// A sample: position, component, all densities, and p_α.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Point {
     pub x: f64,
@@ -269,7 +270,7 @@ impl Sampler {
         }
     }
 
-    /// The sample of a component that `u` chooses.
+    /// The sample of a component at the number `u`.
     fn point(&self, component: usize, u: f64) -> Point {
         let x = self.densities[component].sample(u);
         let mut point = Point { x, component, pdfs: [0.0; 8], mixture_pdf: 0.0 };
@@ -280,7 +281,7 @@ impl Sampler {
         point
     }
 
-    /// r_j = p_j/p_α. A component without samples is no column.
+    /// r_j = p_j/p_α. A component without samples has no column.
     fn columns(&self, point: &Point) -> [f32; MAX_COMPONENTS] {
         let mut columns = [0.0; MAX_COMPONENTS];
         for j in (0..self.counts.len()).filter(|&j| self.counts[j] > 0) {
@@ -289,8 +290,8 @@ impl Sampler {
         columns
     }
 
-    /// Covariances of the means over a block of `passes` of y, by channel, and of the columns, which follow; by
-    /// quadrature over each stratum.
+    /// Covariances of the means over a block of `passes` of y, by channel, followed by the columns; by quadrature over
+    /// each stratum.
     pub(crate) fn covariances(&self, passes: u32) -> Covariances {
         const POINTS: u32 = 1 << 15;
         let mut covariances = Covariances::default();
@@ -345,7 +346,7 @@ impl Sampler {
         });
     }
 
-    /// The sums of a new block in the columns of a form.
+    /// The sums of a new block, in the columns of a form.
     pub(crate) fn block(&self, form: Form, passes: u32, stream: &mut Pcg32, sums: &mut [f32]) {
         sums.fill(0.0);
         self.add(passes, stream, sums);

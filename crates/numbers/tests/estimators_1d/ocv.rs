@@ -1,4 +1,4 @@
-//! Optimizing control variates and its relatives: bias, variance, scale, and what happens where something is missing.
+//! Optimizing control variates and related estimators: bias, variance, scaling, and degenerate cases.
 
 use super::mixtures::{DEGENERATE, Density, Mixture, PROPER, Sampler};
 use super::{assert_means, assert_variances, level, oracle};
@@ -14,11 +14,11 @@ const PROGRESSIVE: Form = Form::Progressive;
 /// Numbers of samples of a pass.
 const NUMBERS: [u32; 4] = [3, 8, 16, 64];
 
-/// Runs whose systems are solved at once, as the renderer does with those of a batch of points.
+/// Number of runs whose systems are solved together, as the renderer does for batches of points.
 const BATCH: usize = 16;
 
-/// Passes in a row, each with the coefficients of the one before: uncorrelated estimates, since each has the
-/// expectation ∫f whatever its coefficients are. [`BATCH`] rows of passes take turns.
+/// Successive passes, each with the coefficients of the previous one. The estimates are uncorrelated, since each has
+/// the expectation ∫f for any coefficients. [`BATCH`] rows of passes alternate.
 fn chain(sampler: &Sampler, runs: usize, key: u32) -> [Welford; 3] {
     let equations = sampler.equations;
     let (len, width) = (equations.len(), equations.coefficients());
@@ -67,9 +67,8 @@ fn variances(sampler: &Sampler, count: u32, runs: usize) -> [[f64; 3]; 2] {
     welford.map(|form| form.map(|w| w.variance()))
 }
 
-/// Variance of the progressive form of [`passes`] by channel, from that of a block with given coefficients, which is
-/// known, over coefficients that are fitted as there: Var(ȳ − Σ β_j c̄_j) of each block, since blocks are not
-/// correlated.
+/// Variance of the progressive form of [`passes`] by channel. It is the mean, over fitted coefficients, of the exact
+/// variance Var(ȳ − Σ β_j c̄_j) of each block with given coefficients, since blocks are uncorrelated.
 fn predicted_variances(sampler: &Sampler, passes: u32, runs: usize) -> [Welford; 3] {
     let equations = sampler.equations;
     let blocks: Vec<_> = Sampler::blocks(passes).map(|len| (len, sampler.covariances(len))).collect();
@@ -98,15 +97,14 @@ fn predicted_variances(sampler: &Sampler, passes: u32, runs: usize) -> [Welford;
     })
 }
 
-/// Runs of a test of the mean: 600,000 of 3 samples of [`Mixture::Table`], and as many samples in all where a run has
-/// more of them, which leaves about the same standard error; a tenth of it for other integrals.
+/// Runs of a test of the mean: 600,000 with 3 samples of [`Mixture::Table`], and the same total number of samples for
+/// runs with more, which gives about the same standard error; a tenth of it for other integrals.
 fn runs_of(sampler: &Sampler) -> usize {
     let samples = if sampler.mixture == Mixture::Table { 1_800_000 } else { 180_000 };
     samples / sampler.n as usize
 }
 
-/// Runs of a test of the variance. Means of many samples are nearly normal, and their variance is known from fewer of
-/// them.
+/// Runs of a test of the variance. Means of many samples are nearly normal, so fewer runs determine their variance.
 fn runs_of_a_variance(sampler: &Sampler) -> usize {
     if sampler.n <= 8 { 10_000 } else { 3_400 }
 }
@@ -133,7 +131,7 @@ fn the_progressive_form_is_unbiased() {
 #[test]
 fn estimates_without_lights_with_too_many_components_and_of_nothing_are_finite_and_unbiased() {
     each_sampler(&DEGENERATE, &[1, 2, 3, 8], |sampler, name, value| {
-        // A single sample may have a component that nothing else can take the place of.
+        // A single sample may have a component that no other can replace.
         if sampler.counts[0] > 0 {
             let channels = chain(sampler, 50_000, 1);
             assert!(channels.iter().all(|w| w.mean().is_finite() && w.variance().is_finite()), "{name}: {channels:?}");
@@ -142,7 +140,7 @@ fn estimates_without_lights_with_too_many_components_and_of_nothing_are_finite_a
     });
 }
 
-/// Estimates of a form with the coefficients of the same samples, as it makes them.
+/// Estimates of a form with coefficients from the same samples.
 fn form_runs(form: Form, sampler: &Sampler, runs: usize) -> [Welford; 3] {
     let equations = sampler.equations;
     let (len, width) = (form.rows() * equations.len(), form.rows() * equations.coefficients());
@@ -170,7 +168,7 @@ fn the_crossfit_form_is_unbiased() {
 
 #[test]
 fn coefficients_of_the_same_samples_are_biased_in_both_other_forms() {
-    // What the tests above would see if a block were fitted to itself.
+    // The effect that the tests above would detect if a block were fitted to itself.
     let sampler = Sampler::new(Mixture::Table, 8, false);
     let value = Mixture::Table.value();
     for form in [Form::Regression, Form::Paper] {
@@ -201,8 +199,8 @@ fn four_passes_of_independent_samples_have_at_most_the_variance_of_mis() {
 
 #[test]
 fn four_passes_have_the_variance_of_their_blocks_and_coefficients() {
-    // Strata leave little variance, and coefficients that were fitted to the samples one by one may multiply it: what
-    // holds is the law of the estimate, with the variance within strata by quadrature.
+    // Strata leave little variance, and coefficients fitted to individual samples may multiply it. The test compares
+    // with the exact variance of the estimate, with the variance within strata by quadrature.
     const PASSES: u32 = 4;
     each_sampler(&PROPER, &NUMBERS, |sampler, name, value| {
         let predicted = predicted_variances(sampler, PASSES, runs_of_a_variance(sampler) / 4);
@@ -221,7 +219,7 @@ fn four_passes_have_the_variance_of_their_blocks_and_coefficients() {
     });
 }
 
-/// Variance of the pass that follows `passes` over that of MIS.
+/// Ratio of the variance of the pass after `passes` to MIS.
 fn ratio_after(sampler: &Sampler, passes: u32, runs: usize) -> f64 {
     let equations = sampler.equations;
     let (mut all, mut sums) = (vec![0.0; equations.len()], vec![0.0; equations.len()]);
@@ -278,7 +276,7 @@ fn progressive_optimal_mis_is_unbiased() {
             sums.fill(0.0);
             sampler.add(1, stream, &mut sums);
             let estimate = optimal_mis::estimate(equations, &sums, &sampler.integrals, &alpha);
-            // Too few samples leave the balance heuristic.
+            // With too few samples the result is the balance heuristic.
             let _ = optimal_mis::coefficients(equations, &sums, &mut alpha);
             estimate.map(f64::from)
         });
@@ -308,7 +306,7 @@ fn two_techniques_are_unbiased_with_every_heuristic() {
 
 #[test]
 fn correlated_sampling_has_the_variance_of_theory_and_no_bias_where_halves_are_fitted_to_each_other() {
-    // The lobe samples; the control is what would be reflected without the occluder.
+    // Samples of the lobe; the control is the unoccluded reflection.
     let (density, mixture) = (Density::Tent, Mixture::Table);
     let value = mixture.value();
     let unshadowed = |x: f64| mixture.unshadowed(x);
@@ -347,7 +345,7 @@ fn correlated_sampling_has_the_variance_of_theory_and_no_bias_where_halves_are_f
         correlated::crossfit([&halves[0], &halves[1]]).map(f64::from)
     });
     assert_means("correlated, crossfit", &fitted, value);
-    // A coefficient of n samples costs one part in n.
+    // Each coefficient fitted to n samples costs a fraction 1/n.
     let ratio = fitted[0].variance() / (variance / f64::from(2 * HALF));
     assert!((0.98..1.1).contains(&ratio), "{ratio}");
 }

@@ -1,12 +1,12 @@
-//! Slow and plain versions in f64, which the shipping ones are compared with.
+//! Slow and simple f64 versions, for comparison with the shipping ones.
 
 use lumiris_numbers::estimators::ocv::ldlt::{self, Columns, Factors};
 use lumiris_numbers::estimators::ocv::{MAX_COMPONENTS, Matrix, NormalEquations, System};
 
-/// Part of Σ c² below which Σ (c − c̄)² is rounding.
+/// Fraction of Σ c² below which Σ (c − c̄)² is rounding.
 const CONSTANT: f64 = 1e-6;
 
-/// The coefficients of one row of sums, `beta[3 j + channel]`, by a factorisation in f64 with pivots.
+/// The coefficients of one row of sums, `beta[3 j + channel]`, by an f64 factorisation with pivoting.
 pub(crate) fn solve(equations: NormalEquations, system: System, sums: &[f32]) -> Vec<f64> {
     let m = equations.components();
     let mut beta = vec![0.0; equations.coefficients()];
@@ -71,7 +71,7 @@ fn assemble(equations: NormalEquations, matrix: Matrix, sums: &[f32]) -> (ldlt::
     (a, b)
 }
 
-/// Trace of the inverse of what is left of the matrix.
+/// Trace of the inverse of the matrix without dropped columns.
 fn inverse_trace(factors: &Factors, m: usize) -> f64 {
     let diagonal = |i: usize| {
         let mut unit = [0.0; MAX_COMPONENTS];

@@ -69,7 +69,8 @@ fn the_optimal_ratio_is_a_minimum_and_the_robust_ratio_at_most_doubles_it() {
     assert!(worst > 1.5 && worst <= 2.0, "{worst}");
 }
 
-/// One channel alone: the lengths of e3 − e2 and e2 − e1 do not add up to that of their sum if a channel has e3 < e2.
+/// A single channel: the lengths of e3 − e2 and e2 − e1 do not add up to the length of their sum if a channel has e3 <
+/// e2.
 fn one_channel(e: Moments, i: usize) -> Moments {
     let one = |e: [f64; 3]| [e[i], 0.0, 0.0];
     Moments { e1: one(e.e1), e2: one(e.e2), e3: one(e.e3) }
@@ -90,7 +91,7 @@ fn the_optimal_set_size_is_a_minimum_of_the_variance() {
             }
         }
     }
-    // Where the target fits a channel worse than p does, one proposal is best; both kinds are there.
+    // If the target fits a channel worse than p does, one proposal is optimal; both cases occur.
     assert!(sizes.contains(&1.0) && sizes.iter().any(|&m| m > 2.0), "{sizes:?}");
 }
 

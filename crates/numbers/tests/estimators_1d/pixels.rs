@@ -1,4 +1,4 @@
-//! Control variates over the pixels of a picture: bias.
+//! Control variates over the pixels of an image: bias.
 
 use super::mixtures::{Mixture, Sampler};
 use super::{assert_means, level};
@@ -8,14 +8,14 @@ use lumiris_numbers::estimators::stats::{Welford, z_test};
 use lumiris_test_support::integrals::run;
 use lumiris_test_support::random::Pcg32;
 
-/// Edge of a picture.
+/// Edge of an image.
 const EDGE: usize = 8;
 
 /// Estimates of pixels, by channel.
 type Estimates = Vec<[f64; 3]>;
 
-/// The pixels of a picture that all have the integral of `sampler`: by MIS, and corrected. Where `copies`, pixels are
-/// pairs of neighbours of the same samples.
+/// Pixels of an image that all have the integral of `sampler`: by MIS, and corrected. With `copies`, pairs of
+/// neighbours have the same samples.
 fn picture(sampler: &Sampler, passes: u32, copies: bool, stream: &mut Pcg32) -> [Estimates; 2] {
     let (equations, m) = (sampler.equations, sampler.counts.len());
     let mut sums = vec![0.0; equations.len()];
@@ -46,7 +46,7 @@ fn mean(estimates: &[[f64; 3]]) -> [f64; 3] {
     [0, 1, 2].map(|c| estimates.iter().map(|e| e[c]).sum::<f64>() / estimates.len() as f64)
 }
 
-/// Means of pictures of `runs` pixels together.
+/// Means over images with `runs` pixels in total.
 fn runs_of_pixels(sampler: &Sampler, runs: usize, copies: bool) -> [Welford; 3] {
     let key = [41, sampler.n, sampler.mixture as u32];
     run(runs / (EDGE * EDGE), key, |stream| mean(&picture(sampler, 1, copies, stream)[1]))
@@ -67,14 +67,14 @@ fn the_form_over_pixels_is_unbiased() {
 
 #[test]
 fn coefficients_of_pixels_that_share_their_samples_are_biased() {
-    // What the test above would see if a pixel were fitted to itself.
+    // The effect that the test above would detect if a pixel were fitted to itself.
     let sampler = Sampler::new(Mixture::Table, 3, false);
     let [w, ..] = runs_of_pixels(&sampler, 1_000_000, true);
     let z = z_test(w.mean(), Mixture::Table.value()[0], w.standard_error());
     assert!(z.p_value < level(), "{} {}", w.mean(), Mixture::Table.value()[0]);
 }
 
-/// Variance of a pixel over that of MIS, in the first channel.
+/// Ratio of the variance of a pixel to MIS, in the first channel.
 fn variance(sampler: &Sampler, passes: u32, pictures: usize) -> f64 {
     let value = sampler.mixture.value()[0];
     let mut squares = [0.0; 2];

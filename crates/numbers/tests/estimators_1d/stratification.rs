@@ -1,4 +1,4 @@
-//! Strata against none, and the ways to choose strata of equal weights.
+//! Strata compared with none, and methods to choose strata of equal weights.
 
 use lumiris_numbers::estimators::ris::choice::length;
 use lumiris_numbers::estimators::ris::{strata, stratified, with_replacement};
@@ -40,7 +40,7 @@ fn stratified_with_a_stratum_per_proposal_is_plain_monte_carlo_bit_for_bit() {
     }
 }
 
-/// How the strata of a run are made.
+/// Method that makes the strata of a run.
 type Strata = fn(&[f32], &[f32], &mut Vec<u32>);
 
 fn variance(integral: Integral, jittered: bool, key: u32, make: Option<Strata>) -> f64 {
@@ -64,8 +64,8 @@ fn variance(integral: Integral, jittered: bool, key: u32, make: Option<Strata>) 
     total_variance(&channels)
 }
 
-/// The greedy strata with a fixed target Σw/N, as the thesis describes them; `complement` turns the printed probability
-/// around. More than N strata are joined to the last.
+/// The greedy strata with a fixed target Σw/N, as in the thesis; `complement` uses the complement of the printed
+/// probability. Strata beyond N are merged into the last.
 fn fixed_target(weights: &[f32], u: &[f32], complement: bool, ends: &mut Vec<u32>) {
     ends.clear();
     let target = weights.iter().sum::<f32>() / N as f32;

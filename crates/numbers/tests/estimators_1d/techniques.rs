@@ -11,10 +11,10 @@ const HEURISTICS: [Heuristic; 3] = [Heuristic::Balance, Heuristic::Power, Heuris
 const LINE: Integral = Integral::Line;
 #[test]
 fn mis_on_samples_is_unbiased() {
-    // Two targets that each resemble f in another place, with sets of 4 and 6 proposals and 1 and 2 draws.
+    // Two targets that resemble f in different regions, with sets of 4 and 6 proposals and 1 and 2 draws.
     let targets = |x: [f64; 2]| [0.1 + x[0] * x[0], if x[0] < 0.6 { 2.0 - x[0] } else { 0.0 }];
     const SETS: [(usize, usize); 2] = [(4, 1), (6, 2)];
-    // Proposals of ½ + x and of 1
+    // Densities ½ + x and 1 of the proposals
     let pdfs = |x: [f64; 2]| [LINE.pdf(x), 1.0];
     let propose = |k: usize, u: f64| if k == 0 { LINE.sample([u, 0.0]) } else { [u, 0.0] };
     let (value, _) = LINE.moments();

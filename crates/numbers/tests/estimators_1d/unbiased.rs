@@ -1,4 +1,4 @@
-//! Means and variances of the ways of drawing.
+//! Means and variances of the drawing methods.
 
 use super::baselines::{defensive_choice, defensive_pdf};
 use super::{assert_means, assert_variances};
@@ -53,7 +53,7 @@ fn independent_sets_have_the_variance_of_paper_equation_2() {
 
 #[test]
 fn stratified_draws_have_the_variance_of_thesis_equation_4_6() {
-    // Four strata of the domain with different numbers of proposals, of which one each is drawn.
+    // Four strata of the domain with different numbers of proposals, and one draw from each.
     const SIZES: [u32; 4] = [1, 2, 5, 3];
     for integral in ALL {
         let (mut value, mut expected) = ([0.0; 3], [0.0; 3]);
@@ -85,7 +85,7 @@ fn stratified_draws_have_the_variance_of_thesis_equation_4_6() {
     }
 }
 
-/// One estimate of `integral` by some way of drawing.
+/// One estimate of `integral` by a drawing method.
 type Estimate = fn(Integral, &mut Pcg32, &mut Proposals) -> [f64; 3];
 
 fn systematic_estimate(integral: Integral, stream: &mut Pcg32, p: &mut Proposals) -> [f64; 3] {
@@ -163,7 +163,7 @@ fn nearly_right(integral: Integral, x: [f64; 2]) -> f64 {
     0.9 * integral.visibility(x) + 0.05
 }
 
-/// Right where it is sure, in doubt elsewhere.
+/// Correct where it is 0 or 1, uncertain elsewhere.
 fn blurred(integral: Integral, [x, y]: [f64; 2]) -> f64 {
     (-4..=4).map(|k| integral.visibility([(x + 0.01 * f64::from(k)).clamp(0.0, 1.0), y])).sum::<f64>() / 9.0
 }
@@ -176,8 +176,8 @@ fn opposite(integral: Integral, x: [f64; 2]) -> f64 {
     1.0 - integral.visibility(x)
 }
 
-/// Runs of `n` draws of the proposals with V̂ by `guess` as a control variate; without one, with the weights of the unshadowed
-/// colour.
+/// Runs of `n` draws from the proposals, with V̂ by `guess` as a control variate; without `guess`, with the weights of
+/// the unshadowed colour.
 fn controlled_runs(integral: Integral, n: usize, guess: Option<Guess>, runs: usize) -> [Welford; 3] {
     let (mut p, mut draws) = (Proposals::default(), Vec::new());
     run(runs, [4, integral as u32, n as u32], |stream| {

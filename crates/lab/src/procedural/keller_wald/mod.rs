@@ -1,5 +1,5 @@
-//! The scenes of `scenes/keller-wald`, after those of [Keller and Wald 2000]: rooms of which one is visible, a caustic
-//! ring, a room lit through a slit. [`rooms`] writes the rooms.
+//! The scenes of `scenes/keller-wald`, after [Keller and Wald 2000]: rooms of which one is visible, a caustic ring, a
+//! room lit through a slit. [`rooms`] writes the rooms.
 
 pub mod rooms;
 
@@ -7,20 +7,20 @@ use super::files::{ProceduralError, write_texts};
 use rooms::{Building, building};
 use std::path::Path;
 
-/// Name and text of each scene file that nobody computes.
+/// Name and text of each scene file that is not generated.
 const SCENES: [(&str, &str); 3] = [
     ("ring.pbrt", include_str!("../../../../../scenes/keller-wald/ring.pbrt")),
     ("ring-indirect.pbrt", include_str!("../../../../../scenes/keller-wald/ring-indirect.pbrt")),
     ("slit.pbrt", include_str!("../../../../../scenes/keller-wald/slit.pbrt")),
 ];
-/// What `ring.pbrt` and `ring-indirect.pbrt` share.
+/// Shared part of `ring.pbrt` and `ring-indirect.pbrt`.
 const SHARED: (&str, &str) =
     ("ring-geometry.pbrt", include_str!("../../../../../scenes/keller-wald/ring-geometry.pbrt"));
 
 /// Number of scenes.
 pub const COUNT: usize = SCENES.len() + 2;
 
-/// Writes the scenes into a folder, which is made if there is none.
+/// Writes the scenes into a folder, which is created if necessary.
 pub fn write_scenes(folder: &Path) -> Result<(), ProceduralError> {
     let rooms = building(&Building::default());
     let many = building(&Building::with_many_lights());

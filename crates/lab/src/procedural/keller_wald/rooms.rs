@@ -1,13 +1,13 @@
-//! A building of adjacent square rooms, closed by walls and a ceiling, with a door between every two neighbours and
-//! separate lights in each: of many lights, a point sees those of one room and a little of the next.
+//! A building of adjacent square rooms, closed by walls and a ceiling, with a door between neighbours and separate
+//! lights in each. Of the many lights, only those of one room and a few of its neighbours are visible from a point.
 //!
-//! z is up; room (i, j) has the middles of its walls at x = 4i and 4(i + 1), y = 4j and 4(j + 1) (m).
+//! z is up. The walls of room (i, j) are centred at x = 4i and 4(i + 1), y = 4j and 4(j + 1) (m).
 
 use lumiris_numbers::math::Vec3;
 use lumiris_numbers::math::hash::{pcg4d, unit_f32};
 use std::fmt::Write;
 
-/// From the middle of a wall to that of the next (m).
+/// Distance of the centres of neighbouring walls (m).
 pub const PITCH: f32 = 4.0;
 /// Height of the rooms (m).
 pub const HEIGHT: f32 = 2.6;
@@ -15,24 +15,24 @@ pub const HEIGHT: f32 = 2.6;
 const HALF_WALL: f32 = 0.1;
 /// Width and height of a door (m).
 const DOOR: [f32; 2] = [0.95, 2.05];
-/// Area of the lights of a room (m²), and how far they hang below the ceiling (m).
+/// Area of the lights of a room (m²), and their distance from the ceiling (m).
 const LIGHT_AREA: f32 = 0.09;
 const LIGHT_DROP: f32 = 0.02;
 /// Radiance of a light whose strength is 1.
 const RADIANCE: f32 = 150.0;
-/// What random numbers are for.
+/// Purposes of the random numbers.
 const DOORS: [u32; 2] = [0x64_6f_6f_72, 0x64_6f_6f_73];
 const LIGHTS: u32 = 0x6c_69_67_68;
 const FURNITURE: u32 = 0x63_68_61_69;
 
-/// What is built.
+/// Parameters of the building.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Building {
     /// Rooms along each side.
     pub rooms: u32,
     /// Rows of lights in a room, and lights in a row.
     pub lights: u32,
-    /// Which doors, lights and furniture.
+    /// Seed of doors, lights and furniture.
     pub seed: u32,
 }
 
@@ -43,7 +43,7 @@ impl Default for Building {
 }
 
 impl Building {
-    /// 10,000 lights: 50 × 50 rooms with four in each, of the same power all together as the one of the smaller
+    /// 10,000 lights: 50 × 50 rooms with four lights each, with the same total power as the light of the smaller
     /// building.
     pub fn with_many_lights() -> Self {
         Building { rooms: 50, lights: 2, ..Building::default() }
@@ -54,7 +54,7 @@ impl Building {
         [self.rooms / 2; 2].map(|r| r.saturating_sub(1))
     }
 
-    /// Whether a room is the one with the camera or beside it.
+    /// True for the room with the camera and its neighbours.
     fn is_near(&self, [i, j]: [u32; 2]) -> bool {
         let [x, y] = self.seen();
         i.abs_diff(x) <= 1 && j.abs_diff(y) <= 1
@@ -65,7 +65,7 @@ impl Building {
         pcg4d([room[0], room[1], purpose, self.seed]).map(unit_f32)
     }
 
-    /// Middle of the door that leads from a room in direction `axis` (0: +x, 1: +y), along the wall (m).
+    /// Centre of the door from a room in direction `axis` (0: +x, 1: +y), along the wall (m).
     fn door(&self, room: [u32; 2], axis: usize) -> f32 {
         let start = PITCH * room[1 - axis] as f32;
         let max = PITCH - 2.0 * HALF_WALL - DOOR[0] - 0.6;
@@ -80,8 +80,8 @@ struct Boxes {
     triangles: Vec<[u32; 3]>,
 }
 
-/// Corners of the sides of a box, counter-clockwise from outside; corner k has the greater x, y, z where bits 0, 1, 2
-/// of k are 1.
+/// Corners of the sides of a box, counter-clockwise from outside. Bits 0, 1, 2 of k select the greater x, y, z of
+/// corner k.
 const SIDES: [[u32; 4]; 6] = [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
 
 impl Boxes {
@@ -113,7 +113,7 @@ impl Boxes {
     }
 }
 
-/// A length in the file: to the millimetre.
+/// A length in the file, rounded to the millimetre.
 fn mm(v: f32) -> f32 {
     (v * 1000.0).round() / 1000.0
 }
@@ -158,7 +158,7 @@ fn head(b: &Building, out: &mut String) {
     );
 }
 
-/// Floor, ceiling and walls. Walls run through the whole building, so that they cross.
+/// Floor, ceiling and walls. Walls extend through the whole building and intersect.
 fn walls(b: &Building, out: &mut String) {
     let size = b.rooms as f32 * PITCH;
     let _ = write!(
@@ -173,7 +173,7 @@ fn walls(b: &Building, out: &mut String) {
     for axis in 0..2 {
         for line in 0..=b.rooms {
             let at = PITCH * line as f32;
-            // A piece of the wall from `a` to `c` along it and from `z` upwards
+            // A piece of the wall from `a` to `c` along it, from `z` upwards
             let mut piece = |a: f32, c: f32, z: f32| {
                 let (mut low, mut high) = (Vec3::new(at - HALF_WALL, a, z), Vec3::new(at + HALF_WALL, c, HEIGHT));
                 if axis == 1 {
@@ -197,7 +197,7 @@ fn walls(b: &Building, out: &mut String) {
     boxes.write(out);
 }
 
-/// A table with a ball, a chest and a stool in the room with the camera and in those around it.
+/// A table with a ball, a chest and a stool in the room with the camera and its neighbours.
 fn furniture(b: &Building, out: &mut String) {
     let (mut wood, mut cloth) = (Boxes::default(), Boxes::default());
     let mut balls = Vec::new();
@@ -206,7 +206,7 @@ fn furniture(b: &Building, out: &mut String) {
             let [u, v, w, s] = b.random([i, j], FURNITURE);
             let corner = Vec3::new(PITCH * i as f32, PITCH * j as f32, 0.0);
 
-            // The table stands in the middle, where no door leads
+            // The table is in the centre, away from the doors
             let middle = corner + Vec3::new(1.9 + 0.3 * u, 1.9 + 0.3 * v, 0.0);
             let half = Vec3::new(0.38 + 0.1 * w, 0.38 + 0.1 * s, 0.0);
             wood.push(middle - half + Vec3::Z * 0.68, middle + half + Vec3::Z * 0.72);
@@ -216,7 +216,7 @@ fn furniture(b: &Building, out: &mut String) {
             }
             balls.push((middle + Vec3::new(0.3 * u - 0.15, 0.3 * v - 0.15, 0.0), 0.13 + 0.06 * w));
 
-            // The chest stands in a corner, the stool beside the table
+            // The chest is in a corner, the stool beside the table
             let chest = corner + Vec3::new(PITCH - HALF_WALL - 0.4, PITCH - HALF_WALL - 0.3, 0.0);
             wood.push(chest, chest + Vec3::new(0.4, 0.3, 0.6 + 0.8 * s));
             let stool = middle + Vec3::new(0.62 + 0.2 * v, 0.2 - 0.4 * u, 0.0);
@@ -240,8 +240,8 @@ fn furniture(b: &Building, out: &mut String) {
     }
 }
 
-/// Squares below the ceilings. Rooms differ in the strength and the warmth of their light; around the camera they
-/// differ less, so that one exposure serves.
+/// Squares below the ceilings. Rooms differ in the strength and colour temperature of their light; near the camera they
+/// differ less, so that one exposure suits them.
 fn lights(b: &Building, out: &mut String) {
     let edge = (LIGHT_AREA / (b.lights * b.lights) as f32).sqrt();
     let z = mm(HEIGHT - LIGHT_DROP);
@@ -253,7 +253,7 @@ fn lights(b: &Building, out: &mut String) {
             let room = RADIANCE * ((strength - 0.5) * span).exp2();
             let color = Vec3::new(1.0, 0.8, 0.52).lerp(Vec3::new(0.66, 0.82, 1.05), warmth);
             for k in 0..b.lights * b.lights {
-                // A grid over most of the ceiling; a single light hangs near the middle
+                // A grid over most of the ceiling; a single light is near the centre
                 let at = |cell: u32, jitter: f32| match b.lights {
                     1 => PITCH * 0.5 + 0.8 * (jitter - 0.5),
                     n => PITCH * 0.5 + (PITCH - 1.0) * ((cell as f32 + 0.5) / n as f32 - 0.5),

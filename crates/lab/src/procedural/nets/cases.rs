@@ -1,13 +1,13 @@
-//! The 256 ways in which a surface can pass a cell: which of the twelve edges belong to the same sheet.
+//! The 256 configurations of a surface in a cell: for each, the sheets and their edges among the twelve.
 //!
-//! Corner i lies at the bits (x, y, z) = (i & 1, i >> 1 & 1, i >> 2 & 1). Edge 4a + j runs along axis a; bit 0 of j is
-//! its place on the axis a + 1, bit 1 on the axis a + 2 (mod 3). On a face whose inside corners are diagonal the inside
-//! is taken as two pieces. Both cells at a face see the same four corners, so they agree.
+//! Corner i has the coordinates (x, y, z) = (i & 1, i >> 1 & 1, i >> 2 & 1). Edge 4a + j is parallel to axis a; bit 0
+//! of j is its coordinate on the axis a + 1, bit 1 on the axis a + 2 (mod 3). On a face with diagonal inside corners,
+//! the inside counts as two pieces. Both cells at a face use the same four corners, so they agree.
 
 /// The sheets of one case.
 #[derive(Clone, Copy)]
 pub(super) struct Case {
-    /// Sheet of each edge; meaningless where the edge is not crossed.
+    /// Sheet of each edge; undefined if the surface does not cross the edge.
     pub sheet: [u8; 12],
     /// Number of sheets, at most 4.
     pub sheets: u8,
@@ -20,13 +20,13 @@ pub(super) fn edge_corners(edge: usize) -> [usize; 2] {
     [first, first | (1 << axis)]
 }
 
-/// The four corners of the face across `axis` on `side`: bit 0 of the place in the array is the axis a + 1, bit 1 the
-/// axis a + 2.
+/// The four corners of the face across `axis` on `side`: bit 0 of the array index is the axis a + 1, bit 1 the axis a +
+/// 2.
 pub(super) fn face_corners(axis: usize, side: usize) -> [usize; 4] {
     std::array::from_fn(|j| (side << axis) | ((j & 1) << ((axis + 1) % 3)) | ((j >> 1) << ((axis + 2) % 3)))
 }
 
-/// True if the inside corners of a face are two that are diagonal.
+/// True if a face has two inside corners, which are diagonal.
 pub(super) fn is_ambiguous(config: u8, corners: [usize; 4]) -> bool {
     let inside = corners.map(|c| config >> c & 1 == 1);
     inside[0] == inside[3] && inside[1] == inside[2] && inside[0] != inside[1]
@@ -58,7 +58,7 @@ fn case(config: u8) -> Case {
         }
     };
 
-    // Each face joins two edges, or two pairs of edges
+    // Each face connects two edges, or two pairs of edges
     for (axis, side) in [(0, 0), (0, 1), (1, 0), (1, 1), (2, 0), (2, 1)] {
         let corners = face_corners(axis, side);
         let around = [[0, 1], [1, 3], [3, 2], [2, 0]].map(|[a, b]| edge_between(corners[a], corners[b]));

@@ -1,14 +1,14 @@
-//! Meshes of implicit surfaces: surface nets [Gibson 1998] with one vertex for each sheet that passes a cell
-//! [Nielson 2004], so that the mesh is closed and every edge has exactly two triangles.
+//! Meshes of implicit surfaces: surface nets [Gibson 1998] with one vertex per sheet and cell [Nielson 2004], so that
+//! the mesh is closed and every edge has exactly two triangles.
 //!
-//! The field f is sampled at the corners of a grid of cubes. A cell through which f changes sign gets a vertex for each
-//! of its sheets ([`cases`]): the mean of the crossings of the sheet's edges, moved onto f = 0 by one Newton step of
-//! the trilinear interpolant where the cell has one sheet. Every crossed grid edge gives the polygon of the four
-//! vertices around it. Where a face of two cells is passed twice, both polygons of each passage get a vertex of their
-//! own between the two cells: without it the two passages might share an edge.
+//! The field f is sampled at the corners of a grid of cubes. A cell in which f changes sign gets a vertex for each of
+//! its sheets ([`cases`]): the mean of the crossings of the sheet's edges. In cells with a single sheet it is moved
+//! onto f = 0 by one Newton step of the trilinear interpolant. Every crossed grid edge gives the polygon of the four
+//! vertices around it. If the surface crosses a face of two cells twice, both polygons of each crossing get an
+//! additional vertex between the two cells; otherwise the two crossings might share an edge.
 //!
-//! Cubes of 16³ cells are made in parallel and joined in order, so the mesh does not depend on the number of threads.
-//! Leaves of 4³ cells are left out where the field bounds its own sign.
+//! Cubes of 16³ cells are processed in parallel and merged in order, so the mesh does not depend on the number of
+//! threads. Leaves of 4³ cells are skipped if the field's bounds exclude a sign change.
 //!
 //! Reading order: `cases`, this file, `piece`.
 
@@ -27,7 +27,8 @@ const BLOCK: usize = 16;
 const LEAF: usize = 4;
 /// Samples of a block along an axis.
 const SAMPLES: usize = BLOCK + 1;
-/// Crossings keep this far from the ends of an edge (parts of its length), so that vertices of different cells differ.
+/// Minimum distance of crossings from the ends of an edge, relative to its length, so that vertices of different cells
+/// differ.
 const MARGIN: f32 = 0.04;
 
 /// A sphere in which a field is queried.
@@ -41,9 +42,9 @@ pub struct Ball {
 
 /// A function of space that is negative inside a solid.
 pub trait Field: Sync {
-    /// What matters of the field in a ball.
+    /// The part of the field that affects a ball.
     type Near;
-    /// Prepares for a ball, which lies in that of `wider`.
+    /// Restricts the field to a ball within the ball of `wider`.
     fn near(&self, wider: Option<&Self::Near>, ball: Ball) -> Self::Near;
     /// True or false if all of the ball is certainly inside or outside.
     fn is_inside(&self, near: &Self::Near) -> Option<bool>;
@@ -92,14 +93,14 @@ impl Grid {
     }
 }
 
-/// A cell that the surface passes.
+/// A cell that intersects the surface.
 #[derive(Clone, Copy)]
 struct Cell {
     /// Index in the block.
     local: u16,
     /// Bit i: corner i is inside.
     config: u8,
-    /// Its first vertex in the block: one for each sheet, then two for each ambiguous face at its lower side.
+    /// Index of its first vertex in the block: one per sheet, then two per ambiguous face on its lower side.
     first: u32,
 }
 
@@ -121,7 +122,7 @@ fn offset(cell: [usize; 3], corner: usize) -> [usize; 3] {
     [cell[0] + (corner & 1), cell[1] + (corner >> 1 & 1), cell[2] + (corner >> 2 & 1)]
 }
 
-/// The surface f = 0 in the grid, with normals (the direction of ∇f) at its vertices. The field must be positive at the
+/// The surface f = 0 in the grid, with normals (the direction of ∇f) at its vertices. The field must be positive on the
 /// border of the grid.
 pub fn mesh_field<F: Field>(field: &F, grid: &Grid) -> Result<TriangleMesh, String> {
     let cases = cases::all();
@@ -141,7 +142,7 @@ pub fn mesh_field<F: Field>(field: &F, grid: &Grid) -> Result<TriangleMesh, Stri
         return Err(format!("the mesh would have {count} vertices, more than 32 bits can number"));
     }
 
-    // Join the blocks
+    // Merge the blocks
     let net = Net { grid, cases: &cases, blocks: &blocks, slots, bases };
     let faces: Vec<Vec<[u32; 3]>> =
         (0..blocks.len()).into_par_iter().map(|slot| net.faces_of(slot)).collect::<Result<_, _>>()?;
@@ -158,7 +159,7 @@ fn mesh_block<F: Field>(field: &F, grid: &Grid, cases: &[Case; 256], index: usiz
         return None;
     }
 
-    // Sample the leaves that the surface may pass
+    // Sample the leaves that may intersect the surface
     let mut samples = vec![f32::NAN; SAMPLES * SAMPLES * SAMPLES];
     let at = |[x, y, z]: [usize; 3]| (z * SAMPLES + y) * SAMPLES + x;
     let mut open = Vec::new();
@@ -207,7 +208,7 @@ impl CellField {
         (0..8).fold(0, |bits, i| bits | u8::from(self.values[i] < 0.0) << i)
     }
 
-    /// Where the field changes sign on an edge, in units of the cell.
+    /// Position of the sign change on an edge, in units of the cell.
     fn crossing(&self, edge: usize) -> Vec3 {
         let [a, b] = edge_corners(edge);
         let (fa, fb) = (self.values[a], self.values[b]);
@@ -259,7 +260,7 @@ impl Block {
             self.add_vertex(&field, p);
         }
 
-        // Two for each face that is passed twice
+        // Two for each face that the surface crosses twice
         for axis in 0..3 {
             let corners = face_corners(axis, 0);
             if is_ambiguous(config, corners) {
@@ -282,19 +283,19 @@ fn is_crossed(config: u8, edge: usize) -> bool {
     (config >> a ^ config >> b) & 1 == 1
 }
 
-/// All blocks, joined.
+/// All blocks, merged.
 struct Net<'a> {
     grid: &'a Grid,
     cases: &'a [Case; 256],
     blocks: &'a [Block],
-    /// Place in `blocks` by block index.
+    /// Position in `blocks` by block index.
     slots: Vec<usize>,
     /// First vertex of each block.
     bases: Vec<usize>,
 }
 
 impl Net<'_> {
-    /// A cell and the number of its first vertex.
+    /// A cell and the index of its first vertex.
     fn find(&self, cell: [usize; 3]) -> Option<(Cell, u32)> {
         let slot = *self.slots.get(self.grid.block_of(cell))?;
         let block = self.blocks.get(slot)?;
@@ -333,13 +334,13 @@ impl Net<'_> {
     fn polygon_around(&self, at: [usize; 3], axis: usize, polygon: &mut Vec<u32>) -> Option<()> {
         let (b, c) = ((axis + 1) % 3, (axis + 2) % 3);
         for step in 0..4 {
-            // Which side of the edge the cell is on, and the face between it and the next one
+            // The side of the edge on which the cell is, and the face between it and the next one
             let (high_b, high_c) = [(false, false), (true, false), (true, true), (false, true)][step];
             let mut cell = at;
             cell[b] = cell[b].checked_sub(usize::from(!high_b))?;
             cell[c] = cell[c].checked_sub(usize::from(!high_c))?;
             let (found, first) = self.find(cell)?;
-            // A cell on the higher side has the edge at its lower side.
+            // A cell on the higher side has the edge on its lower side.
             let edge = 4 * axis + (usize::from(!high_b) | usize::from(!high_c) << 1);
             if !is_crossed(found.config, edge) {
                 return None;
@@ -359,7 +360,7 @@ impl Net<'_> {
         Some(())
     }
 
-    /// Place among a cell's vertices of the passage through its lower face across `axis` that holds `edge`.
+    /// Index among a cell's vertices for the crossing of its lower face across `axis` that contains `edge`.
     fn passage(&self, config: u8, axis: usize, edge: usize) -> u32 {
         let before = (0..axis).filter(|&a| is_ambiguous(config, face_corners(a, 0))).count() as u32;
         let corners = face_corners(axis, 0);
@@ -375,14 +376,14 @@ impl Net<'_> {
         self.blocks[slot].vertices[vertex as usize - self.bases[slot]]
     }
 
-    /// Quads along the diagonal whose smaller triangle is the larger; other polygons as a fan.
+    /// Splits quads along the diagonal that maximises the smaller triangle; other polygons become a fan.
     fn triangulate(&self, polygon: &[u32], faces: &mut Vec<[u32; 3]>) {
         let start = if let &[a, b, c, d] = polygon {
             let [pa, pb, pc, pd] = [a, b, c, d].map(|v| self.position(v));
             let area = |p: Vec3, q: Vec3, r: Vec3| (q - p).cross(r - p).length_squared();
             usize::from(area(pa, pb, pc).min(area(pa, pc, pd)) < area(pb, pc, pd).min(area(pb, pd, pa)))
         } else {
-            // From a vertex between cells: no other polygon has such a diagonal.
+            // Start at a vertex between cells: no other polygon has such a diagonal.
             polygon.iter().position(|&v| self.is_between_cells(v)).unwrap_or(0)
         };
         let at = |i: usize| polygon[(start + i) % polygon.len()];

@@ -1,8 +1,8 @@
-//! The largest connected component of a mesh: carving leaves debris above the surface and bubbles below it.
+//! The largest connected component of a mesh: carving leaves fragments above the surface and bubbles below it.
 
 use lumiris::geometry::TriangleMesh;
 
-/// The representative of the set of `v`, halving the way to it.
+/// The representative of the set of `v`, with path halving.
 fn find(parents: &mut [u32], mut v: u32) -> u32 {
     while parents[v as usize] != v {
         let next = parents[parents[v as usize] as usize];
@@ -12,9 +12,9 @@ fn find(parents: &mut [u32], mut v: u32) -> u32 {
     v
 }
 
-/// The piece with the most triangles (of equal ones the first), with vertices in the same order.
+/// The component with the most triangles (the first one if several are equal), with vertices in the same order.
 pub fn largest_piece(mesh: &TriangleMesh) -> Result<TriangleMesh, String> {
-    // Join the vertices of each triangle; the first vertex of a piece represents it
+    // Union of the vertices of each triangle; the first vertex of a component represents it
     let count = mesh.positions().len();
     let mut parents: Vec<u32> = (0..count as u32).collect();
     for &[a, b, c] in &mesh.indices {
@@ -29,7 +29,7 @@ pub fn largest_piece(mesh: &TriangleMesh) -> Result<TriangleMesh, String> {
     }
     let Some(largest) = (0..count).rev().max_by_key(|&v| sizes[v]) else { return Ok(mesh.clone()) };
 
-    // Number its vertices anew
+    // Renumber its vertices
     let kept: Vec<usize> = (0..count).filter(|&v| find(&mut parents, v as u32) as usize == largest).collect();
     let mut numbers = vec![u32::MAX; count];
     for (number, &v) in kept.iter().enumerate() {

@@ -1,22 +1,22 @@
 //! Sunlight scattered by a spherical atmosphere of air, haze and ozone.
 //!
-//! Single scattering is marched along the view [Nishita et al. 1993]:
-//! L(ω) = E ∫ T(x) T_sun(x) Σ βₖ ρₖ(h) pₖ(cos γ) dx over air (Rayleigh) and haze (Cornette and Shanks), T the
-//! transmittances, E the sun's irradiance above the air. All higher orders are taken as isotropic and as spread evenly,
-//! a geometric series [Hillaire 2020]: they add ∫ T(x) Ψ(x) Σ βₖ ρₖ dx, Ψ = L₂/(1 − f), where L₂ is the light of second
-//! order that arrives at x from everywhere, and f the part of an isotropic unit radiance that comes back after one
-//! scattering.
+//! Single scattering is integrated along the view ray [Nishita et al. 1993]: L(ω) = E ∫ T(x) T_sun(x) Σ βₖ ρₖ(h) pₖ(cos
+//! γ) dx over air (Rayleigh) and haze (Cornette and Shanks), where T are the transmittances, and E is the sun's
+//! irradiance outside the atmosphere. All higher orders are approximated as isotropic and uniform, by a geometric
+//! series [Hillaire 2020]: they add ∫ T(x) Ψ(x) Σ βₖ ρₖ dx, Ψ = L₂/(1 − f), where L₂ is the second-order light that
+//! arrives at x from all directions, and f is the fraction of an isotropic unit radiance that returns after one
+//! scattering event.
 
 use super::spectrum::{BANDS, Spectrum, table, wavelength};
 use std::f32::consts::{PI, TAU};
 
 /// Radius of the ground (km).
 const GROUND: f32 = 6371.0;
-/// Thickness of the air (km).
+/// Thickness of the atmosphere (km).
 const THICKNESS: f32 = 80.0;
 /// Height of the observer (km).
 const OBSERVER: f32 = 0.05;
-/// Height in which air and haze thin to 1/e (km).
+/// Scale heights of air and haze (km): the density decreases to 1/e.
 const SCALE_HEIGHTS: [f32; 2] = [8.0, 1.2];
 /// Asymmetry of the haze.
 const ASYMMETRY: f32 = 0.76;
@@ -40,7 +40,7 @@ const OZONE: [(f32, f32); 15] = [
 ];
 /// Molecules of ozone where it is densest (10²⁵/m² per km): 300 Dobson units over a tent of 30 km.
 const OZONE_DENSITY: f32 = 300.0 * 2.687e20 / 15.0 * 1e-25;
-/// Steps of a march along a view, and towards the sun.
+/// Steps of the integration along a view ray, and towards the sun.
 const STEPS: [usize; 2] = [40, 16];
 /// Entries of the table of Ψ over heights and over the cosine of the sun.
 const TABLE: [usize; 2] = [16, 32];
@@ -81,16 +81,16 @@ pub fn phase_haze(cos: f32) -> f32 {
     3.0 / (8.0 * PI) * (1.0 - g2) * (1.0 + cos * cos) / ((2.0 + g2) * base * base.sqrt())
 }
 
-/// Densities of air, haze and ozone at a height (km), relative to their largest.
+/// Densities of air, haze and ozone at a height (km), relative to their maxima.
 fn densities(height: f32) -> [f32; 3] {
     let thin = |scale: f32| (-height.max(0.0) / scale).exp();
     [thin(SCALE_HEIGHTS[0]), thin(SCALE_HEIGHTS[1]), (1.0 - (height - 25.0).abs() / 15.0).max(0.0)]
 }
 
-/// Way from radius `r` along a direction of cosine `mu` to the sphere of `radius`: the first meeting from outside, the
-/// last from inside.
+/// Distance from radius `r` along a direction of cosine `mu` to the sphere of `radius`: the first intersection from
+/// outside, the last from inside.
 fn way_to_sphere(r: f32, mu: f32, radius: f32) -> Option<f32> {
-    // (radius − r)(radius + r) keeps the digits that radius² − r² would lose.
+    // (radius − r)(radius + r) avoids the cancellation of radius² − r².
     let discriminant = f64::from((radius - r) * (radius + r)) + f64::from(r * mu).powi(2);
     if discriminant < 0.0 {
         return None;
@@ -101,8 +101,8 @@ fn way_to_sphere(r: f32, mu: f32, radius: f32) -> Option<f32> {
     (t > 0.0).then_some(t as f32)
 }
 
-/// Radius after a way `t` from radius `r` along cosine `mu`, and the cosine there of a direction whose cosines with the
-/// zenith and the way are `mu_s` and `nu`.
+/// Radius after a distance `t` from radius `r` along cosine `mu`, and the local zenith cosine of a direction with the
+/// zenith cosine `mu_s` at the start and the cosine `nu` to the ray.
 fn advance(r: f32, mu: f32, t: f32, mu_s: f32, nu: f32) -> (f32, f32) {
     let r_t = (f64::from(r).powi(2) + f64::from(t).powi(2) + 2.0 * f64::from(r * mu) * f64::from(t)).sqrt() as f32;
     (r_t, ((r * mu_s + t * nu) / r_t).clamp(-1.0, 1.0))
@@ -131,7 +131,7 @@ impl Atmosphere {
         self.scattering[0][band] * air + self.haze_extinction[band] * haze + self.ozone[band] * ozone
     }
 
-    /// Transmittance from radius `r` along cosine `mu` out of the atmosphere; 0 if the ground is hit.
+    /// Transmittance from radius `r` along cosine `mu` out of the atmosphere; 0 if the ray hits the ground.
     fn transmittance(&self, r: f32, mu: f32) -> Spectrum {
         if mu < 0.0 && way_to_sphere(r, mu, GROUND).is_some() {
             return [0.0; BANDS];
@@ -139,7 +139,7 @@ impl Atmosphere {
         let Some(way) = way_to_sphere(r, mu, GROUND + THICKNESS) else { return [1.0; BANDS] };
         let mut depth = [0.0_f32; 3];
         for i in 0..STEPS[1] {
-            // Steps that grow with the way: the air is densest near the start.
+            // Steps that increase with distance: the air is densest near the start.
             let edge = |i: usize| way * (i as f32 / STEPS[1] as f32).powi(2);
             let (low, high) = (edge(i), edge(i + 1));
             let here = densities(advance(r, mu, 0.5 * (low + high), 0.0, 0.0).0 - GROUND);
@@ -171,13 +171,13 @@ impl Atmosphere {
         })
     }
 
-    /// Light scattered into the observer's view of cosine `mu` with the zenith, where the sun has cosine `mu_s` with
-    /// the zenith and `nu` with the view. The view ends at the ground.
+    /// Light scattered into the observer's view ray with the zenith cosine `mu`. The sun has the zenith cosine `mu_s`
+    /// and the cosine `nu` to the view ray, which ends at the ground.
     pub fn scattered(&self, mu: f32, mu_s: f32, nu: f32) -> Scattered {
         self.march(GROUND + OBSERVER, mu, mu_s, nu).0
     }
 
-    /// As [`scattered`](Self::scattered) from radius `r`; also f, and the radiance of the sunlit ground in the view.
+    /// As [`scattered`](Self::scattered) from radius `r`; also f, and the radiance of the sunlit ground along the ray.
     fn march(&self, r: f32, mu: f32, mu_s: f32, nu: f32) -> (Scattered, Spectrum, Spectrum) {
         let zero = [0.0; BANDS];
         let mut out = Scattered { air: zero, haze: zero, multiple: zero, transmittance: [1.0; BANDS] };
@@ -194,7 +194,7 @@ impl Atmosphere {
             for b in 0..BANDS {
                 let extinction = self.extinction(here, b).max(1e-9);
                 let step = (-extinction * (high - low)).exp();
-                // The step's transmittance integrated in closed form
+                // Closed-form integral of the transmittance over the step
                 let weight = out.transmittance[b] * (1.0 - step) / extinction;
                 let (air, haze) = (self.scattering[0][b] * here[0], self.scattering[1][b] * here[1]);
                 out.air[b] += weight * air * sun[b];
@@ -215,7 +215,7 @@ impl Atmosphere {
         (out, returned, lit)
     }
 
-    /// Ψ for all heights and suns.
+    /// Ψ for all heights and sun directions.
     fn multiple_table(&self) -> Vec<Spectrum> {
         let entry = |i: usize| {
             let height = ((i / TABLE[1]) as f32 / (TABLE[0] - 1) as f32).powi(2) * THICKNESS;
@@ -257,7 +257,7 @@ mod tests {
     #[test]
     fn optical_depths_are_those_of_a_clear_day() {
         let clear = Atmosphere::new(0.0, 0.0).sun_transmittance(1.0);
-        // Band 5 or 6 is green: air takes about 0.095 at 550 nm, ozone 0.03.
+        // Bands 5 and 6 are green: at 550 nm the optical depth of air is about 0.095, and of ozone 0.03.
         let depth = -clear[6].ln();
         assert!((0.09..0.15).contains(&depth), "{depth}");
         let hazy = Atmosphere::new(1.0, 0.0).sun_transmittance(1.0);

@@ -1,15 +1,15 @@
-//! A layer of broken clouds: optical depths by noise, light by how much cloud lies towards the sun.
+//! A layer of broken clouds: optical depths by noise, illumination by the optical depth towards the sun.
 //!
-//! The layer is seen where the view meets a plane at unit height. With τ the optical depth of the view and τₛ that of
-//! the way to the sun inside the layer, a cloud has the radiance
-//! (1 − e^(−τ)) (E (a p(γ) e^(−τₛ) + b/(1 + τₛ)) + S): light scattered forward once, light diffused by many
-//! scatterings, and skylight S. What is behind it is dimmed by e^(−τ). Clouds dissolve into the air at the horizon.
+//! The layer is evaluated at the intersection of the view ray with a plane at unit height. With τ the optical depth of
+//! the view ray and τₛ the optical depth towards the sun inside the layer, a cloud has the radiance (1 − e^(−τ)) (E (a
+//! p(γ) e^(−τₛ) + b/(1 + τₛ)) + S): light of single forward scattering, diffuse light of multiple scattering, and
+//! skylight S. The background is attenuated by e^(−τ). Clouds fade into the air at the horizon.
 
 use crate::procedural::noise::{fractal, noise, smoothstep};
 use lumiris_numbers::math::{Rgb, Vec2, Vec3};
 use std::f32::consts::PI;
 
-/// Largest optical depth of the layer seen from below.
+/// Maximum optical depth of the layer, seen from below.
 const THICKNESS: f32 = 9.0;
 /// Steps towards the sun.
 const STEPS: usize = 5;
@@ -19,7 +19,7 @@ pub struct Clouds {
     threshold: f32,
     seed: u32,
     to_sun: Vec3,
-    /// Irradiance of a surface that faces the sun.
+    /// Irradiance of a surface facing the sun.
     beam: Rgb,
     /// Mean radiance of the sky.
     sky: Rgb,
@@ -33,9 +33,9 @@ fn phase(cos: f32) -> f32 {
 }
 
 impl Clouds {
-    /// Clouds that cover about the part `cover` of the sky.
+    /// Clouds that cover about the fraction `cover` of the sky.
     pub fn new(cover: f32, seed: u32, to_sun: Vec3, beam: Rgb, sky: Rgb) -> Self {
-        // The noise is nearly normal, of standard deviation about 0.2.
+        // The noise is approximately normal, with a standard deviation of about 0.2.
         let threshold = if cover >= 1.0 { -1.0 } else { 0.45 * (0.5 - cover) };
         Clouds { threshold, seed, to_sun, beam, sky }
     }
@@ -48,14 +48,14 @@ impl Clouds {
         THICKNESS * smoothstep(self.threshold, self.threshold + 0.42, n)
     }
 
-    /// The clouds in the direction `w` (up) before `behind`; `air` is what distance turns them into.
+    /// The clouds in the direction `w` (up) in front of `behind`; `air` is the colour that they fade to at a distance.
     pub fn over(&self, w: Vec3, behind: Rgb, air: Rgb) -> Rgb {
         let p = w.truncate() / w.z.max(0.02);
         let depth = self.depth(p) * smoothstep(0.03, 0.2, w.z);
         if depth <= 0.0 {
             return behind;
         }
-        // The way to the sun leaves the layer after about half its thickness.
+        // The path to the sun leaves the layer after about half its thickness.
         let step = self.to_sun.truncate() * (0.4 / STEPS as f32 / self.to_sun.z.max(0.25));
         let to_sun = (1..=STEPS).map(|i| self.depth(p + step * i as f32)).sum::<f32>() * (0.45 / STEPS as f32);
         let light = self.beam * (0.6 * phase(w.dot(self.to_sun)) * (-to_sun).exp() + 0.3 / (1.0 + 0.8 * to_sun))
@@ -63,7 +63,7 @@ impl Clouds {
         let through = (-depth).exp();
         let cloud = behind * through + light * (1.0 - through);
         let near = smoothstep(0.0, 0.3, w.z);
-        // Far clouds take the colour of the air but still hide the sun.
+        // Distant clouds take the colour of the air but still occlude the sun.
         (air * (1.0 - through) + behind * through).lerp(cloud, near)
     }
 }

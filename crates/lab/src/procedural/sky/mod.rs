@@ -1,10 +1,10 @@
-//! An environment map of sun and sky by our own model of the atmosphere, with broken clouds if wanted.
+//! An environment map of sun and sky by an own atmosphere model, with optional broken clouds.
 //!
 //! The map is the equal-area octahedral one of pbrt-v4 (z up). Below the horizon is a Lambertian ground. The sun is a
-//! disc of the angular radius a = 0.2665° times [`SkyOptions::sun_size`]; its radiance falls towards the rim as
-//! (1 − (γ/a)²)^(α/2), α = −0.023 + 0.292 µm/λ [Hestroffer and Magnan 1998], and integrates to the sun's irradiance
-//! whatever its size. Texels that the disc may touch are means over 64² places. In the end everything is multiplied by
-//! one number, so that an unoccluded horizontal surface has the irradiance that was asked for (luminance).
+//! disc of the angular radius a = 0.2665° times [`SkyOptions::sun_size`]. Its radiance decreases towards the rim as (1
+//! − (γ/a)²)^(α/2), α = −0.023 + 0.292 µm/λ [Hestroffer and Magnan 1998], and integrates to the sun's irradiance for
+//! any size. Texels that the disc may overlap are means over 64² points. Finally everything is multiplied by a common
+//! factor, so that an unoccluded horizontal surface has the requested irradiance (luminance).
 //!
 //! Reading order: [`spectrum`], [`atmosphere`], [`clouds`].
 
@@ -23,12 +23,12 @@ use std::f32::consts::{FRAC_PI_2, PI, TAU};
 
 /// Angular radius of the sun (radians).
 const SUN_RADIUS: f32 = 0.2665 / 180.0 * PI;
-/// Places across a texel that the sun may touch.
+/// Points across a texel that the sun may overlap.
 const SUN_SAMPLES: usize = 64;
-/// Views of the table over elevations (both sides of the horizon) and azimuths from the sun.
+/// View rays of the table over elevations (both sides of the horizon) and azimuths from the sun.
 const TABLE: [usize; 2] = [96, 48];
 
-/// How the sky is made.
+/// Parameters of the sky.
 #[derive(Clone, Copy, Debug)]
 pub struct SkyOptions {
     /// Texels on each side, 8..=8192.
@@ -39,15 +39,15 @@ pub struct SkyOptions {
     pub azimuth: f32,
     /// Amount of haze: 0 none, 1 a clear day, 10 a very hazy one.
     pub haze: f32,
-    /// Radius of the sun over that of the real one, at most 60. Its energy stays the same.
+    /// Ratio of the sun's radius to the real one, at most 60. Its irradiance is unchanged.
     pub sun_size: f32,
     /// Reflectance of the ground, 0..=1.
     pub ground_albedo: f32,
-    /// Part of the sky that clouds cover, about: 0..=1.
+    /// Approximate fraction of the sky covered by clouds: 0..=1.
     pub cloud_cover: f32,
-    /// Irradiance of a horizontal surface (luminance); π lets a white one have the radiance 1.
+    /// Irradiance of a horizontal surface (luminance); with π, a white surface has the radiance 1.
     pub irradiance: f32,
-    /// Which clouds.
+    /// Seed of the clouds.
     pub seed: u32,
 }
 
@@ -68,7 +68,7 @@ impl Default for SkyOptions {
 }
 
 impl SkyOptions {
-    /// `Err` with a message if a value is out of range.
+    /// Returns `Err` with a message if a value is out of range.
     fn check(&self) -> Result<(), String> {
         let range = |name: &str, value: f32, low: f32, high: f32| {
             if (low..=high).contains(&value) {
@@ -87,7 +87,9 @@ impl SkyOptions {
     }
 }
 
-/// The environment map: channels R, G, B, linear Rec.709. `Err` with a message if an option is out of range.
+/// The environment map: channels R, G, B, linear Rec.709.
+///
+/// Returns `Err` with a message if an option is out of range.
 pub fn sky(options: &SkyOptions) -> Result<Image, String> {
     options.check()?;
     let sky = Sky::new(options);
@@ -113,7 +115,7 @@ fn direction(x: f32, y: f32, resolution: usize) -> Vec3 {
     equal_area_square_to_sphere(Vec2::new(x, y) / resolution as f32)
 }
 
-/// Everything that a texel needs.
+/// Data for the texels.
 struct Sky {
     resolution: usize,
     to_sun: Vec3,
@@ -132,7 +134,7 @@ impl Sky {
         let (sun, weights) = (spectrum::sun(), color_weights());
         let atmosphere = Atmosphere::new(options.haze, options.ground_albedo);
         let views = view_table(&atmosphere, to_sun.z);
-        // A sun on the horizon is half above it.
+        // Half of a sun on the horizon is above it.
         let arriving = atmosphere.sun_transmittance(to_sun.z.max(1e-3));
         let beam: Spectrum = std::array::from_fn(|b| arriving[b] * sun[b]);
         let mut sky = Sky {
@@ -198,7 +200,7 @@ impl Sky {
 
     fn texel(&self, x: usize, y: usize) -> Rgb {
         let center = direction(x as f32 + 0.5, y as f32 + 0.5, self.resolution);
-        // Texels are at most about twice as long as the side of a square of their area.
+        // Texels are at most about twice as long as the side of a square of the same area.
         let reach = self.sun_disc.radius + 2.0 * (2.0 * TAU).sqrt() / self.resolution as f32;
         let near_sun = center.dot(self.to_sun) > reach.min(FRAC_PI_2).cos();
         let count = if near_sun { SUN_SAMPLES } else { 2 };
@@ -220,15 +222,15 @@ impl Sky {
 struct SunDisc {
     radius: f32,
     sin_radius: f32,
-    /// Radiance by distance from the centre, 0..=1 in equal steps of its square.
+    /// Radiance by distance from the centre, 0..=1, in equal steps of its square.
     profile: Vec<Rgb>,
 }
 
 impl SunDisc {
-    /// A disc that sends the irradiance `beam`.
+    /// A disc with the irradiance `beam`.
     fn new(beam: &Spectrum, weights: &[Rgb; BANDS], radius: f32) -> Self {
-        // ∫ (1 − s)^(α/2) ds over s = (sin γ/sin a)² is 2/(α + 2), and dω = π sin² a ds but for cos γ, which is put
-        // into the radiance: what is exact then is the irradiance of a surface that faces the sun.
+        // ∫ (1 − s)^(α/2) ds over s = (sin γ/sin a)² is 2/(α + 2), and dω = π sin² a ds up to cos γ, which is included
+        // in the radiance: the irradiance of a surface facing the sun is then exact.
         let sin_radius = radius.sin();
         let entries = 256;
         let profile = (0..=entries).map(|i| {
@@ -254,11 +256,11 @@ impl SunDisc {
     }
 }
 
-/// What the air scatters in all views, by elevation and azimuth from the sun.
+/// Scattered light of all view rays, by elevation and azimuth from the sun.
 fn view_table(atmosphere: &Atmosphere, mu_s: f32) -> Vec<Scattered> {
     let entry = |i: usize| {
         let x = 2.0 * (i / TABLE[1]) as f32 / (TABLE[0] - 1) as f32 - 1.0;
-        // The horizon itself has both a side of sky and one of ground; entries lie close to it on either.
+        // The horizon has a sky side and a ground side; entries are close to it on both sides.
         let elevation = FRAC_PI_2 * x.abs() * x;
         let phi = PI * (i % TABLE[1]) as f32 / (TABLE[1] - 1) as f32;
         let (mu, r) = (elevation.sin(), elevation.cos());
@@ -275,7 +277,7 @@ fn lookup(views: &[Scattered], w: Vec3, to_sun: Vec3) -> Scattered {
     let (a, b) = (w.truncate(), to_sun.truncate());
     let phi = a.perp_dot(b).abs().atan2(a.dot(b));
     let y = phi / PI * (TABLE[1] - 1) as f32;
-    // Not across the horizon: the two rows beside it are continued.
+    // No interpolation across the horizon: the two rows next to it are extrapolated.
     let (above, middle) = (w.z > 0.0, TABLE[0] / 2);
     let i = if above { (x as usize).clamp(middle, TABLE[0] - 2) } else { (x as usize).min(middle - 2) };
     let j = (y as usize).min(TABLE[1] - 2);
@@ -304,7 +306,7 @@ mod tests {
         SkyOptions { resolution: 64, ..SkyOptions::default() }
     }
 
-    /// Irradiance of a surface that faces the sun, by texels within 30 degrees of it.
+    /// Irradiance of a surface facing the sun, by texels within 30 degrees of it.
     fn facing(image: &Image, to_sun: Vec3) -> f64 {
         let n = image.width;
         let mut sum = 0.0;
@@ -327,7 +329,7 @@ mod tests {
         for (size, resolution) in [(1.0, 64), (1.0, 500), (8.0, 128)] {
             let mut sky = Sky::new(&SkyOptions { sun_size: size, resolution, ..small() });
             sky.sun_disc = SunDisc::new(&beam, &weights, size * SUN_RADIUS);
-            // The difference of a map with the disc and one without
+            // The difference of maps with and without the disc
             let (mut with, mut without) = (
                 Image::new(resolution, resolution, &["R", "G", "B"]),
                 Image::new(resolution, resolution, &["R", "G", "B"]),

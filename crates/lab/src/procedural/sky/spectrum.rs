@@ -1,7 +1,7 @@
-//! Light in wavelength bands, and its colour.
+//! Spectra in wavelength bands, and their colours.
 //!
-//! The sun is a black body of 5772 K above the atmosphere. Colours are those of the CIE 1931 observer, by the fit of
-//! [Wyman et al. 2013, Eq. 4], converted to linear Rec.709.
+//! The sun is a black body of 5772 K above the atmosphere. Colours are computed for the CIE 1931 observer, by the fit
+//! of [Wyman et al. 2013, Eq. 4], and converted to linear Rec.709.
 
 use lumiris_numbers::math::Rgb;
 
@@ -20,7 +20,7 @@ pub fn wavelength(band: usize) -> f32 {
     FIRST + WIDTH * band as f32
 }
 
-/// Value of a table at rising positions, linear between them.
+/// Linear interpolation of a table at increasing positions.
 pub fn table(entries: &[(f32, f32)], x: f32) -> f32 {
     let i = entries.partition_point(|e| e.0 <= x).clamp(1, entries.len() - 1);
     let (a, b) = (entries[i - 1], entries[i]);
@@ -28,7 +28,7 @@ pub fn table(entries: &[(f32, f32)], x: f32) -> f32 {
     a.1 + (b.1 - a.1) * t
 }
 
-/// Irradiance of the sun above the atmosphere, of an arbitrary unit [Planck 1901].
+/// Irradiance of the sun above the atmosphere, in an arbitrary unit [Planck 1901].
 pub fn sun() -> Spectrum {
     std::array::from_fn(|band| {
         let lambda = wavelength(band) * 1e-3;
@@ -37,7 +37,7 @@ pub fn sun() -> Spectrum {
     })
 }
 
-/// The two halves of a Gaussian with slopes `low` and `high` (1/nm).
+/// A Gaussian with different slopes `low` and `high` (1/nm) on both sides.
 fn lobe(lambda: f32, center: f32, low: f32, high: f32) -> f32 {
     let t = (lambda - center) * if lambda < center { low } else { high };
     (-0.5 * t * t).exp()
@@ -59,7 +59,7 @@ pub fn color_weights() -> [Rgb; BANDS] {
     })
 }
 
-/// The colour of a spectrum; what lies outside Rec.709 is cut.
+/// The colour of a spectrum, clipped to Rec.709.
 pub fn color(spectrum: &Spectrum, weights: &[Rgb; BANDS]) -> Rgb {
     let mut sum = [0.0_f32; 3];
     for (value, weight) in spectrum.iter().zip(weights) {

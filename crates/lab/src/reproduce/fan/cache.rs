@@ -1,4 +1,4 @@
-//! Irradiance caching: records whose direct light is estimated by `mis` or by `ocv` [Fan et al. 2006, Fig. 4].
+//! Irradiance caching: records with direct light estimated by `mis` or by `ocv` [Fan et al. 2006, Fig. 4].
 
 use super::super::figure::Figure;
 use super::super::images::{Image, gain, significant};
@@ -23,19 +23,19 @@ const SPP: u32 = 9;
 const SAMPLES: u32 = 18;
 /// The row of the paper's table.
 const ASKED: Asked = Asked { paper: [4.9, 4.0], time: 1.05, target: 18.0, efficient: false };
-/// Camera rays of each of the long renderings, by path tracing, and their number.
+/// Camera rays of each of the long path-traced renderings, and their number.
 const LONG: (u32, u32) = (64, 4);
-/// Fewest and most turns.
+/// Minimum and maximum number of turns.
 const TURNS: [u32; 2] = [4, 16];
-/// Edge of the image on which times are found out, and the least edge, usual and quick.
+/// Edge of the image for time measurements, and the minimum edge, normal and quick.
 const PILOT_SIZE: u32 = 64;
 const MIN_SIZE: [u32; 2] = [64, 32];
-/// Place of `ocv`, progressive.
+/// Index of `ocv`, progressive.
 const BEST: usize = 2;
 
 /// Names and methods; the first is the baseline.
 fn methods() -> Vec<(&'static str, Method)> {
-    // The box has one light, so that no choice of lights takes part
+    // The box has one light, so the light sampler has no effect
     let of = |m: Method| m.stratified().of(Transport::Cached);
     vec![
         ("mis, balance heuristic", of(Method::mis(SAMPLES).weighted(Heuristic::Balance))),
@@ -45,7 +45,7 @@ fn methods() -> Vec<(&'static str, Method)> {
     ]
 }
 
-/// Everything that was measured.
+/// All measurements.
 struct Outcome {
     size: [u32; 2],
     names: Vec<&'static str>,
@@ -54,7 +54,7 @@ struct Outcome {
     errors: Vec<Errors>,
 }
 
-/// Measures it within about `time`.
+/// Measures within about `time`.
 pub(super) fn run(setup: &Setup<'_>, time: Duration) -> Result<Figure, ReproduceError> {
     let start = Instant::now();
     let observer = setup.observer;
@@ -63,7 +63,7 @@ pub(super) fn run(setup: &Setup<'_>, time: Duration) -> Result<Figure, Reproduce
     let (names, list): (Vec<_>, Vec<_>) = methods().into_iter().unzip();
     let long = Method::mis(1).stratified().of(Transport::Path);
 
-    // As many pixels as fit
+    // Image size that fits the time
     let pilot_size = setup.size.min(PILOT_SIZE);
     let mut stage = Stage::load(&path, scaled(SHAPE, pilot_size), setup.options.threads)?;
     let pilot = turns(&mut stage, &[list[BEST], long], View::Centres, SPP, 0..2, observer)?;
@@ -77,7 +77,7 @@ pub(super) fn run(setup: &Setup<'_>, time: Duration) -> Result<Figure, Reproduce
     let grown = (f64::from(size) / f64::from(pilot_size)).powi(2);
     stage = Stage::load(&path, scaled(SHAPE, size), setup.options.threads)?;
 
-    // As many turns as fit
+    // Number of turns that fits the time
     let left = time.saturating_sub(start.elapsed()).as_secs_f64() / (1.2 * grown) - reference;
     let count = ((left / turn) as u32).clamp(TURNS[0], if setup.options.quick { TURNS[0] } else { TURNS[1] });
     let size = stage.size();
@@ -162,7 +162,7 @@ fn shown(setup: &Setup<'_>, o: &Outcome) -> Result<Vec<Shown>, ReproduceError> {
     Ok(shown)
 }
 
-/// The part of the error that differs from rendering to rendering.
+/// The part of the error that varies between renderings.
 fn noise(e: &Errors) -> f64 {
     (e.error().value.powi(2) - e.systematic).max(0.0).sqrt()
 }

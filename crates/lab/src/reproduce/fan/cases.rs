@@ -1,4 +1,4 @@
-//! The cases of direct light: scenes in place of those of the paper's table, and what is rendered of each.
+//! The cases of direct light: scenes that replace the paper's, and their settings.
 
 use super::roster::Role;
 
@@ -13,14 +13,14 @@ pub(super) struct Case {
     /// Camera rays per pixel, and samples at each.
     pub spp: u32,
     pub samples: u32,
-    /// Errors of mis and of ocv in the paper, and the time of ocv over that of mis.
+    /// Errors of mis and of ocv in the paper, and the ratio of the time of ocv to mis.
     pub paper: [f64; 2],
     pub paper_time: f64,
-    /// Reduction of the error that is to be reached (percent).
+    /// Target reduction of the error (percent).
     pub target: f64,
-    /// True if the efficiency must not be below that of mis either.
+    /// True if the efficiency must be at least as high as with mis.
     pub efficient: bool,
-    /// The part of the image that is shown larger: left, top, right, bottom, in fractions.
+    /// The part of the image for the enlarged view: left, top, right, bottom, in fractions.
     pub crop: [f64; 4],
 }
 
@@ -73,9 +73,9 @@ impl Case {
 
 /// Camera rays of each of the long renderings, and their number.
 pub(super) const LONG: (u32, u32) = (16, 4);
-/// Seeds of long renderings are those of turns from here on.
+/// First turn of long renderings, whose index determines their seed.
 pub(super) const LONG_TURNS: u32 = 1_000_000;
 
-/// Who is shown with antialiasing, and with samples drawn in which ways.
+/// Methods with antialiased images, and their sampling.
 pub(super) const SHOWN: [Role; 4] = [Role::Balance, Role::Progressive, Role::Correlated, Role::Ris];
 pub(super) const SHOWN_WAYS: [usize; 2] = [0, 1];

@@ -1,4 +1,4 @@
-//! Direct light: all methods against `mis` with the same samples per estimate, and two of them with the same time.
+//! Direct light: all methods compared with `mis` at the same samples per estimate, and two of them at the same time.
 
 use super::super::calibrate::{calibrate, match_samples};
 use super::super::figure::Figure;
@@ -14,12 +14,13 @@ use super::{Setup, report};
 use lumiris::settings::SampleCounts;
 use std::time::{Duration, Instant};
 
-/// Seeds of antialiased images are those of turns from here on.
+/// First turn of antialiased images, whose index determines their seed.
 const ANTIALIASED_TURNS: u32 = 2_000_000;
-/// Edge of the image on which times are found out, and the least edge: usual and quick.
+/// Edge of the image for time measurements, and the minimum edge: normal and quick.
 const PILOT_SIZE: [u32; 2] = [96, 48];
 const MIN_SIZE: [u32; 2] = [64, 32];
-/// Fewest and most turns, and those that the size of the image is chosen for; quick ones are as few as that.
+/// Minimum and maximum number of turns, and the number for which the size of the image is chosen; quick runs use that
+/// number.
 const TURNS: [u32; 2] = [4, 32];
 const WANTED_TURNS: [f64; 2] = [8.0, 4.0];
 /// Turns of the antialiased images.
@@ -31,7 +32,7 @@ fn truth(stage: &mut Stage, method: Method, view: View, observer: Observer<'_>) 
     Ok(Truth::new(&turns(stage, &[method], view, LONG.0, range, observer)?[0]))
 }
 
-/// Times of a stage: the numbers of samples of equal time, and seconds of a camera ray per pixel.
+/// Times of a stage: the numbers of samples for equal time, and the time of a camera ray per pixel (s).
 fn pilot(stage: &mut Stage, case: &Case, observer: Observer<'_>) -> Result<(Numbers, f64), ReproduceError> {
     let unknown = Numbers {
         samples: case.samples,
@@ -44,7 +45,7 @@ fn pilot(stage: &mut Stage, case: &Case, observer: Observer<'_>) -> Result<(Numb
     Ok((Numbers { equal_time, ris: calibration.sample_counts, ..unknown }, calibration.seconds))
 }
 
-/// Camera rays per pixel for everything but the turns.
+/// Camera rays per pixel for everything except the turns.
 fn fixed_cost(case: &Case, quick: bool) -> f64 {
     let shown = (SHOWN.len() * SHOWN_WAYS.len()) as f64;
     2.0 * f64::from(LONG.0 * LONG.1) + f64::from(PAIR_TURNS * case.spp) * shown + growth_cost(quick)
@@ -57,7 +58,7 @@ pub(super) fn run(setup: &Setup<'_>, case: &Case, time: Duration) -> Result<Figu
     (observer.say)(&format!("{} …", case.title));
     let path = setup.scenes.join(case.file);
 
-    // As many pixels as fit
+    // Image size that fits the time
     let pilot_size = setup.size.min(PILOT_SIZE[usize::from(quick)]);
     let mut stage = Stage::load(&path, scaled(case.shape, pilot_size), setup.options.threads)?;
     let (mut numbers, mut seconds) = pilot(&mut stage, case, observer)?;
@@ -72,7 +73,7 @@ pub(super) fn run(setup: &Setup<'_>, case: &Case, time: Duration) -> Result<Figu
         (numbers, seconds) = pilot(&mut stage, case, observer)?;
     }
 
-    // As many turns as fit
+    // Number of turns that fits the time
     let left = time.saturating_sub(start.elapsed()).as_secs_f64() / (seconds * 1.15) - fixed;
     let max = if quick { WANTED_TURNS[1] as u32 } else { TURNS[1] };
     let count_turns = ((left / turn) as u32).clamp(TURNS[0], max);

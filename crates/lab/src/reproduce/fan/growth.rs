@@ -1,5 +1,5 @@
-//! The error of progressive `ocv` relative to `mis` as the number of camera rays grows: its coefficients come from
-//! earlier rays.
+//! The error of progressive `ocv` relative to `mis` as a function of the number of camera rays: its coefficients come
+//! from earlier rays.
 
 use super::super::ReproduceError;
 use super::super::measure::{Estimate, Stage, View, turns};
@@ -8,20 +8,20 @@ use super::cases::{Case, LONG, LONG_TURNS};
 use super::roster::{FULL_WAYS, Numbers, Role, methods};
 use super::truth::Truth;
 
-/// Numbers of camera rays: usual and quick.
+/// Numbers of camera rays: normal and quick.
 const RAYS: [&[u32]; 2] = [&[1, 2, 4, 8, 16], &[1, 4, 16]];
 /// Turns of each.
 const TURNS: u32 = 4;
 const FIRST_TURN: u32 = 3_000_000;
-/// Edges are this part of those of the image.
+/// Reduction factor of the image's edges.
 const SHRINK: u32 = 2;
-/// Who takes part.
+/// The compared methods.
 const PAIR: [Role; 2] = [Role::Balance, Role::Progressive];
 
-/// Camera rays and error of progressive `ocv` over that of `mis`, for each of the ways to draw samples.
+/// Camera rays, and ratio of the error of progressive `ocv` to `mis`, for each sampling.
 pub(super) struct Growth(pub [Vec<(u32, Estimate)>; FULL_WAYS]);
 
-/// Camera rays per pixel of the whole image that take as long.
+/// Equivalent number of camera rays per pixel of the whole image.
 pub(super) fn cost(quick: bool) -> f64 {
     let rays: u32 = RAYS[usize::from(quick)].iter().sum();
     f64::from(TURNS * rays * (PAIR.len() * FULL_WAYS) as u32 + LONG.0 * LONG.1) / f64::from(SHRINK * SHRINK)

@@ -1,8 +1,8 @@
 //! The figures of optimizing control variates [Fan et al. 2006, Table 1].
 //!
-//! [`truth`] computes the paper's measure of error, [`roster`] lists the methods, [`cases`] the scenes of direct light,
-//! in which [`direct`] compares them; [`growth`] does so with more camera rays, and [`cache`] in irradiance caching.
-//! [`outcome`] holds the measurements of direct light; [`report`] writes the results.
+//! [`truth`] computes the paper's error measure, [`roster`] lists the methods, and [`cases`] the scenes of direct
+//! light, in which [`direct`] compares them. [`growth`] compares them with more camera rays, and [`cache`] in
+//! irradiance caching. [`outcome`] holds the measurements of direct light; [`report`] writes the results.
 
 mod cache;
 mod cases;
@@ -21,12 +21,12 @@ use cases::Case;
 use std::path::PathBuf;
 use std::time::Duration;
 
-/// Time for everything, and for the tenth of it that `quick` takes; less than is promised, for what cannot be stopped
-/// half-way.
+/// Time for everything, normal and `quick` (a tenth); less than documented, as a reserve for steps that cannot be
+/// interrupted.
 const TIME: [Duration; 2] = [Duration::from_secs(1080), Duration::from_secs(85)];
-/// Most pixels along an edge of an image: usual and quick.
+/// Maximum number of pixels along an edge of an image: normal and quick.
 const SIZE: [u32; 2] = [400, 128];
-/// Cells of the grid along the statue's height: usual and quick.
+/// Cells of the grid along the statue's height: normal and quick.
 const DETAIL: [u32; 2] = [512, 128];
 
 /// The page around the figures.
@@ -65,18 +65,18 @@ const STUDY: Study = Study {
     numbers: "fan.json",
 };
 
-/// What all figures need.
+/// Data shared by all figures.
 struct Setup<'a> {
     options: &'a Options,
     observer: Observer<'a>,
     /// Folder with the scenes.
     scenes: PathBuf,
-    /// Most pixels along an edge.
+    /// Maximum number of pixels along an edge.
     size: u32,
 }
 
 impl<'a> Setup<'a> {
-    /// Makes the scenes inside the folder of the page, unless the options name others.
+    /// Generates the scenes in the folder of the page, unless the options name others.
     fn new(options: &'a Options, observer: Observer<'a>) -> Result<Self, ReproduceError> {
         let quick = usize::from(options.quick);
         let statue = StatueOptions { detail: DETAIL[quick], ..StatueOptions::default() };
@@ -85,7 +85,7 @@ impl<'a> Setup<'a> {
     }
 }
 
-/// Renders all figures and writes `index.html` and `fan.json`; the answer is the page.
+/// Renders all figures and writes `index.html` and `fan.json`; returns the path of the page.
 pub fn run(options: &Options, observer: Observer<'_>) -> Result<PathBuf, ReproduceError> {
     let mut budget = Budget::new(TIME[usize::from(options.quick)]);
     make_folder(&options.out)?;

@@ -1,4 +1,4 @@
-//! What was measured for a case of direct light.
+//! Measurements of a case of direct light.
 
 use super::super::measure::{Estimate, Measured};
 use super::cases::Case;
@@ -6,7 +6,7 @@ use super::growth::Growth;
 use super::roster::{Numbers, Role};
 use super::truth::{Errors, Truth};
 
-/// Everything that was measured for a case.
+/// All measurements of a case.
 pub(super) struct Outcome<'a> {
     pub case: &'a Case,
     pub facts: (usize, usize),
@@ -15,7 +15,7 @@ pub(super) struct Outcome<'a> {
     pub measured: Vec<Measured>,
     pub truth: Truth,
     pub errors: Vec<Errors>,
-    /// Those of [`SHOWN`](super::cases::SHOWN) with rays all over the pixels, for each of
+    /// Measurements of [`SHOWN`](super::cases::SHOWN) with antialiasing, for each of
     /// [`SHOWN_WAYS`](super::cases::SHOWN_WAYS).
     pub antialiased: Vec<Vec<Measured>>,
     pub antialiased_truth: Truth,
@@ -23,7 +23,7 @@ pub(super) struct Outcome<'a> {
 }
 
 impl Outcome<'_> {
-    /// A method with one of the ways to draw samples, and the baseline with the same.
+    /// A method with one sampling, and the baseline with the same.
     pub(super) fn pair(&self, role: Role, way: usize) -> [&Measured; 2] {
         [role, Role::Balance].map(|r| &self.measured[r.place(way)])
     }
@@ -33,13 +33,13 @@ impl Outcome<'_> {
         [role, Role::Balance].map(|r| &self.errors[r.place(way)])
     }
 
-    /// The error of the one relative to that of the other.
+    /// The ratio of both errors.
     pub(super) fn relative(&self, role: Role, way: usize) -> Estimate {
         let [e, base] = self.errors(role, way);
         e.relative(base)
     }
 
-    /// Errors of those with antialiasing, in one of [`SHOWN_WAYS`](super::cases::SHOWN_WAYS), against their own
+    /// Errors of the antialiased images, for one of [`SHOWN_WAYS`](super::cases::SHOWN_WAYS), relative to their own
     /// reference.
     pub(super) fn antialiased_errors(&self, shown: usize) -> Vec<Errors> {
         self.antialiased[shown].iter().map(|m| self.antialiased_truth.errors(m)).collect()

@@ -1,4 +1,4 @@
-//! From measurements to sections of the page and to JSON.
+//! Converts measurements to sections of the page and to JSON.
 
 use super::super::ReproduceError;
 use super::super::chart::Chart;
@@ -19,7 +19,7 @@ pub(super) fn bias_text(b: Interval) -> String {
     format!("{:+.3} ± {:.3} %", b.value * 100.0, b.half * 100.0)
 }
 
-/// Time relative to that of a baseline, as more or less of it.
+/// Time relative to a baseline, as a percentage more or less.
 pub(super) fn more_time(ratio: f64) -> String {
     format!("{:+.1} %", (ratio - 1.0) * 100.0)
 }
@@ -55,15 +55,15 @@ pub(super) fn method_row(name: &str, [m, base]: [&Measured; 2], [e, base_errors]
 /// Columns of the tables of methods.
 pub(super) const HEADER: [&str; 7] = ["method", "N", "error", "against mis", "time", "efficiency", "bias of the mean"];
 
-/// What a target asks for.
+/// A target.
 pub(super) struct Asked {
     /// Errors of mis and of ocv in the paper.
     pub paper: [f64; 2],
-    /// Time of ocv over that of mis in the paper.
+    /// Ratio of the time of ocv to mis in the paper.
     pub time: f64,
-    /// Reduction of the error (percent).
+    /// Target reduction of the error (percent).
     pub target: f64,
-    /// Whether the efficiency counts as well.
+    /// True if the efficiency counts as well.
     pub efficient: bool,
 }
 
@@ -151,7 +151,7 @@ pub(super) fn direct(setup: &Setup<'_>, o: &Outcome<'_>) -> Result<Figure, Repro
     })
 }
 
-/// What a row of the table says beside its result.
+/// The remark beside the result of a row of the table.
 fn reason(o: &Outcome<'_>, way: usize) -> String {
     if let Some(alike) = way.checked_sub(FULL_WAYS) {
         let [mis, ocv] = [Role::Balance, Role::Progressive]

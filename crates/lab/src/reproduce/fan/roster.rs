@@ -1,33 +1,33 @@
-//! The methods that are compared, with three ways to draw samples: stratified in each estimate separately, as in the
-//! paper; stratified over all camera rays of a pixel; independent. Every light is chosen with equal probability, as in
-//! the paper; `mis` and progressive `ocv` also choose lights by the light tree, as the renderer does by default.
+//! The compared methods, with three kinds of sampling: stratified in each estimate separately, as in the paper;
+//! stratified over all camera rays of a pixel; independent. Every light is chosen with equal probability, as in the
+//! paper; `mis` and progressive `ocv` are also measured with the light tree, the default of the renderer.
 
 use super::super::method::{Method, Points};
 use lumiris::lights::LightSamplerKind;
 use lumiris::settings::{OcvForm, OptimalForm, SampleCounts, Strata};
 use lumiris_numbers::estimators::mis::Heuristic;
 
-/// Who takes part, in this order with each of the ways to draw samples.
+/// Roles of the methods, in this order for each kind of sampling.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Role {
-    /// What all are compared with: mis with the balance heuristic.
+    /// The baseline: mis with the balance heuristic.
     Balance,
     Power,
-    /// What the target is about.
+    /// The method of the target.
     Progressive,
     Paper,
     Optimal,
     OptimalDirect,
     Correlated,
-    /// One technique alone.
+    /// A single technique.
     Light,
-    /// `ris` in the time of the baseline.
+    /// `ris` at the time of the baseline.
     Ris,
-    /// `ocv`, progressive, in the time of the baseline.
+    /// `ocv`, progressive, at the time of the baseline.
     EqualTime,
 }
 
-/// All of them.
+/// All roles.
 pub(super) const ROLES: [Role; 10] = [
     Role::Balance,
     Role::Power,
@@ -41,17 +41,17 @@ pub(super) const ROLES: [Role; 10] = [
     Role::EqualTime,
 ];
 
-/// Those that also choose lights by the tree.
+/// Roles that are also measured with the light tree.
 const PAIR: [Role; 2] = [Role::Balance, Role::Progressive];
 
-/// A way to draw samples and to choose lights.
+/// A kind of sampling, with a light sampler.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Way {
     /// Name on the page.
     pub name: &'static str,
     pub points: Points,
     pub lights: LightSamplerKind,
-    /// Who takes part.
+    /// The methods measured.
     pub roles: &'static [Role],
 }
 
@@ -63,7 +63,7 @@ const fn by_tree(name: &'static str, points: Points) -> Way {
     Way { name, points, lights: LightSamplerKind::Tree, roles: &PAIR }
 }
 
-/// All ways.
+/// All kinds of sampling.
 pub(super) const WAYS: [Way; 6] = [
     alike("stratified in each estimate", Points::PerEstimate),
     alike("stratified over all rays", Points::PerPixel),
@@ -73,7 +73,7 @@ pub(super) const WAYS: [Way; 6] = [
     by_tree("independent, lights by the tree", Points::Independent),
 ];
 
-/// Number of ways in which all take part: the first ones.
+/// Number of kinds of sampling with all methods; they come first.
 pub(super) const FULL_WAYS: usize = 3;
 
 /// Numbers of samples.
@@ -81,9 +81,9 @@ pub(super) const FULL_WAYS: usize = 3;
 pub(super) struct Numbers {
     /// Samples per estimate.
     pub samples: u32,
-    /// Those of `ocv` that take as long as `mis` with the former.
+    /// Samples of `ocv` that take as long as `mis` with `samples`.
     pub equal_time: u32,
-    /// Those of `ris` that do.
+    /// Sample counts of `ris` that take as long.
     pub ris: SampleCounts,
 }
 
@@ -104,7 +104,7 @@ impl Role {
         }
     }
 
-    /// False if the expectation may differ from the truth.
+    /// False if the expectation may differ from the reference.
     pub(super) fn is_unbiased(self) -> bool {
         match self {
             Role::Paper | Role::OptimalDirect | Role::Correlated => false,
@@ -118,7 +118,7 @@ impl Role {
         }
     }
 
-    /// The method, stratified over all rays, with every light as often as any other.
+    /// The method, stratified over all rays, with equal probability for every light.
     pub(super) fn method(self, n: Numbers) -> Method {
         let method = match self {
             Role::Balance => Method::mis(n.samples).weighted(Heuristic::Balance),
@@ -135,7 +135,7 @@ impl Role {
         method.lights_by(LightSamplerKind::Uniform).stratified()
     }
 
-    /// Its place among all methods; `way` is one of [`WAYS`] in which it takes part.
+    /// Its index among all methods; `way` is one of [`WAYS`] for which it is measured.
     pub(super) fn place(self, way: usize) -> usize {
         let before: usize = WAYS[..way].iter().map(|w| w.roles.len()).sum();
         let own = WAYS[way].roles.iter().position(|&r| r == self);

@@ -1,19 +1,19 @@
 //! The reference image, and the errors of renderings.
 //!
 //! E = √(mean ((L − L_true)/tvi(L_true))²) [Fan et al. 2006, Eq. 12] with luminances L in cd/m², where a luminance of 1
-//! in the image is [`CANDELAS`]. L_true is the mean of K long renderings and has noise of its own: its variance, from
-//! the differences of the K, is subtracted from each square, so that E² has the expectation that it would have with the
-//! exact L_true.
+//! in the image is [`CANDELAS`]. L_true is the mean of K long renderings and has noise of its own. Its variance,
+//! estimated from the differences of the K renderings, is subtracted from each square, so that E² has the same
+//! expectation as with the exact L_true.
 
 use super::super::measure::{Estimate, Measured};
 use lumiris::imaging::metrics::tvi;
 use lumiris_numbers::estimators::stats::Welford;
 use lumiris_numbers::math::luminance;
 
-/// Luminance (cd/m²) of a pixel whose luminance is 1: that of white on a display.
+/// Luminance (cd/m²) of a pixel whose luminance is 1: white on a display.
 pub(super) const CANDELAS: f64 = 100.0;
 
-/// The true image, as long renderings show it.
+/// The reference image, from long renderings.
 pub(super) struct Truth {
     /// Mean radiance.
     pub radiance: Vec<[f32; 3]>,
@@ -27,15 +27,16 @@ pub(super) struct Truth {
     pub mean: Estimate,
 }
 
-/// How far renderings of one method are from the truth.
+/// Errors of the renderings of one method.
 #[derive(Clone, Debug)]
 pub(super) struct Errors {
     /// Mean square of eq. (12), turn by turn.
     squares: Welford,
-    /// Mean over the pixels of the square of their expected error, in the unit of eq. (12): what no number of turns
-    /// removes.
+    /// Mean over the pixels of the square of their expected error, in units of eq. (12): the part that does not
+    /// decrease with the number of turns.
     pub systematic: f64,
-    /// Mean luminance of the image over that of the truth, less 1, with half the width of its 95 % confidence interval.
+    /// Ratio of the mean luminance of the image to the reference, minus 1, with half the width of its 95 % confidence
+    /// interval.
     pub bias: Interval,
 }
 
@@ -49,7 +50,7 @@ pub(super) struct Interval {
 }
 
 impl Truth {
-    /// From turns of a method without bias.
+    /// From turns of an unbiased method.
     pub(super) fn new(long: &Measured) -> Self {
         let turns = long.turns() as f64;
         let mean = long.mean_radiance();
@@ -66,18 +67,18 @@ impl Truth {
         }
     }
 
-    /// Mean square of what the noise of this truth adds, in the unit of eq. (12).
+    /// Mean square of the noise of this reference, in units of eq. (12).
     pub(super) fn noise(&self) -> f64 {
         let noise = |(v, t): (&f64, &f64)| v / (t * t);
         (self.variance.iter().zip(&self.threshold).map(noise).sum::<f64>() / self.variance.len().max(1) as f64).sqrt()
     }
 
-    /// The same image in the unit of eq. (12): variance over the square of the threshold.
+    /// A variance image in units of eq. (12): variance over the square of the threshold.
     pub(super) fn weighted(&self, variances: &[f64]) -> Vec<f64> {
         variances.iter().zip(&self.threshold).map(|(v, t)| v / (t * t)).collect()
     }
 
-    /// Mean square of eq. (12) of an image with this luminance, without the noise of the truth.
+    /// Mean square of eq. (12) of an image with this luminance, without the noise of the reference.
     fn square(&self, image: impl Iterator<Item = f64>) -> f64 {
         let error = |(i, l): (usize, f64)| {
             let (difference, t) = (l - self.luminance[i], self.threshold[i]);
@@ -86,14 +87,14 @@ impl Truth {
         image.enumerate().map(error).sum::<f64>() / self.luminance.len().max(1) as f64
     }
 
-    /// Holds the turns of a method against the truth.
+    /// Compares the turns of a method with the reference.
     pub(super) fn errors(&self, m: &Measured) -> Errors {
         let (mut squares, mut means) = (Welford::new(), Welford::new());
         for turn in m.luminances() {
             squares.add(self.square(turn.iter().map(|&v| f64::from(v))));
             means.add(turn.iter().map(|&v| f64::from(v)).sum::<f64>() / turn.len().max(1) as f64);
         }
-        // The mean image, less what its own noise adds
+        // The mean image, minus the contribution of its own noise
         let turns = m.turns() as f64;
         let mean = self.square(m.mean_radiance().iter().map(|&p| luminance(p)));
         let noise = self.weighted(&m.variance_map()).iter().sum::<f64>() / (turns * self.luminance.len().max(1) as f64);
@@ -111,7 +112,7 @@ impl Errors {
         Estimate { value, error: 0.5 * self.squares.standard_error() / value.max(1e-300) }
     }
 
-    /// E relative to that of another method.
+    /// Ratio of E to another method's.
     pub(super) fn relative(&self, base: &Errors) -> Estimate {
         let (a, b) = (self.error(), base.error());
         if !(a.value > 0.0 && b.value > 0.0) {
@@ -121,7 +122,7 @@ impl Errors {
         Estimate { value, error: value * (a.error / a.value).hypot(b.error / b.value) }
     }
 
-    /// 1/(E²·time) relative to that of another method, for the ratio of their times.
+    /// 1/(E²·time) relative to another method, for the ratio of their times.
     pub(super) fn efficiency(&self, base: &Errors, time_ratio: f64) -> Estimate {
         let left = self.relative(base);
         let value = 1.0 / (left.value * left.value * time_ratio).max(1e-300);
@@ -149,7 +150,7 @@ mod tests {
 
     #[test]
     fn the_noise_of_the_truth_takes_no_part() {
-        // The truth is 2 with variance 8/4 of its mean; an image of 2 is no further from it than its noise says.
+        // The reference is 2, and its mean has variance 8/4; an image of 2 differs from it by no more than its noise.
         let truth = Truth::new(&measured(&[[0.0, 0.0], [4.0, 4.0]]));
         assert!((truth.square([2.0, 2.0].into_iter()) + 4.0 / truth.threshold[0].powi(2)).abs() < 1e-6);
         let exact = Truth::new(&measured(&[[2.0, 2.0], [2.0, 2.0]]));
@@ -166,7 +167,7 @@ mod tests {
         let errors = exact.errors(&measured(&[[3.0, 3.0], [3.0, 3.0]]));
         assert!((errors.systematic / errors.error().value.powi(2) - 1.0).abs() < 1e-6);
         assert!((errors.bias.value - 0.5).abs() < 1e-6);
-        // Four turns whose mean is right: its square is 0, and their variance 4/3 says that noise would make it 1/3.
+        // Four turns with a correct mean: its square is 0, and their variance 4/3 implies a noise of 1/3.
         let noisy = exact.errors(&measured(&[[3.0, 1.0], [1.0, 3.0], [3.0, 1.0], [1.0, 3.0]]));
         assert!((noisy.systematic / noisy.error().value.powi(2) + 1.0 / 3.0).abs() < 1e-6);
     }

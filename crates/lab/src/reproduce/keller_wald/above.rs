@@ -1,4 +1,4 @@
-//! Points of a scene seen from above: their density over each square of the floor plan. x is to the right, y upwards.
+//! Points of a scene from above: their density in each square of the floor plan. x is to the right, y upwards.
 
 use super::super::images::{HEAT, Image, Scale};
 use lumiris_numbers::math::{Bounds3, Vec3};
@@ -19,25 +19,25 @@ pub(super) struct Plan {
 pub(super) struct Area {
     /// Minimum x and y.
     pub low: [f32; 2],
-    /// Greatest x and y.
+    /// Maximum x and y.
     pub high: [f32; 2],
 }
 
 impl Area {
-    /// True if a point is above or below it.
+    /// True if a point is above or below the area.
     pub(super) fn holds(&self, p: Vec3) -> bool {
         let inside = |i: usize| self.low[i] <= p[i] && p[i] < self.high[i];
         inside(0) && inside(1)
     }
 
-    /// How many points are above or below it.
+    /// Number of points above or below the area.
     pub(super) fn count(&self, points: &[Vec3]) -> u64 {
         points.iter().filter(|&&p| self.holds(p)).count() as u64
     }
 }
 
 impl Plan {
-    /// Around everything, with `longer` squares along the longer side.
+    /// A raster that covers the bounds, with `longer` squares along the longer side.
     pub(super) fn new(bounds: &Bounds3, longer: u32) -> Self {
         let extent = [0, 1].map(|i| f64::from((bounds.max[i] - bounds.min[i]).max(1e-3)));
         let longer = longer.max(1);
@@ -67,8 +67,8 @@ impl Plan {
         Image::colored(self.size, density, scale)
     }
 
-    /// One scale for several images: from the density of a single point to that which a twentieth of the squares
-    /// exceed: walls.
+    /// A common scale for several images: from the density of a single point to the 95th percentile of the squares,
+    /// which are walls.
     pub(super) fn scale(&self, densities: &[&[f64]]) -> Scale {
         let mut sorted: Vec<f64> = densities.iter().flat_map(|d| d.iter().copied()).filter(|v| *v > 0.0).collect();
         sorted.sort_by(f64::total_cmp);
@@ -92,7 +92,7 @@ mod tests {
         let points = [Vec3::new(-0.5, 0.5, 0.0), Vec3::new(-0.5, 0.5, 0.9), Vec3::new(2.5, 1.5, 0.0)];
         let density = plan.density(&points);
         assert_eq!(density.iter().map(|d| d.round()).collect::<Vec<_>>(), [0.0, 0.0, 0.0, 1.0, 2.0, 0.0, 0.0, 0.0]);
-        // What is outside is nowhere
+        // Points outside do not count
         assert_eq!(plan.density(&[Vec3::new(5.0, 0.0, 0.0), Vec3::splat(f32::NAN)]), [0.0; 8]);
         let area = Area { low: [-1.0, 0.0], high: [0.0, 2.0] };
         assert_eq!(area.count(&points), 2);

@@ -1,4 +1,4 @@
-//! Direct light from many, mostly hidden lights [Keller and Wald 2000, Fig. 5]: variance at equal time in the rooms
+//! Direct light from many, mostly occluded lights [Keller and Wald 2000, Fig. 5]: variance at equal time in the rooms
 //! with 100 lights, and the cost of a sample among 10,000.
 
 use super::super::calibrate::{Calibration, calibrate};
@@ -16,30 +16,30 @@ use lumiris::settings::{SampleCounts, Strata, Target};
 use serde_json::{Value, json};
 use std::time::{Duration, Instant};
 
-/// Shadow rays of an estimate, and camera rays per pixel and turn.
+/// Shadow rays per estimate, and camera rays per pixel and turn.
 const SAMPLES: u32 = 4;
 const SPP: u32 = 4;
-/// Edge of the image on which times are found out, and the least edge.
+/// Edge of the image for time measurements, and the minimum edge.
 const PILOT_SIZE: u32 = 64;
 const MIN_SIZE: u32 = 16;
-/// Fewest and most turns.
+/// Minimum and maximum number of turns.
 const TURNS: [u32; 2] = [4, 24];
 const QUICK_TURNS: u32 = 6;
-/// Turns that the size of the image is chosen for.
+/// Number of turns for which the size of the image is chosen.
 const WANTED_TURNS: f64 = 8.0;
-/// Part of the time for the scene with more lights.
+/// Fraction of the time for the scene with more lights.
 const MANY_FRACTION: f64 = 0.3;
 
-/// What a method is for.
+/// The role of a method.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Role {
-    /// Light and BSDF sampling over all lights: what others are compared with.
+    /// The baseline: light and BSDF sampling over all lights.
     All,
-    /// Resampling without knowledge of visibility.
+    /// Resampling without visibility information.
     Resampled,
-    /// What photons tell is used, without bias.
+    /// Uses the visibility information of photons, without bias.
     Informed,
-    /// What photons tell is taken for the truth.
+    /// Treats the visibility information of photons as exact, with bias.
     Biased,
     /// For completeness.
     Other,
@@ -74,42 +74,43 @@ fn methods(sample_counts: SampleCounts) -> Vec<Named> {
     ]
 }
 
-/// What was measured on one scene.
+/// Measurements of one scene.
 struct Outcome {
     lights: usize,
     size: [u32; 2],
     calibration: Calibration,
     named: Vec<Named>,
     measured: Vec<Measured>,
-    /// Photons that told which lights are seen, and the time that it took (s).
+    /// Number of photons in the visibility cache, and the time to build it (s).
     visibility_cache: (u64, f64),
 }
 
 impl Outcome {
-    /// The method of least variance at equal time among those that use what photons tell, without bias.
+    /// The unbiased method with the least variance at equal time among those that use the visibility information of
+    /// photons.
     fn best(&self) -> usize {
         let informed = (0..self.named.len()).filter(|&i| self.named[i].role == Role::Informed);
         let left = |i: &usize| self.against(*i, Role::All).value;
         informed.min_by(|a, b| left(a).total_cmp(&left(b))).expect("the roster has every role")
     }
 
-    /// [`same_mean`] among the methods without bias, and of one with bias among all.
+    /// [`same_mean`] among the unbiased methods; for a biased one, among all.
     fn same_mean(&self, i: usize) -> f64 {
         let unbiased = self.named.iter().take_while(|n| n.role != Role::Biased).count();
         same_mean(&self.measured[..unbiased.max(i + 1)], i)
     }
 
-    /// Place of the method with a role.
+    /// Index of the method with a role.
     fn place(&self, role: Role) -> usize {
         self.named.iter().position(|n| n.role == role).expect("the roster has every role")
     }
 
-    /// Variance at equal time of a method, relative to that with a role.
+    /// Variance at equal time of a method, relative to the method with a role.
     fn against(&self, i: usize, role: Role) -> Estimate {
         self.measured[i].at_equal_time(&self.measured[self.place(role)], None)
     }
 
-    /// Processor time of a method for each shadow segment (ns).
+    /// Processor time of a method per shadow segment (ns).
     fn per_sample(&self, i: usize) -> f64 {
         let m = &self.measured[i];
         let segments = m.segments as f64 / m.turns().max(1) as f64;
@@ -131,7 +132,7 @@ fn measure(setup: &Setup<'_>, file: &str, time: Duration) -> Result<Outcome, Rep
     let path = setup.scenes.join(file);
     let base = Method::mis(SAMPLES).stratified();
 
-    // As many pixels as fit
+    // Image size that fits the time
     let pilot_size = setup.size.min(PILOT_SIZE);
     let mut stage = Stage::load(&path, scaled(SHAPE, pilot_size), setup.options.threads)?;
     let mut calibration = calibrate(&mut stage, &base, setup.observer)?;
@@ -145,7 +146,7 @@ fn measure(setup: &Setup<'_>, file: &str, time: Duration) -> Result<Outcome, Rep
         calibration = calibrate(&mut stage, &base, setup.observer)?;
     }
 
-    // As many turns as fit
+    // Number of turns that fits the time
     let named = methods(calibration.sample_counts);
     let visibility_cache = prepare_visibility_cache(setup, &mut stage);
     let list: Vec<Method> = named.iter().map(|n| n.method).collect();
@@ -157,8 +158,7 @@ fn measure(setup: &Setup<'_>, file: &str, time: Duration) -> Result<Outcome, Rep
     Ok(Outcome { lights, size, calibration, named, measured, visibility_cache })
 }
 
-/// Traces photons that come straight from lights, and lets them say which lights are seen. The answer is their number,
-/// and the time that it took (s).
+/// Builds the visibility cache from photons that come straight from lights. Returns their number, and the time (s).
 fn prepare_visibility_cache(setup: &Setup<'_>, stage: &mut Stage) -> (u64, f64) {
     let start = Instant::now();
     let visibility_cache = setup.pool.install(|| build_visibility_cache(stage.job()));
@@ -224,7 +224,7 @@ fn figure(setup: &Setup<'_>, few: &Outcome, many: &Outcome) -> Result<Figure, Re
     })
 }
 
-/// What leaving lights out wins and loses.
+/// Gain and loss by omitting lights.
 fn biased_summary(o: &Outcome) -> Summary {
     let i = o.place(Role::Biased);
     let (own, true_mean) = (o.measured[i].mean(), o.measured[o.best()].mean());

@@ -1,4 +1,4 @@
-//! Photon maps of a scene, and what they look like: from above, and shown directly.
+//! Photon maps of a scene, and their images: from above, and visualised directly.
 
 use super::super::ReproduceError;
 use super::super::images::Image;
@@ -16,22 +16,22 @@ use lumiris_numbers::math::{Rgb, Vec3};
 use rayon::prelude::*;
 use std::time::{Duration, Instant};
 
-/// Largest radius in which photons are looked for (m): that of furniture.
+/// Maximum radius of photon searches (m): the size of furniture.
 const MAX_RADIUS: f32 = 0.5;
-/// Squares along the longer side of a plan: usual and quick.
+/// Squares along the longer side of a plan: normal and quick.
 const PLAN_SIZE: [u32; 2] = [400, 240];
-/// Turns of a reference; their seeds begin here.
+/// Turns of a reference, whose index determines their seed.
 const LONG_TURNS: std::ops::Range<u32> = 1_000_000..1_000_004;
-/// Most camera rays of a turn of a reference: usual and quick.
+/// Maximum number of camera rays of a turn of a reference: normal and quick.
 const MAX_RAYS: [f64; 2] = [16384.0, 256.0];
-/// Photon paths that find out how fast photons are traced.
+/// Photon paths of the measurement of tracing speed.
 const PILOT: u64 = 50_000;
 
 /// The maps of one run of photon tracing.
 pub(super) struct Maps {
-    /// Light that came over diffuse surfaces, or straight from lights.
+    /// Photons from lights, or scattered by diffuse surfaces.
     pub global: PhotonMap,
-    /// Light that came over other surfaces.
+    /// Photons scattered by other surfaces.
     pub caustic: PhotonMap,
     /// Photon paths traced.
     pub paths: u64,
@@ -42,7 +42,7 @@ pub(super) struct Maps {
 }
 
 impl Maps {
-    /// Sorts what was traced.
+    /// Builds the maps of traced photons.
     pub(super) fn new(traced: Traced) -> Self {
         let (rate, seconds) = (traced.arrivals_per_second(), traced.elapsed.as_secs_f64());
         Maps {
@@ -64,7 +64,7 @@ impl Maps {
         self.global.bytes() + self.caustic.bytes()
     }
 
-    /// Where the photons are.
+    /// Positions of the photons.
     pub(super) fn positions(&self) -> Vec<Vec3> {
         [&self.global, &self.caustic].into_iter().flat_map(positions).collect()
     }
@@ -75,7 +75,7 @@ impl Maps {
     }
 }
 
-/// Where the photons of a map are.
+/// Positions of the photons of a map.
 pub(super) fn positions(map: &PhotonMap) -> impl Iterator<Item = Vec3> {
     map.photons().iter().map(Photon::p)
 }
@@ -107,7 +107,7 @@ pub(super) fn trace(
     setup.pool.install(|| Ok(Maps::new(trace_photons(job, tracing, importance, budget)?)))
 }
 
-/// Photons stored and photon paths traced in a second.
+/// Photons stored and photon paths traced per second.
 pub(super) fn speed(
     setup: &Setup<'_>,
     job: &RenderJob,
@@ -120,7 +120,7 @@ pub(super) fn speed(
     Ok([maps.stored() as f64 / seconds, maps.paths as f64 / seconds])
 }
 
-/// The image by path tracing, for about `time`.
+/// The path-traced image, rendered for about `time`.
 pub(super) fn path_traced(setup: &Setup<'_>, stage: &mut Stage, time: Duration) -> Result<Reference, ReproduceError> {
     let observer = setup.observer;
     let method = Method::ris(16, 2).stratified().of(Transport::Path);
@@ -136,7 +136,7 @@ pub(super) fn plan(setup: &Setup<'_>, job: &RenderJob) -> Plan {
     Plan::new(&job.world.scene.geometry.world_bounds(), PLAN_SIZE[usize::from(setup.options.quick)])
 }
 
-/// Points from above: name of the file, heading, caption, and where they are.
+/// Points from above, with file name, heading and caption.
 pub(super) struct Cloud {
     /// Name of the file.
     pub name: String,
@@ -148,7 +148,7 @@ pub(super) struct Cloud {
     pub points: Vec<Vec3>,
 }
 
-/// Images of points with one scale for all. Densities are those of as many points as the last has.
+/// Images of points with a common scale. Densities are normalised to the number of points of the last one.
 pub(super) fn clouds(setup: &Setup<'_>, plan: &Plan, clouds: &[Cloud]) -> Result<Vec<Block>, ReproduceError> {
     let count = clouds.last().map_or(0, |c| c.points.len()) as f64;
     let density = |c: &Cloud| {
@@ -183,7 +183,7 @@ pub(super) struct Print<'a> {
     pub radiance: &'a [[f32; 3]],
 }
 
-/// Images with one exposure for all.
+/// Images with a common exposure.
 pub(super) fn prints(setup: &Setup<'_>, exposure: f32, prints: &[Print<'_>]) -> Result<Block, ReproduceError> {
     let mut shown = Vec::new();
     for p in prints {

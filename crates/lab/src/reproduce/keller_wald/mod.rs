@@ -1,7 +1,7 @@
 //! The figures of importance sampling for photon maps [Keller and Wald 2000].
 //!
-//! [`above`] draws points on the floor plan, [`seen`] has the diffuse surfaces that the camera sees and the error of
-//! images that visualise a map directly, [`maps`] renders such images; then the figures: [`rooms`] (1 and 2), [`ring`]
+//! [`above`] plots points on the floor plan. [`seen`] has the diffuse surfaces visible to the camera, and the error of
+//! images that visualise a map directly. [`maps`] renders such images. The figures are [`rooms`] (1 and 2), [`ring`]
 //! (3), [`slit`] (4) and [`direct`] (5).
 
 mod above;
@@ -19,8 +19,8 @@ use lumiris::render::{RenderError, thread_pool};
 use std::path::PathBuf;
 use std::time::Duration;
 
-/// Time for everything, and for the tenth of it that `quick` takes; less than is promised, for what cannot be stopped
-/// half-way.
+/// Time for everything, normal and `quick` (a tenth); less than documented, as a reserve for steps that cannot be
+/// interrupted.
 const TIME: [Duration; 2] = [Duration::from_secs(1080), Duration::from_secs(80)];
 /// Maximum number of pixels along an edge of an image: normal and quick.
 const SIZE: [u32; 2] = [400, 128];
@@ -52,7 +52,7 @@ const STUDY: Study = Study {
     numbers: "keller-wald.json",
 };
 
-/// What all figures need.
+/// Data shared by all figures.
 struct Setup<'a> {
     options: &'a Options,
     observer: Observer<'a>,
@@ -65,7 +65,7 @@ struct Setup<'a> {
 }
 
 impl<'a> Setup<'a> {
-    /// Makes the scenes inside the folder of the page, unless the options name others.
+    /// Generates the scenes in the folder of the page, unless the options name others.
     fn new(options: &'a Options, observer: Observer<'a>) -> Result<Self, ReproduceError> {
         let scenes = scenes_folder(options, write_scenes)?;
         let size = options.size.unwrap_or(SIZE[usize::from(options.quick)]);
@@ -73,7 +73,7 @@ impl<'a> Setup<'a> {
     }
 }
 
-/// Renders all figures and writes `index.html` and `keller-wald.json`; the answer is the page.
+/// Renders all figures and writes `index.html` and `keller-wald.json`; returns the path of the page.
 pub fn run(options: &Options, observer: Observer<'_>) -> Result<PathBuf, ReproduceError> {
     let mut budget = Budget::new(TIME[usize::from(options.quick)]);
     make_folder(&options.out)?;

@@ -15,26 +15,26 @@ use std::time::{Duration, Instant};
 
 /// The ratios, as their reciprocals.
 const RATIOS: [u64; 3] = [1, 5, 20];
-/// Photon paths of the reference over those of the finest map, and photons of its estimates.
+/// Ratio of the reference's photon paths to the finest map's, and of the photons of its estimates.
 const LONGER: u64 = 8;
 const REFERENCE_COUNT: u32 = 120;
 /// Photons of an estimate.
 const COUNT: u32 = 50;
-/// Fewest photon paths of the global map, and most: usual and quick.
+/// Minimum and maximum number of photon paths of the global map: normal and quick.
 const MIN_COUNT: f64 = 1_000.0;
 const MAX_COUNT: [f64; 2] = [400_000.0, 10_000.0];
-/// Most pixels along an edge: usual and quick.
+/// Maximum number of pixels along an edge: normal and quick.
 const SIZE: [u32; 2] = [320, 96];
-/// The part of the image that is shown larger.
+/// The part of the image for the enlarged view.
 const PART: [f64; 4] = [0.24, 0.3, 0.66, 0.72];
-/// Part of the time for photons.
+/// Fraction of the time for photons.
 const PHOTON_FRACTION: f64 = 0.7;
 
 /// A ratio with its maps.
 struct Row {
     q: u64,
     maps: Maps,
-    /// Radiance of caustics, and of everything.
+    /// Radiance of caustics, and total radiance.
     caustic: Vec<[f32; 3]>,
     all: Vec<[f32; 3]>,
     error: f64,
@@ -52,7 +52,7 @@ const SCENES: [Scene; 2] = [
     Scene { file: "ring-indirect.pbrt", name: "lit by a bright patch of a wall", id: "ring-indirect" },
 ];
 
-/// What was measured on one scene.
+/// Measurements of one scene.
 struct Outcome {
     scene: &'static Scene,
     size: [u32; 2],
@@ -80,7 +80,7 @@ fn measure(setup: &Setup<'_>, scene: &'static Scene, time: Duration) -> Result<O
     let count = (left * paths / all as f64).clamp(MIN_COUNT, MAX_COUNT[usize::from(setup.options.quick)]) as u64;
     (setup.observer.say)(&format!("  {}, {} × {} pixels, {count} photon paths", scene.name, size[0], size[1]));
 
-    // The reference holds no global photons to speak of
+    // The global map of the reference is negligible
     let long = trace_ratio(setup, job, 2, finest * LONGER, count)?;
     let reference = show(setup, &seen, &[&long.caustic], REFERENCE_COUNT);
     let mask: Vec<bool> = seen.iter().map(Option::is_some).collect();
@@ -158,7 +158,7 @@ fn figure(setup: &Setup<'_>, outcomes: &[Outcome; 2]) -> Result<Figure, Reproduc
     })
 }
 
-/// The greatest change of the number of global photons, relative to that of the first row.
+/// The maximum change of the number of global photons, relative to the first row.
 fn global_change(o: &Outcome) -> f64 {
     let first = o.rows[0].maps.global.len().max(1) as f64;
     o.rows.iter().map(|r| (r.maps.global.len() as f64 / first - 1.0).abs()).fold(0.0, f64::max)

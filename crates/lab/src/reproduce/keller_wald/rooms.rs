@@ -17,22 +17,22 @@ use lumiris_numbers::math::Vec3;
 use serde_json::{Value, json};
 use std::time::{Duration, Instant};
 
-/// Photons of the larger maps over those of the smaller ones.
+/// Ratio of the photons of the larger maps to the smaller ones.
 const LARGER: u64 = 8;
-/// Fewest photons of the smaller maps, and most: usual and quick. The report has 6·10⁵.
+/// Minimum and maximum number of photons of the smaller maps: normal and quick. The report has 6·10⁵.
 const MIN_COUNT: f64 = 2_000.0;
 const MAX_COUNT: [f64; 2] = [600_000.0, 20_000.0];
-/// Photons of an estimate: each map is shown with the number that serves it best.
+/// Photons per estimate: each map is visualised with the number of least error.
 const COUNTS: [u32; 4] = [20, 60, 200, 600];
-/// Most pixels along an edge: usual and quick.
+/// Maximum number of pixels along an edge: normal and quick.
 const SIZE: [u32; 2] = [240, 96];
-/// Parts of the time for the reference, and for the photons of the maps.
+/// Fractions of the time for the reference, and for the photons of the maps.
 const REFERENCE_FRACTION: f64 = 0.4;
 const PHOTON_FRACTION: f64 = 0.35;
 /// Importon paths.
 const IMPORTONS: u64 = 100_000;
 
-/// A map, and how well it shows the room.
+/// A map, and its errors.
 struct Row {
     name: &'static str,
     importance: bool,
@@ -45,7 +45,7 @@ struct Row {
     in_room: u64,
 }
 
-/// What maps are held against.
+/// Reference data for the maps.
 struct Judge<'a> {
     setup: &'a Setup<'a>,
     job: &'a RenderJob,
@@ -82,7 +82,7 @@ impl Row {
     }
 }
 
-/// Measures it within about `time`.
+/// Measures within about `time`.
 pub(super) fn run(setup: &Setup<'_>, time: Duration) -> Result<Figure, ReproduceError> {
     let start = Instant::now();
     (setup.observer.say)("Rooms …");
@@ -95,7 +95,7 @@ pub(super) fn run(setup: &Setup<'_>, time: Duration) -> Result<Figure, Reproduce
     let settings = ImportanceSettings { paths: IMPORTONS, seed: 1, ..ImportanceSettings::default() };
     let importance = setup.pool.install(|| trace_importons(job, &settings))?;
 
-    // As many photons as fit
+    // Number of photons that fits the time
     let tracing = Tracing { seed: 2, ..Tracing::default() };
     let [stored, _] = speed(setup, job, &tracing, Some(&importance))?;
     let left = time.saturating_sub(start.elapsed()).as_secs_f64() * PHOTON_FRACTION / (1.0 - REFERENCE_FRACTION);

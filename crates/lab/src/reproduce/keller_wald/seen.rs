@@ -1,4 +1,4 @@
-//! The diffuse surfaces that the camera sees, for images that visualise a photon map directly: L = albedo·E/π at the
+//! The diffuse surfaces visible to the camera, for images that visualise a photon map directly: L = albedo·E/π at the
 //! hit of the ray through the centre of each pixel [Keller and Wald 2000, Fig. 2].
 
 use super::super::measure::Measured;
@@ -12,7 +12,7 @@ use std::f32::consts::FRAC_1_PI;
 /// A point of a diffuse surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Seen {
-    /// Where.
+    /// Position.
     pub p: Vec3,
     /// Unit normal towards the camera.
     pub n: Vec3,
@@ -28,7 +28,8 @@ impl Seen {
     }
 }
 
-/// What each pixel shows, row by row; `None` where that is nothing, a light, or not diffuse alone.
+/// The visible point of each pixel, row by row; `None` if there is no surface, a light, or a surface that is not purely
+/// diffuse.
 pub(super) fn seen(world: &World) -> Vec<Option<Seen>> {
     let scene = &world.scene;
     let [width, height] = scene.film.resolution;
@@ -69,7 +70,7 @@ fn diffuse_at(world: &World, wo: Vec3, hit: &Hit) -> Option<Seen> {
     Some(Seen { p: surface.p, n, albedo: part.reflectance })
 }
 
-/// What an image should be, by long renderings.
+/// The reference image, from long renderings.
 pub(super) struct Reference {
     /// Mean radiance.
     pub radiance: Vec<[f32; 3]>,
@@ -79,7 +80,7 @@ pub(super) struct Reference {
 }
 
 impl Reference {
-    /// From turns of a method without bias.
+    /// From turns of an unbiased method.
     pub(super) fn new(long: &Measured) -> Self {
         let (mean, turns) = (long.mean_radiance(), long.turns().max(1) as f64);
         Reference {
@@ -94,23 +95,23 @@ impl Reference {
         mean_where(mask, self.luminance.iter().copied())
     }
 
-    /// Root of the mean square of the difference in luminance over the pixels of a mask, relative to the mean
-    /// luminance. The reference's own noise is subtracted from each square.
+    /// RMS difference in luminance over the pixels of a mask, relative to the mean luminance. The reference's own noise
+    /// is subtracted from each square.
     pub(super) fn rmse(&self, image: &[[f32; 3]], mask: &[bool]) -> f64 {
         let square =
             |(i, p): (usize, &[f32; 3])| (luminance(p.map(f64::from)) - self.luminance[i]).powi(2) - self.variance[i];
         mean_where(mask, image.iter().enumerate().map(square)).max(0.0).sqrt() / self.mean(mask).max(1e-300)
     }
 
-    /// Mean luminance of an image over that of the reference, less 1, over the pixels of a mask.
+    /// Ratio of the mean luminance of an image to the reference, minus 1, over the pixels of a mask.
     pub(super) fn bias(&self, image: &[[f32; 3]], mask: &[bool]) -> f64 {
         let mean = mean_where(mask, image.iter().map(|p| luminance(p.map(f64::from))));
         mean / self.mean(mask).max(1e-300) - 1.0
     }
 }
 
-/// Root of the mean square of the difference in luminance from another image over the pixels of a mask, relative to the
-/// mean luminance of the other.
+/// RMS difference in luminance from another image over the pixels of a mask, relative to the mean luminance of the
+/// other image.
 pub(super) fn relative_rmse(image: &[[f32; 3]], other: &[[f32; 3]], mask: &[bool]) -> f64 {
     let light = |p: &[f32; 3]| luminance(p.map(f64::from));
     let square = mean_where(mask, image.iter().zip(other).map(|(a, b)| (light(a) - light(b)).powi(2)));

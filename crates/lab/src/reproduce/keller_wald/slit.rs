@@ -1,5 +1,5 @@
-//! A room lit through a slit: where importance stores photons, and what the cut-off loses [Keller and Wald 2000, Fig.
-//! 4].
+//! A room lit through a slit: the distribution of photons stored by importance, and the loss by the cut-off [Keller and
+//! Wald 2000, Fig. 4].
 
 use super::super::figure::{Figure, Summary};
 use super::super::images::{gain, significant};
@@ -21,24 +21,24 @@ use std::time::{Duration, Instant};
 
 /// ε of the floor and of the cut-off.
 const MIN_PROBABILITY: f32 = 0.05;
-/// Maps of each kind, with seeds of their own.
+/// Number of maps of each kind, with different seeds.
 const SEEDS: u32 = 4;
-/// Fewest photons of a map, and most: usual and quick.
+/// Minimum and maximum number of photons of a map: normal and quick.
 const MIN_COUNT: f64 = 500.0;
 const MAX_COUNT: [f64; 2] = [200_000.0, 10_000.0];
-/// Photons of an estimate.
+/// Photons per estimate.
 const COUNT: u32 = 60;
-/// Most pixels along an edge: usual and quick.
+/// Maximum number of pixels along an edge: normal and quick.
 const SIZE: [u32; 2] = [240, 96];
-/// Part of the time for photons.
+/// Fraction of the time for photons.
 const PHOTON_FRACTION: f64 = 0.7;
 const IMPORTONS: u64 = 100_000;
-/// Part of the camera rays whose importance may be less than that of p = 1: a few see into the other room, or corners.
+/// Fraction of the camera rays whose importance may be below that at p = 1: a few hit the other room, or corners.
 const QUANTILE: f32 = 0.1;
 /// The room with the camera.
 const ROOM: Area = Area { low: [-4.1, -2.1], high: [-0.11, 2.1] };
 
-/// A way to deposit photons, and what it gave.
+/// A storage rule of photons, and its results.
 struct Row {
     name: &'static str,
     id: &'static str,
@@ -50,14 +50,14 @@ struct Row {
     mean: Estimate,
 }
 
-/// Measures it within about `time`.
+/// Measures within about `time`.
 pub(super) fn run(setup: &Setup<'_>, time: Duration) -> Result<Figure, ReproduceError> {
     let start = Instant::now();
     (setup.observer.say)("Slit …");
     let size = setup.size.min(SIZE[usize::from(setup.options.quick)]);
     let stage = Stage::load(&setup.scenes.join("slit.pbrt"), scaled(SHAPE, size), setup.options.threads)?;
     let (job, size) = (stage.job(), stage.size());
-    // What the slit shows of the other room is no part of this one
+    // Exclude the part of the other room that is visible through the slit
     let in_this_room = |s: Seen| Some(s).filter(|s| ROOM.holds(s.p));
     let seen: Vec<Option<Seen>> = seen(&job.world).into_iter().map(|s| s.and_then(in_this_room)).collect();
     let settings =
@@ -67,7 +67,7 @@ pub(super) fn run(setup: &Setup<'_>, time: Duration) -> Result<Figure, Reproduce
     let importance = |s: &ImportanceSettings| setup.pool.install(|| trace_importons(job, s));
     let (floor, cut) = (importance(&floor)?, importance(&cut)?);
 
-    // As many photons as fit
+    // Number of photons that fits the time
     let [by_floor, _] = speed(setup, job, &Tracing::default(), Some(&floor))?;
     let [by_cut, _] = speed(setup, job, &Tracing::default(), Some(&cut))?;
     let each = f64::from(SEEDS) * (1.0 / by_floor.max(1.0) + 2.0 / by_cut.max(1.0));
@@ -106,7 +106,7 @@ fn row(
     Ok(Row { name, id, maps, image, in_room, mean })
 }
 
-/// Mean of a row over that of another, less 1.
+/// Ratio of the mean of a row to another, minus 1.
 fn bias(row: &Row, base: &Row) -> Estimate {
     let value = row.mean.value / base.mean.value.max(1e-300);
     let relative = |e: Estimate| e.error / e.value.max(1e-300);
@@ -160,7 +160,7 @@ fn figure(
     })
 }
 
-/// Part of a map's photons that lie in the visible room, of the standard map, with ε, and with the cut-off.
+/// Fraction of a map's photons in the visible room, for the standard map, with ε, and with the cut-off.
 fn fractions(rows: &[Row; 3]) -> [f64; 3] {
     [0, 1, 2].map(|i| rows[i].in_room as f64 / rows[i].maps.stored().max(1) as f64)
 }

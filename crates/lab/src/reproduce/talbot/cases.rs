@@ -1,4 +1,4 @@
-//! The cases of the comparison: figures of the paper and of the thesis that hold methods against each other.
+//! The cases of the comparison: figures of the paper and of the thesis that compare methods.
 
 use super::scenes::Which;
 use lumiris::settings::SampleCounts;
@@ -11,30 +11,30 @@ pub(super) struct Case {
     pub scene: Which,
     /// Camera rays per pixel.
     pub primary: u32,
-    /// Shadow rays of the baseline at each.
+    /// Shadow rays of the baseline per camera ray.
     pub samples: u32,
     /// M and N of the paper.
     pub printed: Option<SampleCounts>,
     pub kind: Kind,
 }
 
-/// What is compared, and with what outcome.
+/// The comparison and its target.
 #[derive(Clone, Copy)]
 pub(super) enum Kind {
-    /// Resampling against light sampling: reduction of variance in the paper, and to be reached here (percent), by the
-    /// resampling that is judged.
+    /// Resampling compared with light sampling: reduction of variance in the paper, and target (percent), for the
+    /// judged resampling.
     Reduction { paper: f64, target: f64, judged: Judged },
-    /// Ways to stratify resampling against none.
+    /// Kinds of stratification of resampling, compared with none.
     Stratification,
 }
 
-/// Which M and N a verdict is about.
+/// The M and N that a verdict refers to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Judged {
     /// Equal halves of the time for proposals and for samples, stratified.
     EqualHalves,
-    /// Those of the paper, without stratification: where a proposal costs what a sample does, equal halves of the time
-    /// are M = N, which resamples nothing.
+    /// The M and N of the paper, without stratification. If a proposal costs as much as a sample, equal halves of the
+    /// time give M = N, without resampling.
     Printed,
 }
 

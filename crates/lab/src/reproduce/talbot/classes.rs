@@ -1,7 +1,7 @@
-//! Lit, penumbra and shadowed pixels, by the fraction of the light that arrives.
+//! Lit, penumbra and shadowed pixels, by the fraction of unoccluded light.
 //!
-//! The fraction is v = L/L₀, where L is the image and L₀ the same image without occlusion: for delta lights it is 0 or
-//! 1, for all others the mean visibility of the light weighted by its contribution. Pixels without a surface belong to
+//! The fraction is v = L/L₀, where L is the image and L₀ the same image without occlusion. For delta lights it is 0 or
+//! 1, for all others the mean visibility of the light, weighted by its contribution. Pixels without a surface belong to
 //! no class.
 
 use super::super::measure::{Stage, View, radiance};
@@ -9,9 +9,9 @@ use super::super::method::Method;
 use super::super::{Observer, ReproduceError};
 use lumiris_numbers::math::luminance;
 
-/// Minimum fraction of the light that arrives in lit pixels.
+/// Minimum fraction in lit pixels.
 pub(super) const LIT: f64 = 0.9;
-/// Largest part of the light that arrives in shadowed pixels.
+/// Maximum fraction in shadowed pixels.
 pub(super) const SHADOWED: f64 = 0.25;
 
 /// Names of the classes, in their order.
@@ -19,9 +19,9 @@ pub(super) const NAMES: [&str; 3] = ["lit", "penumbra", "shadow"];
 
 /// The class of every pixel.
 pub(super) struct Classes {
-    /// Part of the light that arrives; NaN where there is no surface, or no light.
+    /// Fraction of unoccluded light; NaN without a surface, or without light.
     pub visibility: Vec<f64>,
-    /// Which pixels are lit, which in half-shadow, which in shadow.
+    /// Masks of lit, penumbra and shadowed pixels.
     pub masks: [Vec<bool>; 3],
 }
 

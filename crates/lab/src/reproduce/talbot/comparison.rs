@@ -15,13 +15,13 @@ use std::time::{Duration, Instant};
 
 /// Turns of the antialiased images, for their variance.
 const PAIR_TURNS: u32 = 4;
-/// Edge of the image on which times are found out, and the least edge.
+/// Edge of the image for time measurements, and the minimum edge.
 const PILOT_SIZE: u32 = 96;
 const MIN_SIZE: u32 = 32;
-/// Fewest and most turns.
+/// Minimum and maximum number of turns.
 const TURNS: [u32; 2] = [4, 48];
 const QUICK_TURNS: u32 = 8;
-/// Turns that the size of the image is chosen for.
+/// Number of turns for which the size of the image is chosen.
 const WANTED_TURNS: f64 = 8.0;
 
 /// Measures a case within about `time`.
@@ -32,7 +32,7 @@ pub(super) fn run(setup: &Setup<'_>, case: &Case, time: Duration) -> Result<Figu
     let base = Method::mc(case.samples);
     let path = setup.scenes.path(case.scene);
 
-    // As many pixels as fit
+    // Image size that fits the time
     let pilot_size = setup.size.min(PILOT_SIZE);
     let mut stage = Stage::load(&path, portrait(pilot_size), setup.options.threads)?;
     let mut calibration = calibrate(&mut stage, &base, setup.observer)?;
@@ -47,7 +47,7 @@ pub(super) fn run(setup: &Setup<'_>, case: &Case, time: Duration) -> Result<Figu
         calibration = calibrate(&mut stage, &base, setup.observer)?;
     }
 
-    // As many turns as fit
+    // Number of turns that fits the time
     let (named, roles) = methods(case, calibration.sample_counts);
     let list: Vec<Method> = named.iter().map(|n| n.method).collect();
     let left = time.saturating_sub(start.elapsed()).as_secs_f64() / cost(&calibration) - antialiased;

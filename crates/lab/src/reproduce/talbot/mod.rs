@@ -1,8 +1,8 @@
 //! The figures of resampled importance sampling for direct light [Talbot et al. 2005; Talbot 2005, ch. 5].
 //!
-//! [`comparison`] compares methods at equal time: those of [`roster`] in the figures of [`cases`], for an [`outcome`].
-//! [`classes`] classifies lit and shadowed pixels, [`ratio`] searches the best number of proposals per sample,
-//! [`spheres`] samples BSDFs, [`report`] writes the results.
+//! [`comparison`] compares the methods of [`roster`] at equal time, in the figures of [`cases`]; the measurements are
+//! an [`outcome`]. [`classes`] classifies lit and shadowed pixels, [`ratio`] searches the best number of proposals per
+//! sample, [`spheres`] samples BSDFs, [`report`] writes the results.
 
 mod cases;
 mod classes;
@@ -21,8 +21,8 @@ use scenes::Scenes;
 use std::path::PathBuf;
 use std::time::Duration;
 
-/// Time for everything, and for the tenth of it that `quick` takes; less than is promised, for what cannot be stopped
-/// half-way.
+/// Time for everything, normal and `quick` (a tenth); less than documented, as a reserve for steps that cannot be
+/// interrupted.
 const TIME: [Duration; 2] = [Duration::from_secs(1080), Duration::from_secs(80)];
 /// Maximum number of pixels along an edge of an image: normal and quick.
 const SIZE: [u32; 2] = [400, 160];
@@ -48,7 +48,7 @@ const STUDY: Study = Study {
     numbers: "talbot.json",
 };
 
-/// What all figures need.
+/// Data shared by all figures.
 struct Setup<'a> {
     options: &'a Options,
     observer: Observer<'a>,
@@ -61,7 +61,7 @@ fn portrait(size: u32) -> [u32; 2] {
     [(size * 3 / 4).max(1), size]
 }
 
-/// Renders all figures and writes `index.html` and `talbot.json`; the answer is the page.
+/// Renders all figures and writes `index.html` and `talbot.json`; returns the path of the page.
 pub fn run(options: &Options, observer: Observer<'_>) -> Result<PathBuf, ReproduceError> {
     let quick = usize::from(options.quick);
     let mut budget = Budget::new(TIME[quick]);

@@ -1,4 +1,4 @@
-//! What was measured for a case of the comparison.
+//! Measurements of a case of the comparison.
 
 use super::super::calibrate::Calibration;
 use super::super::measure::Measured;
@@ -6,7 +6,7 @@ use super::cases::Case;
 use super::classes::Classes;
 use super::roster::{Named, Roles};
 
-/// Everything that was measured for a case.
+/// All measurements of a case.
 pub(super) struct Outcome<'a> {
     pub case: &'a Case,
     pub stage_facts: (usize, usize),
@@ -17,7 +17,6 @@ pub(super) struct Outcome<'a> {
     pub measured: Vec<Measured>,
     pub reference: Vec<[f64; 3]>,
     pub classes: Classes,
-    /// The baseline, the method that is judged, and the baseline with stratified samples where there is one, with rays
-    /// all over the pixels.
+    /// The baseline, the judged method, and the baseline with stratified samples if there is one, with antialiasing.
     pub antialiased: Vec<Measured>,
 }

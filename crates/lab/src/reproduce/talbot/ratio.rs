@@ -19,17 +19,17 @@ use lumiris_numbers::estimators::ris::choice::{Costs, Variances, clamp_ratio, op
 use serde_json::json;
 use std::time::{Duration, Instant};
 
-/// M and N of the left image of the thesis, which sets the time.
+/// M and N of the left image of the thesis, which determine the time.
 const BASE: u32 = 20;
 /// Numbers of samples of the sweep.
 const SAMPLES: [u32; 9] = [20, 17, 14, 10, 7, 5, 3, 2, 1];
-/// Proposals of the rendering from which the variance of visibility follows.
+/// Proposals of the rendering that measures the variance of visibility.
 const MANY: u32 = 96;
-/// Most camera rays per turn: usual and quick.
+/// Maximum number of camera rays per turn: normal and quick.
 const MAX_CAMERA_RAYS: [u32; 2] = [16, 4];
-/// Fewest and most turns.
+/// Minimum and maximum number of turns.
 const TURNS: [u32; 2] = [6, 40];
-/// `auto` may have this many times the variance of the best ratio.
+/// Maximum ratio of the variance of `auto` to the best ratio's.
 const TARGET: f64 = 2.0;
 
 /// V(f/p) and V(f/q) of every pixel.
@@ -37,7 +37,7 @@ struct Terms(Vec<Variances>);
 
 impl Terms {
     /// From the variances with M = N = 1, and with N = 1 of [`MANY`] proposals: V = V(f/p)/M + (1 − 1/M)·V(f/q).
-    /// Averaged over 3 × 3 pixels, since each is from few turns.
+    /// Averaged over 3 × 3 pixels, since there are few turns.
     fn new(one: &Measured, many: &Measured, spp: u32, size: [u32; 2]) -> Self {
         let scaled = |m: &Measured| -> Vec<f64> { m.variance_map().iter().map(|v| v * f64::from(spp)).collect() };
         let (p, many) = (smooth(&scaled(one), size), smooth(&scaled(many), size));
@@ -47,13 +47,13 @@ impl Terms {
         Terms(pixels.map(|(&p, &v)| Variances { proposals: p, samples: samples(p, v) }).collect())
     }
 
-    /// The best M/N of every pixel; `None` where there is no variance.
+    /// The best M/N of every pixel; `None` without variance.
     fn ratios(&self, costs: Costs, time: f64) -> Vec<Option<f64>> {
         let best = |v: &Variances| (v.proposals > 0.0).then(|| optimal_ratio(costs, *v, time));
         self.0.iter().map(best).collect()
     }
 
-    /// Mean variance of an estimate that takes `time` with the ratio that `ratio` chooses for each pixel.
+    /// Mean variance of an estimate that takes `time`, with the ratio `ratio(pixel)`.
     fn predicted(&self, costs: Costs, time: f64, ratio: impl Fn(usize) -> f64) -> f64 {
         let of_pixel = |(i, v): (usize, &Variances)| {
             let k = clamp_ratio(ratio(i), costs, time);
@@ -76,13 +76,13 @@ fn smooth(values: &[f64], size: [u32; 2]) -> Vec<f64> {
     (0..w * h).map(|i| at(i % w, i / w)).collect()
 }
 
-/// Everything that was measured.
+/// All measurements.
 struct Outcome {
     calibration: Calibration,
     swept: Vec<SampleCounts>,
     /// Camera rays per pixel of a turn.
     spp: u32,
-    /// The sweep, `auto`, the best of each pixel by the renderer's pilot, one proposal, one sample of many.
+    /// The sweep, `auto`, the optimum of each pixel by the renderer's pilot, one proposal, one sample of many.
     measured: Vec<Measured>,
     /// M/N of each pixel by the renderer's pilot, and the processor time of the pilot (s).
     pilot: Vec<f32>,
@@ -96,7 +96,7 @@ impl Outcome {
         &self.measured[..self.swept.len()]
     }
 
-    /// Times, and the time to spend on a point (ns).
+    /// Times, and the available time per point (ns).
     fn costs(&self) -> (Costs, f64) {
         (self.calibration.times, self.calibration.budget)
     }
@@ -109,7 +109,7 @@ impl Outcome {
         &self.measured[self.swept.len() + 1]
     }
 
-    /// Position in the sweep of the least variance at equal time; after the last for `auto`.
+    /// Index in the sweep of the least variance at equal time; after the last for `auto`.
     fn best(&self, mask: Option<&[bool]>) -> usize {
         let value = |m: &Measured| m.at_equal_time(&self.measured[0], mask).value;
         let all = &self.measured[..=self.swept.len()];
@@ -139,7 +139,7 @@ pub(super) fn run(setup: &Setup<'_>, time: Duration) -> Result<Figure, Reproduce
     methods.extend([of(&calibration.sample_counts), per_pixel, Method::ris(1, 1), Method::ris(MANY, 1)]);
     let (pilot, pilot_seconds) = stage.plan_per_pixel(calibration.times, calibration.budget)?;
 
-    // Turns, and camera rays per turn, that fit
+    // Turns, and camera rays per turn, that fit the time
     let quick = usize::from(setup.options.quick);
     let turn = calibration.seconds * 1.1 * methods.len() as f64;
     let left = time.saturating_sub(start.elapsed()).as_secs_f64() * 0.95;

@@ -1,4 +1,4 @@
-//! From measurements to sections of the page and to JSON.
+//! Converts measurements to sections of the page and to JSON.
 
 use super::super::ReproduceError;
 use super::super::figure::{Figure, Summary, estimate_json, percent, plus_minus};
@@ -14,7 +14,7 @@ use super::roster::Roles;
 use lumiris::settings::SampleCounts;
 use serde_json::{Value, json};
 
-/// All numbers of a method among those it was in turns with, the first of which is the baseline.
+/// All numbers of a method among the methods of its turns, the first of which is the baseline.
 pub(super) fn method_json(name: &str, all: &[Measured], method: usize, classes: &Classes) -> Value {
     let (m, base) = (&all[method], &all[0]);
     let class = |k: usize| {
@@ -81,9 +81,9 @@ pub(super) fn comparison(setup: &Setup<'_>, o: &Outcome<'_>) -> Result<Figure, R
     Ok(Figure { id: o.case.id, title: o.case.title, summary, also, blocks, numbers })
 }
 
-/// Variance that visibility alone leaves unstratified resampling, relative to that of the baseline, both at the time of
-/// the baseline; and its part of what unstratified resampling has. V(f/q) is from one sample of many proposals by
-/// [Talbot 2005, Eq. 4.2].
+/// Variance of unstratified resampling due to visibility alone, relative to the baseline, both at the time of the
+/// baseline; and its fraction of the total variance of unstratified resampling. V(f/q) comes from one sample of many
+/// proposals by [Talbot 2005, Eq. 4.2].
 fn visibility(o: &Outcome<'_>) -> (f64, f64) {
     let (base, plain) = (&o.measured[o.roles.base], &o.measured[o.roles.plain]);
     let many = &o.measured[o.roles.visibility];
@@ -139,7 +139,7 @@ fn reduction(o: &Outcome<'_>, i: usize, [paper, target]: [f64; 2]) -> Summary {
     }
 }
 
-/// The row of the judged M and N, and that of equal halves of the time where it is another.
+/// The row of the judged M and N, and the row of equal halves of the time if it differs.
 fn reductions(o: &Outcome<'_>, printed: [f64; 2]) -> (Summary, Vec<(&'static str, Summary)>) {
     let Roles { judged, equal_halves, .. } = o.roles;
     let beside = (judged != equal_halves).then(|| {
@@ -149,14 +149,14 @@ fn reductions(o: &Outcome<'_>, printed: [f64; 2]) -> (Summary, Vec<(&'static str
     (reduction(o, judged, printed), beside.into_iter().collect())
 }
 
-/// The row of the ways to stratify, which the list of methods has in the order of the thesis.
+/// The row of the kinds of stratification, which the list of methods has in the order of the thesis.
 fn stratification(o: &Outcome<'_>) -> Summary {
     let base = &o.measured[o.roles.base];
     let masks = &o.classes.masks;
     let at = |i: usize, mask: Option<&[bool]>| o.measured[i].at_equal_time(base, mask);
     let none = Estimate { value: 1.0, error: 0.0 };
     let steps: Vec<Estimate> = std::iter::once(none).chain((1..=4).map(|i| at(i, None))).collect();
-    // What strata of samples leave of the variance that stratified proposals leave
+    // The ratio of the variance with strata of samples to the variance with stratified proposals only
     let left = |i: usize| {
         [0, 1, 2].map(|k| {
             let mask = Some(&masks[k][..]);

@@ -1,4 +1,4 @@
-//! The methods that are held against each other, and which of them is which.
+//! The compared methods and their roles.
 
 use super::super::method::Method;
 use super::cases::{Case, Judged, Kind};
@@ -11,20 +11,20 @@ pub(super) struct Named {
     pub method: Method,
 }
 
-/// Proposals of the rendering that shows the variance of visibility alone.
+/// Proposals of the rendering that measures the variance of visibility alone.
 const MANY: u32 = 96;
 
-/// Positions among the methods that [`methods`] gives.
+/// Indices of the methods of [`methods`].
 pub(super) struct Roles {
-    /// What all are compared with.
+    /// The baseline.
     pub base: usize,
-    /// What the target is about.
+    /// The method of the target.
     pub judged: usize,
-    /// Resampling that is stratified in every way, with M and N for equal halves of the time.
+    /// Fully stratified resampling, with M and N for equal halves of the time.
     pub equal_halves: usize,
     /// Resampling without stratification.
     pub plain: usize,
-    /// Light sampling with well distributed points, where it is there.
+    /// Light sampling with well distributed points, if measured.
     pub base_stratified: Option<usize>,
     /// One sample of many proposals.
     pub visibility: usize,

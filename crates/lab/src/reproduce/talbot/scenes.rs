@@ -5,16 +5,16 @@ use crate::procedural::statue::StatueOptions;
 use crate::procedural::talbot::{TalbotOptions, write_scenes};
 use std::path::PathBuf;
 
-/// Cells of the grid along the statue's height: usual and quick.
+/// Cells of the grid along the statue's height: normal and quick.
 const DETAIL: [u32; 2] = [512, 128];
 
-/// A statue under a sky and two lights, and with either alone.
+/// A statue illuminated by a sky, by two lights, or by both.
 #[derive(Clone, Debug)]
 pub(super) struct Scenes {
     folder: PathBuf,
 }
 
-/// Which of them.
+/// The illumination.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Which {
     /// Sky.
@@ -26,7 +26,7 @@ pub(super) enum Which {
 }
 
 impl Scenes {
-    /// Makes the scenes inside the folder of the page, unless the options name others.
+    /// Generates the scenes in the folder of the page, unless the options name others.
     pub(super) fn new(options: &Options) -> Result<Self, ReproduceError> {
         let detail = DETAIL[usize::from(options.quick)];
         let statue = StatueOptions { detail, ..StatueOptions::default() };

@@ -1,5 +1,5 @@
 //! BSDFs that can only be evaluated, sampled from a default density with and without resampling [Talbot et al. 2005,
-//! Fig. 5]: one sample of M = 20 proposals against one of M = 1.
+//! Fig. 5]: one sample of M = 20 proposals compared with M = 1.
 
 use super::super::figure::{Figure, Summary};
 use super::super::images::{HEAT, Image, Scale, gain, significant};
@@ -14,7 +14,7 @@ use lumiris_numbers::math::luminance;
 use serde_json::{Value, json};
 use std::time::Instant;
 
-/// Largest part of the variance that may be left.
+/// Maximum remaining fraction of the variance.
 const TARGET: f64 = 0.2;
 /// Proposals without and with resampling.
 const PROPOSALS: [u32; 2] = [1, 20];
@@ -25,7 +25,7 @@ struct Sphere {
     name: &'static str,
     model: Model,
     density: ProposalDensity,
-    /// True for the two that the paper shows.
+    /// True for the two spheres of the paper.
     in_paper: bool,
 }
 
@@ -33,7 +33,7 @@ struct Sphere {
 struct Pair {
     images: [SphereStudy; 2],
     variances: [SphereStudy; 2],
-    /// Nanoseconds of an estimate.
+    /// Times of an estimate (ns).
     times: [f64; 2],
 }
 
@@ -64,7 +64,7 @@ fn study(sphere: &Sphere, size: u32) -> Pair {
     Pair { images: PROPOSALS.map(|m| render(m, SPP[0], 11 + m)), variances, times }
 }
 
-/// Variance with resampling by variance without.
+/// Ratio of the variance with resampling to the variance without.
 fn ratio(pair: &Pair) -> f64 {
     let [one, many] = [0, 1].map(|i| luminance(pair.variances[i].mean_variance()));
     many / one.max(1e-300)

@@ -1,8 +1,8 @@
 //! Blocks of passes of the progressive form: 0 | 1 | 2, 3 | 4 … 7 | 8 … 15 | …
 //!
-//! β is frozen within a block and fitted to all earlier ones. For the estimate to be unbiased, the samples of a block
-//! must be independent of those of earlier blocks, so each block is randomised separately; lengths are powers of two,
-//! so that each block can be a whole net of a Sobol' sequence.
+//! β is constant within a block and fitted to all earlier blocks. The estimate is unbiased only if the samples of a
+//! block are independent of earlier blocks, so each block is randomised separately. Lengths are powers of two, so that
+//! each block can be a whole net of a Sobol' sequence.
 
 /// Passes that share coefficients.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

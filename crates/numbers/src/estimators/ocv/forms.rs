@@ -1,4 +1,4 @@
-//! How β is found: what its columns are, which system it solves, and the estimate with it.
+//! The forms of β: their columns, their systems, and their estimates.
 
 use super::ldlt::MAX_COMPONENTS;
 use super::normal::NormalEquations;
@@ -6,7 +6,7 @@ use super::solve::System;
 use crate::estimators::mc;
 use strum::{EnumString, IntoStaticStr, VariantNames};
 
-/// How β is found.
+/// The form of β.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, EnumString, IntoStaticStr, VariantNames)]
 #[strum(serialize_all = "kebab-case")]
 pub enum Form {
@@ -18,15 +18,15 @@ pub enum Form {
     Crossfit,
     /// Equation (7), β from earlier blocks of passes of the same pixel ([`block_of`](super::block_of)). Unbiased.
     Progressive,
-    /// Equation (7) for the means of a pixel over all its samples, β from those of other pixels ([`super::pixels`]).
-    /// Unbiased if pixels are independent.
+    /// Equation (7) for the means of a pixel over all its samples, β from other pixels ([`super::pixels`]). Unbiased if
+    /// pixels are independent.
     #[default]
     Pixels,
 }
 
 impl Form {
-    /// How many rows of sums the samples of an estimate are: each half of them has its own in the form that fits β to
-    /// the other.
+    /// Number of rows of sums for the samples of an estimate: two in the form that fits β of each half to the other
+    /// half.
     pub fn rows(self) -> usize {
         match self {
             Form::Crossfit => 2,
@@ -43,7 +43,8 @@ impl Form {
         }
     }
 
-    /// Makes sums of the form's columns of those of r_j = p_j/p_α: r_j/I_j for the paper, r_j − I_j for the others.
+    /// Converts sums over columns r_j = p_j/p_α to the columns of the form: r_j/I_j for the paper, r_j − I_j for the
+    /// others.
     pub fn finish(self, equations: NormalEquations, sums: &mut [f32], integrals: &[f32]) {
         match self {
             Form::Paper => {
@@ -57,11 +58,10 @@ impl Form {
         }
     }
 
-    /// The estimate of the samples of [`rows`](Self::rows) rows of `sums` with the coefficients `beta` of the systems
-    /// of these rows; in the progressive form, with those that were fitted to earlier samples.
+    /// The estimate from the samples of [`rows`](Self::rows) rows of `sums`. `beta` are the coefficients of the systems
+    /// of these rows; in the progressive form, the coefficients fitted to earlier samples.
     ///
-    /// A system without solution has coefficients of 0; the estimate, or the half of it that they are for, is then that
-    /// of MIS.
+    /// A system without solution has coefficients of 0. The estimate, or its half with these coefficients, is then MIS.
     pub fn estimate(self, equations: NormalEquations, sums: &[f32], beta: &[f32], integrals: &[f32]) -> [f32; 3] {
         match self {
             Form::Paper => with_intercept(equations, sums, beta, integrals),
@@ -76,8 +76,8 @@ impl Form {
     }
 }
 
-/// β₀ + Σ β_j of the components that are there [Fan et al. 2006, Eq. 10]; the last unknown is β₀. The mean of y if
-/// there is no solution.
+/// β₀ + Σ β_j over the existing components [Fan et al. 2006, Eq. 10]; the last unknown is β₀. The mean of y if there is
+/// no solution.
 fn with_intercept(equations: NormalEquations, sums: &[f32], beta: &[f32], integrals: &[f32]) -> [f32; 3] {
     let last = equations.components().saturating_sub(1);
     if beta.iter().all(|b| *b == 0.0) {
@@ -133,7 +133,7 @@ mod tests {
     fn paper_without_penalty_is_the_regression_and_its_penalty_fades() {
         let (equations, all) = sums(40, 1.0);
         let without = System { ridge: 0.0, ..System::PAPER };
-        // The last column is 3 less the others here, so that the fit is the same without it.
+        // The last column is 3 minus the others here, so the fit without it is the same.
         let expected = estimate(Form::Regression, System::LEAST_SQUARES, equations, &[&all])[0];
         let got = estimate(Form::Paper, without, equations, &[&all])[0];
         assert!((got - expected).abs() < 1e-3, "{got} {expected}");

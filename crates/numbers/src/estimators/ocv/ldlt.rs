@@ -1,20 +1,19 @@
 //! Symmetric systems of up to [`MAX_COMPONENTS`] unknowns, by LDLᵀ with pivots.
 //!
-//! The pivot is the largest remaining diagonal, relative to its original value. Where it has fallen to [`DEPENDENT`] of
-//! that, the columns that remain depend on the others as far as rounding of the sums can tell: they are dropped (their
-//! unknowns are 0), which leaves a solution of the system if there is one.
+//! The pivot is the largest remaining diagonal element, relative to its original value. Once it falls to [`DEPENDENT`]
+//! of that, the remaining columns are linearly dependent on the others within the rounding of the sums. They are
+//! dropped (their unknowns are 0), which leaves a solution of the system if there is one.
 
 /// Maximum number of components of a system.
 pub const MAX_COMPONENTS: usize = 8;
 
-/// A system that has no usable solution: something in it is not finite. The estimate is then that of β = 0, which is
-/// MIS.
+/// The system has no usable solution, since something in it is not finite. The estimate is then MIS (β = 0).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("the normal equations are ill-conditioned")]
 pub struct IllConditioned;
 
-/// Part of its diagonal below which a pivot is rounding: a column is dropped. The sums are f32 with about 2⁻²⁴ √n of
-/// error.
+/// Fraction of the diagonal below which a pivot is rounding and its column is dropped. The f32 sums have an error of
+/// about 2⁻²⁴ √n.
 pub const DEPENDENT: f64 = 1e-5;
 
 /// A square matrix of the size of the largest system.
@@ -22,22 +21,22 @@ pub type Matrix = [[f64; MAX_COMPONENTS]; MAX_COMPONENTS];
 /// Three right-hand sides or solutions.
 pub type Columns = [[f64; MAX_COMPONENTS]; 3];
 
-/// The factors of a symmetric matrix that is not negative.
+/// The factors of a symmetric positive semidefinite matrix.
 #[derive(Clone, Copy, Debug)]
 pub struct Factors {
     /// Rows and columns in the order of their pivots.
     order: [usize; MAX_COMPONENTS],
-    /// How many of them are not dropped.
+    /// Number of columns that are not dropped.
     rank: usize,
-    /// How many were dropped though they are not 0.
+    /// Number of dropped columns that are not 0.
     dropped: usize,
     m: usize,
-    /// D on the diagonal; L D below it in the order of pivots, by original rows and columns.
+    /// D on the diagonal; L D below it, in pivot order, indexed by original rows and columns.
     a: Matrix,
 }
 
 impl Factors {
-    /// The factors of the leading `m` rows and columns of `a`. An error if anything is not finite.
+    /// Factorises the leading `m` rows and columns of `a`. An error if anything is not finite.
     pub fn new(m: usize, mut a: Matrix) -> Result<Factors, IllConditioned> {
         let scale: [f64; MAX_COMPONENTS] = std::array::from_fn(|i| if i < m { a[i][i] } else { 0.0 });
         let is_finite = a[..m].iter().all(|row| row[..m].iter().all(|v| v.is_finite()));
@@ -74,12 +73,12 @@ impl Factors {
         self.rank
     }
 
-    /// Number of columns that were dropped though they are not 0.
+    /// Number of dropped columns that are not 0.
     pub fn dropped(&self) -> usize {
         self.dropped
     }
 
-    /// x with A x = b as far as the columns that are left can have it; 0 for those that were dropped.
+    /// x with A x = b in the remaining columns; 0 in the dropped ones.
     pub fn solve(&self, mut b: [f64; MAX_COMPONENTS]) -> [f64; MAX_COMPONENTS] {
         let (kept, a) = (&self.order[..self.rank], &self.a);
         for (k, &i) in kept.iter().enumerate() {
@@ -97,7 +96,7 @@ impl Factors {
         b
     }
 
-    /// Trace of the inverse of what is left of A.
+    /// Trace of the inverse of A without the dropped columns.
     pub fn inverse_trace(&self) -> f64 {
         let diagonal = |&i: &usize| {
             let mut unit = [0.0; MAX_COMPONENTS];
@@ -113,7 +112,7 @@ mod tests {
     use super::*;
     use lumiris_test_support::random::{Pcg32, RngExt, pcg32};
 
-    /// A = G Gᵀ with G of m rows and `rank` columns, no two of which are alike, and B = A X.
+    /// A = G Gᵀ with a random G of m rows and `rank` columns, and B = A X.
     fn system(m: usize, rank: usize, stream: &mut Pcg32) -> (Matrix, Columns) {
         let mut next = || f64::from(stream.random::<f32>()) - 0.5;
         let g: Vec<Vec<f64>> =

@@ -2,10 +2,10 @@
 
 use super::ldlt::MAX_COMPONENTS;
 
-/// Samples after which the sums stay as they are: the count would no longer be exact in f32.
+/// Maximum number of samples: beyond it, the count would not be exact in f32, and sums remain unchanged.
 const MAX_SAMPLES: f32 = 16_777_216.0;
 
-/// Where the sums over samples lie in a slice of f32: Σ c_j c_k (k ≤ j, row by row), Σ c_j y (by column, then channel),
+/// Layout of the sums over samples in a slice of f32: Σ c_j c_k (k ≤ j, row by row), Σ c_j y (by column, then channel),
 /// Σ c_j, Σ y, Σ y², and the number of samples.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct NormalEquations {
@@ -51,7 +51,7 @@ impl NormalEquations {
         self.values() + 6
     }
 
-    /// Number of samples that were added.
+    /// Number of added samples.
     pub fn samples(self, sums: &[f32]) -> f32 {
         sums[self.count()]
     }
@@ -82,8 +82,8 @@ impl NormalEquations {
         f64::from(sums[self.values() + 3 + channel])
     }
 
-    /// Adds a sample whose columns are 0 but for `columns`, by their indices, which ascend. One that is not finite is
-    /// counted as y = 0 at the mean of the columns.
+    /// Adds a sample with the non-zero `columns`, given with ascending indices. A non-finite sample counts as y = 0 at
+    /// the mean of the columns.
     #[inline]
     pub fn add_sparse(self, sums: &mut [f32], columns: &[(usize, f32)], y: [f32; 3]) {
         if sums[self.count()] >= MAX_SAMPLES {
@@ -108,7 +108,7 @@ impl NormalEquations {
         }
     }
 
-    /// Adds `count` samples of y = 0 whose columns are 0 but for column `j`.
+    /// Adds `count` samples of y = 0 in which only column `j` is non-zero.
     pub fn add_zeros(self, sums: &mut [f32], (j, c): (usize, f32), count: u32) {
         let count = (count as f32).min(MAX_SAMPLES - sums[self.count()]);
         sums[self.count()] += count;
@@ -118,7 +118,7 @@ impl NormalEquations {
         }
     }
 
-    /// Makes sums of columns s_j r_j of those of columns r_j.
+    /// Converts sums over columns r_j to columns s_j r_j.
     pub fn scale(self, sums: &mut [f32], scales: &[f32]) {
         for j in 0..self.m {
             for k in 0..=j {
@@ -129,7 +129,7 @@ impl NormalEquations {
         }
     }
 
-    /// Makes sums of columns r_j − I_j of those of columns r_j.
+    /// Converts sums over columns r_j to columns r_j − I_j.
     pub fn centre(self, sums: &mut [f32], integrals: &[f32]) {
         let n = sums[self.count()];
         let (rest, y) = (self.columns(), self.values());

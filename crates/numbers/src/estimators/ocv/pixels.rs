@@ -1,38 +1,39 @@
-//! β of each pixel of a picture from the estimates of the pixels around it.
+//! β of each pixel of an image from the surrounding pixels.
 //!
 //! A pixel p has the estimate ȳ_p and the means c̄_p of its control variates over all of its samples. Its coefficients
-//! are those of the regression of y on c over other pixels q, each of which counts as one sample: so they are fitted to
-//! the variance of whole estimates, whatever strata have left of it. They do not depend on the samples of p; if pixels
-//! are independent, ȳ_p − Σ β_j c̄_pj is unbiased.
+//! are the regression of y on c over other pixels q, each of which counts as one sample. They are therefore fitted to
+//! the variance of whole estimates, including the effect of stratification. They do not depend on the samples of p; if
+//! pixels are independent, ȳ_p − Σ β_j c̄_pj is unbiased.
 //!
-//! * The picture itself varies from pixel to pixel. From ȳ_q the mean of its neighbours is subtracted. What is left is
-//!   clamped to the light of the darkest of them: single bright samples would make coefficients for all around.
-//! * Pixels that are unlike p tell nothing of it: those of other classes, of other normals, and those whose darkest
-//!   neighbour is more than [`MAX_RATIO`] times as bright or as dark as that of p.
-//! * β is held back by the ridge and the factor of [`System::OTHER_SAMPLES`], in units in which the controls of the
-//!   pixels have together a mean square of one: columns that hardly vary are left out.
+//! * The image itself varies from pixel to pixel. The mean of its neighbours is subtracted from ȳ_q. The rest is
+//!   clamped to the radiance of the darkest neighbour, since single bright samples would dominate the coefficients of
+//!   all pixels around.
+//! * Pixels unlike p are excluded: pixels of other classes or normals, and pixels whose darkest neighbour is more than
+//!   [`MAX_RATIO`] times as bright or as dark as the darkest neighbour of p.
+//! * β is regularised by the ridge and the factor of [`System::OTHER_SAMPLES`], in units in which the controls of the
+//!   pixels have together a mean square of one. Nearly constant columns are omitted.
 //!
-//! * Nor is β more than [`MAX_BETA`] times the light around p: controls are parts of one, so that no more than that can follow from
-//!   them, but where those of other pixels hardly vary, noise would be taken for much more.
+//! * β is at most [`MAX_BETA`] times the radiance around p. Controls are fractions of one, so larger coefficients are
+//!   only noise of nearly constant controls.
 //!
-//! p itself is no part of any of this: not of the means of its neighbours, nor of what is bright or like it.
+//! p itself is excluded from all of this: from the means of its neighbours, and from their brightness and similarity.
 
 use super::normal::NormalEquations;
 use super::solve::System;
 use crate::math::luminance;
 
-/// Radius of the square of pixels that β is fitted to.
+/// Radius of the square of pixels that β of a pixel is fitted to.
 const RADIUS: usize = 6;
-/// Rows above and below a row that its coefficients depend on: those pixels, and their neighbours.
+/// Number of rows above and below a row that its coefficients depend on: the square of pixels, and their neighbours.
 pub const MARGIN: usize = RADIUS + 1;
-/// Minimum number of neighbours whose mean stands for the picture.
+/// Minimum number of neighbours for a mean.
 const MIN_AROUND: f64 = 3.0;
-/// Maximum ratio of the light around two pixels that are alike.
+/// Maximum ratio of the radiance around two similar pixels.
 const MAX_RATIO: f64 = 2.0;
-/// Most of β, relative to the luminance of the light around a pixel: blue light has a fourteenth of its radiance.
+/// Maximum of β, relative to the luminance around a pixel: blue light has a luminance of a fourteenth of its radiance.
 const MAX_BETA: f64 = 16.0;
-/// Minimum squared length of the mean normal of a pixel that is one surface, and minimum part of it that is the product
-/// with that of a pixel which is alike.
+/// Minimum squared length of the mean normal of a pixel with a single surface, and minimum ratio of its dot product
+/// with the normal of a similar pixel to that length.
 const MIN_FLATNESS: f32 = 0.95;
 const MIN_PRODUCT: f32 = 0.9;
 
@@ -41,19 +42,19 @@ const MIN_PRODUCT: f32 = 0.9;
 pub struct Pixel {
     /// ȳ, by channel.
     pub mean: [f32; 3],
-    /// Which pixels it can be compared to; `None`: it is like no other. It must not depend on y or c.
+    /// Pixels are only compared within a class; `None` excludes the pixel. It must not depend on y or c.
     pub class: Option<u32>,
-    /// Mean normal; it must not depend on y or c either.
+    /// Mean normal; it must not depend on y or c.
     pub normal: [f32; 3],
 }
 
-/// What is known of a pixel from those of its eight neighbours that are like it.
+/// Sums over the similar pixels among the eight neighbours of a pixel.
 #[derive(Clone, Copy, Debug)]
 struct Around {
     count: f64,
     /// Σ ȳ.
     means: [f64; 3],
-    /// The least light of them, and the least but one, with the pixels.
+    /// The smallest and the second smallest radiance among them, with the pixels.
     darkest: [(f64, usize); 2],
 }
 
@@ -72,7 +73,7 @@ impl Around {
         }
     }
 
-    /// The light that the pixel is taken to have; `None` if too few pixels tell.
+    /// The radiance around the pixel; `None` if there are too few neighbours.
     fn light(&self) -> Option<f64> {
         (self.count >= MIN_AROUND && self.darkest[0].0 > 0.0).then_some(self.darkest[0].0)
     }
@@ -86,7 +87,7 @@ pub struct Memory {
     scales: Vec<f32>,
 }
 
-/// The estimates of the pixels of a picture.
+/// The estimates of the pixels of an image.
 #[derive(Clone, Debug)]
 pub struct Picture {
     width: usize,
@@ -98,7 +99,7 @@ pub struct Picture {
 }
 
 impl Picture {
-    /// Pixels row by row with their controls, `components` of each.
+    /// Pixels row by row, with `components` controls each.
     pub fn new(width: usize, components: usize, mut pixels: Vec<Pixel>, controls: Vec<f32>) -> Self {
         assert_eq!(controls.len(), pixels.len() * components, "as many controls as pixels");
         for (pixel, controls) in pixels.iter_mut().zip(controls.chunks(components.max(1))) {
@@ -122,7 +123,7 @@ impl Picture {
         self.pixels.len() / self.width
     }
 
-    /// What is known of pixel `i` from its neighbours but `without`.
+    /// Sums over the neighbours of pixel `i`, excluding `without`.
     fn look_around(&self, i: usize, without: usize) -> Around {
         let mut around = Around::NOTHING;
         self.each_within(1, i, |q, _| {
@@ -133,7 +134,7 @@ impl Picture {
         around
     }
 
-    /// Pixels of the square around pixel `i`, without it, and whether they are next to it.
+    /// Pixels of the square around pixel `i`, without it, with a flag for direct neighbours.
     #[inline]
     fn each_within(&self, radius: usize, i: usize, mut f: impl FnMut(usize, bool)) {
         let (x, y) = (i % self.width, i / self.width);
@@ -146,14 +147,14 @@ impl Picture {
         }
     }
 
-    /// True if both show the same kind of surface.
+    /// True if both pixels show the same kind of surface.
     fn are_alike(&self, q: usize, p: usize) -> bool {
         let (q, p) = (&self.pixels[q], &self.pixels[p]);
         let product: f32 = q.normal.iter().zip(&p.normal).map(|(a, b)| a * b).sum();
         q.class.is_some() && q.class == p.class && product > MIN_PRODUCT
     }
 
-    /// β of the pixels of row `row`, by pixel, component and channel; 0 where nothing is known.
+    /// β of the pixels of row `row`, by pixel, component and channel; 0 without data.
     pub fn coefficients(&self, row: usize, memory: &mut Memory, beta: &mut Vec<f32>) {
         let (len, width) = (self.equations.len(), self.equations.coefficients());
         let Memory { terms, sums, scales } = memory;
@@ -180,7 +181,7 @@ impl Picture {
         }
     }
 
-    /// Adds pixel `q`, whose neighbours are `around`, as a sample.
+    /// Adds pixel `q`, with the neighbourhood `around`, as a sample.
     fn add_pixel(&self, q: usize, around: &Around, sums: &mut [f32]) {
         let m = self.equations.components();
         let mut columns = [(0, 0.0); super::MAX_COMPONENTS];
@@ -194,8 +195,9 @@ impl Picture {
         self.equations.add_sparse(sums, &columns[..m], y);
     }
 
-    /// Sums the pixels around `p` that are like it, of which those not next to it have `terms`, from the pixel `first`
-    /// on. Controls are in units of their root mean square, whose inverse is returned; 0 if there are none.
+    /// Sums over the pixels around `p` that are similar to it. `terms` are the precomputed terms of pixels that are not
+    /// direct neighbours, starting at pixel `first`. Controls are scaled by the inverse of their root mean square,
+    /// which is returned; 0 without pixels.
     fn sum_around(&self, p: usize, (first, terms): (usize, &[f32]), sums: &mut [f32]) -> f32 {
         let Some(light) = self.around[p].light() else { return 0.0 };
         let len = self.equations.len();
@@ -223,7 +225,7 @@ impl Picture {
         1.0 / unit
     }
 
-    /// Σ β_j c̄_j of pixel `i`, which is to be subtracted from ȳ, by channel; `beta` is that of the pixel.
+    /// Σ β_j c̄_j of pixel `i`, to be subtracted from ȳ, by channel; `beta` are the coefficients of the pixel.
     pub fn correction(&self, i: usize, beta: &[f32]) -> [f32; 3] {
         let m = self.equations.components();
         correction(&self.controls[i * m..][..m], beta)

@@ -1,48 +1,46 @@
-//! β from the sums of many shading points at once, a point per lane: small symmetric systems.
+//! β from the sums of many shading points at once, one point per lane: small symmetric systems.
 //!
-//! The factorisation is LDLᵀ without pivots. A column whose pivot is rounding is dropped.
+//! The factorisation is LDLᵀ without pivoting. A column whose pivot is rounding is dropped.
 //!
-//! Lanes are arrays, of whose loops the compiler makes vector code: the loops over columns are too many to be unrolled
-//! for every level of a dispatch.
+//! Lanes are arrays, whose loops the compiler vectorises. There are too many loops over columns to unroll them for
+//! every level of a dispatch.
 
 use super::ldlt::MAX_COMPONENTS;
 use super::normal::NormalEquations;
 use std::ops::{Add, AddAssign, Div, Mul, MulAssign, Sub, SubAssign};
 
-/// Points that are solved together.
+/// Number of points that are solved together.
 const LANES: usize = 8;
 
-/// Part of its diagonal below which a pivot is rounding.
+/// Fraction of the diagonal below which a pivot is rounding.
 const DEPENDENT: f32 = 1e-5;
 
-/// Part of Σ c² below which Σ (c − c̄)² is rounding.
+/// Fraction of Σ c² below which Σ (c − c̄)² is rounding.
 const CONSTANT: f32 = 1e-6;
 
-/// Which system is made of the sums.
+/// The matrix of the system.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Matrix {
     /// Σ c_j c_k: columns of mean 0.
     KnownMeans,
     /// Σ (c_j − c̄_j)(c_k − c̄_k), as in a regression with an intercept.
     SampleMeans,
-    /// Σ c_j c_k with a column of ones in place of the last one.
+    /// Σ c_j c_k with a column of ones instead of the last one.
     Intercept,
 }
 
-/// The system whose solution β is, and how it is held back where samples are few: β = 0 is MIS, and so is every
-/// multiple of α.
+/// The system with the solution β, and its regularisation for few samples: β = 0 is MIS, and so is every multiple of α.
 ///
-/// The columns c_j are dimensionless and of order one, so that the ridge is a number of samples, and scaling f scales
-/// β.
+/// The columns c_j are dimensionless and of order one, so that the ridge is a number of samples, and β scales with f.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct System {
     /// The matrix.
     pub matrix: Matrix,
     /// λ of λ Σ β_j², in samples whose columns have a mean square of one.
     pub ridge: f32,
-    /// κ of the factor max(0, 1 − κ σ² p/T) of each channel [James and Stein 1961]: T is what β explains of the sum of
-    /// squares of y, p = tr (C + λ1)⁻¹C the number of effective coefficients, and σ² what is not explained, by degree
-    /// of freedom n − 1 − p; 0 if fewer than half a degree is left. κ = 0 is no factor.
+    /// κ of the factor max(0, 1 − κ σ² p/T) of each channel [James and Stein 1961]. T is the part of the sum of squares
+    /// of y that β explains, p = tr (C + λ1)⁻¹C is the number of effective coefficients, and σ² is the unexplained part
+    /// per degree of freedom n − 1 − p. The factor is 0 if fewer than half a degree is left. κ = 0 disables it.
     pub shrink: f32,
 }
 
@@ -50,21 +48,21 @@ impl System {
     /// Plain least squares with an intercept.
     pub const LEAST_SQUARES: System = System { matrix: Matrix::SampleMeans, ridge: 0.0, shrink: 0.0 };
 
-    /// For β that is applied to the samples it was fitted to.
+    /// For β that is applied to the samples it is fitted to.
     pub const SAME_SAMPLES: System = System { matrix: Matrix::SampleMeans, ridge: 1.0, shrink: 0.0 };
 
-    /// For β that is applied to other samples. Chosen by measurement, see `docs/measurements/ocv`: the smallest that
-    /// keeps the first four passes within 2 % of MIS where nothing is to be gained.
+    /// For β that is applied to other samples. Chosen by measurement, see `docs/measurements/ocv`: the weakest
+    /// regularisation that keeps the first four passes within 2 % of MIS if control variates do not reduce variance.
     pub const OTHER_SAMPLES: System = System { matrix: Matrix::KnownMeans, ridge: 4.0, shrink: 1.0 };
 
-    /// Equation (11) of the paper, λ = 1. The penalty draws the intercept, which is most of the estimate, to 0 as well.
+    /// Equation (11) of the paper, λ = 1. The penalty shrinks the intercept, which is most of the estimate, as well.
     pub const PAPER: System = System { matrix: Matrix::Intercept, ridge: 1.0, shrink: 0.0 };
 }
 
 impl NormalEquations {
-    /// Solves the system of each row of `sums` and writes `beta[coefficients·row + 3 j + channel]`, 0 where a solution
-    /// is not finite. Returns the number of ill-conditioned systems: those without a finite solution, and those that
-    /// dropped a column which is not 0 in all samples.
+    /// Solves the system of each row of `sums` and writes `beta[coefficients·row + 3 j + channel]`, 0 if a solution is
+    /// not finite. Returns the number of ill-conditioned systems: systems without a finite solution, and systems in
+    /// which a column that is not 0 in all samples was dropped.
     pub fn solve(self, system: System, sums: &[f32], beta: &mut [f32]) -> usize {
         let (len, width) = (self.len(), self.coefficients());
         if width == 0 {
@@ -86,7 +84,7 @@ impl NormalEquations {
     }
 }
 
-/// A number of each point.
+/// One number per point.
 #[derive(Clone, Copy)]
 struct F([f32; LANES]);
 
@@ -152,7 +150,7 @@ macro_rules! assignments {
 }
 assignments!(AddAssign add_assign +, SubAssign sub_assign -, MulAssign mul_assign *);
 
-/// Sums of [`LANES`] points from `first` on; past the `last` one, of that one.
+/// Sums of [`LANES`] points from `first` on; lanes after the `last` point repeat it.
 struct Lanes<'a> {
     equations: NormalEquations,
     sums: &'a [f32],
@@ -171,7 +169,7 @@ impl Lanes<'_> {
         F(v)
     }
 
-    /// Σ c_j², n for a column of ones.
+    /// Σ c_j²; n for a column of ones.
     fn squares(&self, system: System) -> [F; MAX_COMPONENTS] {
         let m = self.equations.components();
         let mut squares = [F::ZERO; MAX_COMPONENTS];
@@ -185,7 +183,7 @@ impl Lanes<'_> {
     }
 }
 
-/// Coefficients by column and channel, and which systems are ill-conditioned.
+/// Coefficients by column and channel, and flags of ill-conditioned systems.
 fn solve_lanes(lanes: &Lanes<'_>, system: System) -> ([F; 3 * MAX_COMPONENTS], [bool; LANES]) {
     let (m, values) = (lanes.equations.components(), lanes.equations.values());
     let (zero, one) = (F::ZERO, F::ONE);
@@ -196,7 +194,7 @@ fn solve_lanes(lanes: &Lanes<'_>, system: System) -> ([F; 3 * MAX_COMPONENTS], [
     let left = n - 1.0 - factors.effective(m, system.ridge);
 
     let mut x = [zero; 3 * MAX_COMPONENTS];
-    // What is not finite in the system or in a solution makes this NaN, whatever is dropped or shrunk to 0.
+    // NaN if anything in the system or in a solution is not finite, even if it is dropped or shrunk to 0.
     let mut sum = zero;
     for j in 0..m {
         for k in 0..=j {
@@ -276,7 +274,7 @@ fn assemble(lanes: &Lanes<'_>, system: System, per_n: F) -> (Triangle, [[F; MAX_
     (a, b)
 }
 
-/// L below the diagonal, and 1/D, which is 0 for columns that are dropped.
+/// L below the diagonal, and 1/D, which is 0 for dropped columns.
 struct Factors {
     l: Triangle,
     per_d: [F; MAX_COMPONENTS],
@@ -307,7 +305,7 @@ fn factorise(m: usize, a: &Triangle, ridge: f32) -> Factors {
 }
 
 impl Factors {
-    /// L D Lᵀ x = b, 0 for columns that were dropped.
+    /// Solves L D Lᵀ x = b; 0 for dropped columns.
     fn solve(&self, m: usize, b: &[F; MAX_COMPONENTS]) -> [F; MAX_COMPONENTS] {
         let mut x = *b;
         for j in 0..m {
@@ -324,7 +322,8 @@ impl Factors {
         x
     }
 
-    /// Where a column takes no part though its sum of squares is not 0: it is constant, or depends on those before it.
+    /// True if a column is dropped although its sum of squares is not 0: it is constant, or linearly dependent on
+    /// earlier ones.
     fn drops(&self, squares: &[F; MAX_COMPONENTS], a: &Triangle) -> [bool; LANES] {
         let mut drops = [false; LANES];
         for (j, squares) in squares.iter().enumerate() {
@@ -335,7 +334,7 @@ impl Factors {
         drops
     }
 
-    /// rank − λ tr A⁻¹, by the columns of L⁻¹.
+    /// rank − λ tr A⁻¹, from the columns of L⁻¹.
     fn effective(&self, m: usize, ridge: f32) -> F {
         let (zero, one) = (F::ZERO, F::ONE);
         let (mut rank, mut trace) = (zero, zero);
@@ -363,7 +362,7 @@ mod tests {
     const LENGTHS: [usize; 8] = [0, 1, 3, 7, 8, 9, 23, 32];
     const MATRICES: [Matrix; 3] = [Matrix::KnownMeans, Matrix::SampleMeans, Matrix::Intercept];
 
-    /// Rows of sums of `n` samples each, whose columns `column` changes.
+    /// Rows of sums of `n` samples each; `column` modifies the columns.
     fn rows(m: usize, points: usize, n: usize, column: fn(&mut [f32], f32)) -> (NormalEquations, Vec<f32>) {
         let equations = NormalEquations::new(m);
         let (mut sums, mut stream) = (vec![0.0; points * equations.len()], pcg32([m as u32, n as u32, 3]));
@@ -416,7 +415,7 @@ mod tests {
             assert_eq!(count(matrix, 0.0, |c, _| c[2] = c[0] - 0.5 * c[1]), 11, "{matrix:?}");
             assert_eq!(count(matrix, 0.0, |c, u| c[2] = u), 0, "{matrix:?}");
             assert_eq!(count(matrix, 0.0, |c, _| c[2] = 0.0), 0, "{matrix:?}");
-            // The penalty makes the columns independent
+            // The penalty makes the columns linearly independent
             assert_eq!(count(matrix, 1.0, |c, _| c[2] = c[0] - 0.5 * c[1]), 0, "{matrix:?}");
         }
         assert_eq!([0.0, 1.0].map(|ridge| count(Matrix::SampleMeans, ridge, |c, _| c[2] = 1.5)), [11, 11]);

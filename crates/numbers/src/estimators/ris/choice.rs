@@ -1,25 +1,25 @@
-//! Sample counts: the numbers of proposals M and samples N of least variance in a given time.
+//! Sample counts: the numbers of proposals M and samples N with the least variance in a given time.
 //!
 //! Symbols: T time to spend; T1 time of a proposal, T2 of a sample (tracing its ray); K = M/N;
 //! V(f/p) = [`Variances::proposals`], V(f/q) = [`Variances::samples`] with q = q̂/∫q̂.
 //!
-//! N draws of M common proposals cost M T1 + N T2 and have variance V(f/p)/M + (1 − 1/M) V(f/q)/N (thesis 4.2). It is
-//! least at
+//! N draws from M common proposals cost M T1 + N T2 and have the variance V(f/p)/M + (1 − 1/M) V(f/q)/N (thesis 4.2).
+//! Its minimum is at
 //!
 //! K = (T2/T1) √[ (V(f/p) T/T2 − V(f/q)) / (V(f/q) T/T1 − V(f/q)) ]  (thesis 4.3),
 //!
-//! and K̄ = T2/T1 (thesis 4.4), equal time for proposals and samples, at most doubles the variance without knowing any,
-//! if V(f/q) ≤ V(f/p); if the target is worse than p and M is small, it can be more (2.4 times was seen).
-//! N independent sets of M proposals cost N (M T1 + T2) and have variance [(e3 − e2)/M + (e2 − e1)]/N (paper 2), least
-//! at M = √[ |e3 − e2| T2 / (|e2 − e1| T1) ] (paper 3), with
+//! K̄ = T2/T1 (thesis 4.4), with equal time for proposals and samples, needs no variances. It at most doubles the
+//! variance if V(f/q) ≤ V(f/p); if the target is worse than p and M is small, the factor can be larger (2.4 was
+//! measured). N independent sets of M proposals cost N (M T1 + T2) and have the variance [(e3 − e2)/M + (e2 − e1)]/N
+//! (paper 2), with the minimum at M = √[ |e3 − e2| T2 / (|e2 − e1| T1) ] (paper 3), with
 //!
 //! e1 = E(f/p)²,  e2 = E(f²/(q̂p)) E(q̂/p),  e3 = E(f²/p²);  V(f/p) = e3 − e1,  V(f/q) = e2 − e1.
 //!
-//! A colour has three variances; the length of the vector (l² norm) stands for them, as in the paper. That is exact for
-//! one channel. For three it is near: lengths of sums are shorter than sums of lengths, most of all in (paper 3), where
-//! a channel that q̂ fits worse than p does has e3 < e2.
+//! A colour has three variances, which are replaced by the length of the vector (l² norm), as in the paper. This is
+//! exact for one channel and approximate for three: lengths of sums are shorter than sums of lengths, most of all in
+//! (paper 3) if a channel that q̂ fits worse than p has e3 < e2.
 
-/// Time of a proposal and of a sample (s). Only their ratio to each other and to the time to spend matters.
+/// Time of a proposal and of a sample (s). Only their ratios to each other and to the available time matter.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Costs {
     /// T1: generate a proposal and compute its weight (s).
@@ -29,14 +29,14 @@ pub struct Costs {
 }
 
 impl Costs {
-    /// K̄ = T2/T1 [Talbot 2005, Eq. 4.4; Talbot et al. 2005, Eq. 4]; 1 if that is not a number.
+    /// K̄ = T2/T1 [Talbot 2005, Eq. 4.4; Talbot et al. 2005, Eq. 4]; 1 if the ratio is undefined.
     pub fn robust_ratio(self) -> f64 {
         let ratio = self.t2 / self.t1;
         if ratio >= 0.0 { ratio } else { 1.0 }
     }
 }
 
-/// Variances of one proposal's f/p and of one perfect sample's f/q, as one number each.
+/// Variances of one proposal's f/p and of one ideal sample's f/q, as one number each.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Variances {
     /// V(f/p).
@@ -62,7 +62,7 @@ pub fn length(v: [f64; 3]) -> f64 {
     v.iter().map(|x| x * x).sum::<f64>().sqrt()
 }
 
-/// Numbers of proposals and of samples, each at least 1.
+/// Numbers of proposals and samples, each at least 1.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Counts {
     /// Proposals, at least as many as samples ([`counts`]), or proposals per set ([`counts_of_sets`]).
@@ -71,11 +71,11 @@ pub struct Counts {
     pub n: u32,
 }
 
-/// Numbers are held below this, so that they fit and stay exact.
+/// Upper bound of the numbers, so that they fit and are exact in f32.
 const MAX_COUNT: f64 = 16_777_216.0;
 
-/// Optimal K = M/N for `time` seconds, before clamping [Talbot 2005, Eq. 4.3]: infinite if V(f/q) = 0 (one sample will
-/// do), 0 if proposals should not be more than samples, K̄ if nothing varies.
+/// Optimal K = M/N for `time` seconds, before clamping [Talbot 2005, Eq. 4.3]: infinite if V(f/q) = 0 (one sample
+/// suffices), 0 if there should not be more proposals than samples, K̄ if nothing varies.
 pub fn optimal_ratio(costs: Costs, variances: Variances, time: f64) -> f64 {
     let robust = costs.robust_ratio();
     let gain = variances.proposals * time / costs.t2 - variances.samples;
@@ -90,8 +90,8 @@ pub fn optimal_ratio(costs: Costs, variances: Variances, time: f64) -> f64 {
 /// M and N for a ratio K = M/N and `time` seconds [Talbot 2005, Section 4.3]:
 /// K̃ = max(min(K, (T − T2)/T1), 1), N = ⌊T/(K̃ T1 + T2) + u₀⌋, M = ⌊N K̃ + u₁⌋.
 ///
-/// The expectations are N = T/(K̃ T1 + T2) and M = K̃ N, so the expected time is T, unless T < T1 + T2: one of each is
-/// made then. The thesis uses one random number for both roundings, which are then dependent; two keep both
+/// The expectations are N = T/(K̃ T1 + T2) and M = K̃ N, so the expected time is T. If T < T1 + T2, both are 1. The
+/// thesis uses one random number for both roundings, which makes them dependent; two random numbers keep both
 /// expectations.
 pub fn counts(ratio: f64, costs: Costs, time: f64, u: [f32; 2]) -> Counts {
     let ratio = clamp_ratio(ratio, costs, time);
@@ -99,7 +99,8 @@ pub fn counts(ratio: f64, costs: Costs, time: f64, u: [f32; 2]) -> Counts {
     Counts { m: round(f64::from(n) * ratio, u[1]).max(n), n }
 }
 
-/// K̃ = max(min(K, (T − T2)/T1), 1): at least one sample can be paid for, and no more samples than proposals.
+/// K̃ = max(min(K, (T − T2)/T1), 1): there is time for at least one sample, and there are no more samples than
+/// proposals.
 pub fn clamp_ratio(ratio: f64, costs: Costs, time: f64) -> f64 {
     let max = (time - costs.t2) / costs.t1;
     ratio.min(max).clamp(1.0, MAX_COUNT)
@@ -133,9 +134,9 @@ impl Moments {
         std::array::from_fn(|i| (by_m[i] / m + by_n[i]) / n)
     }
 
-    /// Optimal M of independent sets, before clamping [Talbot et al. 2005, Eq. 3]: infinite if V(f/q) = 0, K̄ if
-    /// nothing varies, and 1 if a second proposal makes the variance longer, which the length |e3 − e2| does not tell
-    /// (q̂ fits f worse than p does).
+    /// Optimal M of independent sets, before clamping [Talbot et al. 2005, Eq. 3]: infinite if V(f/q) = 0, and K̄ if
+    /// nothing varies. 1 if a second proposal increases the length of the variance (q̂ fits f worse than p does), which
+    /// the length |e3 − e2| does not show.
     pub fn optimal_set_size(&self, costs: Costs) -> f64 {
         // Half of −d|V|²/dM at M = 1.
         let (by_m, variance) = (difference(self.e3, self.e2), difference(self.e3, self.e1));
@@ -154,7 +155,7 @@ fn difference(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
 }
 
 /// Size M and number N of independent sets for `time` seconds [Talbot et al. 2005, Section 4.2]: M ≥ 1, N = T/(M T1 +
-/// T2) ≥ 1, and with that N again M = (T/N − T2)/T1; rounded by `u` so that the expected values stay.
+/// T2) ≥ 1, and again M = (T/N − T2)/T1 with this N; rounded stochastically by `u`.
 pub fn counts_of_sets(size: f64, costs: Costs, time: f64, u: [f32; 2]) -> Counts {
     let size = size.clamp(1.0, MAX_COUNT);
     let n = (time / (size * costs.t1 + costs.t2)).clamp(1.0, MAX_COUNT);
@@ -162,7 +163,7 @@ pub fn counts_of_sets(size: f64, costs: Costs, time: f64, u: [f32; 2]) -> Counts
     Counts { m: round(size, u[1]), n: round(n, u[0]) }
 }
 
-/// Running estimate of [`Moments`] from proposals whose f was evaluated in full. Sums of several can be merged.
+/// Running estimate of [`Moments`] from proposals with fully evaluated f. Several can be merged.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct MomentsEstimate {
     count: u64,
@@ -180,8 +181,8 @@ impl MomentsEstimate {
         MomentsEstimate { count: 0, f: [0.0; 3], f2: [0.0; 3], a: [0.0; 3], w: 0.0 }
     }
 
-    /// Adds one proposal by f/p = c_j M (per channel) and q̂/p = w_j M. Where the weight is 0, f must be 0 (it could
-    /// never be drawn); it counts as 0 then.
+    /// Adds one proposal by f/p = c_j M (per channel) and q̂/p = w_j M. f must be 0 where the weight is 0, since the
+    /// proposal could never be drawn; it counts as 0 then.
     pub fn add(&mut self, f_over_p: [f64; 3], q_hat_over_p: f64) {
         self.count += 1;
         if !(q_hat_over_p > 0.0) {
@@ -219,8 +220,8 @@ impl MomentsEstimate {
         self.count
     }
 
-    /// The moments, unbiased: products of means are those over pairs of different proposals,
-    /// E(X)E(Y) ≈ (ΣX ΣY − ΣXY)/(n(n − 1)). `None` with fewer than two proposals.
+    /// The moments, unbiased: products of means are estimated over pairs of different proposals, E(X)E(Y) ≈ (ΣX ΣY −
+    /// ΣXY)/(n(n − 1)). `None` with fewer than two proposals.
     pub fn moments(&self) -> Option<Moments> {
         if self.count < 2 {
             return None;
@@ -297,7 +298,7 @@ mod tests {
             const GRID: u32 = 400;
             let mut spent = 0.0;
             for k in 0..GRID {
-                // Independent enough: all pairs of a grid of 20 by 20.
+                // Sufficiently independent: all pairs of a 20 × 20 grid.
                 let u = [(k % 20) as f32 / 20.0 + 0.025, (k / 20) as f32 / 20.0 + 0.025];
                 let c = counts_of_sets(size, costs, time, u);
                 prop_assert!(c.m >= 1 && c.n >= 1);

@@ -1,16 +1,18 @@
 //! Draws N of M proposals by weight; each draw is one [`Draw`] with the scale that keeps the estimate unbiased.
 //!
-//! | function | E[times that j is drawn] | scale | a proposal can come | source |
+//! | function | E[times that j is drawn] | scale | draws of a proposal | source |
 //! |---|---|---|---|---|
 //! | [`with_replacement`] | N w_j/S | S/(N w_j) | up to N times | thesis (4.1) |
 //! | [`systematic`] | N w_j/S | S/(N w_j) | ⌊N w_j/S⌋ or ⌈N w_j/S⌉ times | [Kitagawa 1996] |
 //! | [`stratified`] | w_j/S_k | S_k/w_j | once | thesis (4.5); paper (1) |
 //!
-//! S is the sum of all weights, S_k that of stratum k. A weight that is not positive and finite counts as 0; such a
-//! proposal is never drawn, and nothing is drawn if there is no other. Uniform numbers outside 0..1 are clamped.
+//! S is the sum of all weights, S_k the sum of stratum k. Weights that are not positive and finite count as 0.
+//! Proposals of weight 0 are never drawn; if all weights are 0, nothing is drawn. Uniform numbers outside 0..1 are
+//! clamped.
 //!
-//! Weights are summed in f32 within blocks of eight and in f64 across blocks, always in the same order: equal arguments
-//! give equal bits, and a probability is off by about 1e-7 of its block's, which is the step of a uniform f32.
+//! Weights are summed in f32 within blocks of eight and in f64 across blocks, always in the same order. Equal arguments
+//! therefore give bit-identical results, and the error of a probability is about 1e-7 of its block's, which is the
+//! spacing of a uniform f32.
 
 use crate::math::ONE_MINUS_EPSILON;
 use crate::math::number::Number;
@@ -24,32 +26,32 @@ pub struct Draw {
     pub scale: f32,
 }
 
-/// Proposals that are summed together: sums within a block do not wait for the block before.
+/// Size of a block of proposals; sums within a block do not depend on the block before.
 const BLOCK: usize = 8;
 
-/// Most cells that [`with_replacement`] searches; up to 512 proposals a cell is one block.
+/// Maximum number of cells that [`with_replacement`] searches; up to 512 proposals a cell is one block.
 const CELLS: usize = 64;
 
-/// Factor of the weights where their sum in f32 would overflow.
+/// Factor of the weights if their sum overflows in f32.
 const DOWN: f32 = 1.0 / 1024.0;
 
 type Block = [f32; BLOCK];
 
-/// The weight q̂·r of a proposal, or of several; 0 if that is not finite.
+/// The weight q̂·r of a proposal, or of several; 0 if it is not finite.
 #[inline(always)]
 pub fn weight<N: Number>(q_hat: N, r: N) -> N {
     let w = q_hat * r;
     w.finite_or(w.constant(0.0))
 }
 
-/// The weight that counts: 0 for NaN, infinite and negative weights.
+/// The effective weight: 0 for NaN, infinite and negative weights.
 #[inline(always)]
 pub(super) fn clean(weight: f32) -> f32 {
     if weight > 0.0 && weight <= f32::MAX { weight } else { 0.0 }
 }
 
-/// The weights of a block in halves of a vector each. Unless `LARGE`, infinity is let through, for one instruction per
-/// vector; the infinite sum then asks for `LARGE`, where each weight is cleaned and times [`DOWN`].
+/// The weights of a block, as two half vectors. Unless `LARGE`, infinity is not removed, which saves instructions; an
+/// infinite sum then requires `LARGE`, where each weight is cleaned and multiplied by [`DOWN`].
 #[inline(always)]
 fn load<const LARGE: bool>(w: &Block) -> ([f32; 4], [f32; 4]) {
     let at = |i: usize| if LARGE { clean(w[i]) * DOWN } else { positive(w[i]) };
@@ -73,11 +75,11 @@ fn block_sum<const LARGE: bool>(w: &Block) -> f64 {
     f64::from((sum[0] + sum[2]) + (sum[1] + sum[3]))
 }
 
-/// Index within the block of the proposal in whose part of the cumulative weight `threshold` falls. The block has
-/// weight.
+/// Index within the block of the proposal whose part of the cumulative weight contains `threshold`. The block must have
+/// a positive weight.
 #[inline(always)]
 fn search_block<const LARGE: bool>(w: &Block, threshold: f32) -> usize {
-    // Prefix sums that never fall: pairs, then fours, then eight.
+    // Monotonic prefix sums: pairs, then fours, then eight.
     let prefix = |v: [f32; 4]| {
         let pairs = add(v, [0.0, v[0], 0.0, v[2]]);
         add(pairs, [0.0, 0.0, pairs[1], pairs[1]])
@@ -88,18 +90,18 @@ fn search_block<const LARGE: bool>(w: &Block, threshold: f32) -> usize {
 
     let below = |bounds: &[f32]| bounds.iter().map(|&b| u32::from(b <= threshold)).sum::<u32>();
     let i = (below(&low) + below(&high[..3])) as usize % BLOCK;
-    // A finite sum holds no infinite weight.
+    // A finite sum contains no infinite weight.
     let has_weight = if LARGE { clean(w[i]) > 0.0 } else { w[i] > 0.0 };
     if has_weight { i } else { last(w).unwrap_or(i) }
 }
 
-/// Index of the last proposal that has weight: where a threshold falls that rounding put at the end.
+/// Index of the last proposal with a positive weight, for a threshold that was rounded to the end.
 #[cold]
 fn last(weights: &[f32]) -> Option<usize> {
     weights.iter().rposition(|&w| clean(w) > 0.0)
 }
 
-/// Weights in whole blocks, and the rest filled up with zeros.
+/// Weights in whole blocks, and the zero-padded rest.
 struct Blocks<'a> {
     whole: &'a [Block],
     rest: Option<Block>,
@@ -121,20 +123,20 @@ impl<'a> Blocks<'a> {
     }
 }
 
-/// A uniform number as f64 in [0, 1); what is outside is clamped, NaN is 0.
+/// A uniform number as f64, clamped to [0, 1); NaN becomes 0.
 #[inline(always)]
 fn unit(u: f32) -> f64 {
     if u > 0.0 { f64::from(u.min(ONE_MINUS_EPSILON)) } else { 0.0 }
 }
 
-/// A sum in the units of the weights.
+/// A sum in units of the weights.
 #[inline(always)]
 fn unscaled<const LARGE: bool>(sum: f64) -> f64 {
     if LARGE { sum / f64::from(DOWN) } else { sum }
 }
 
-/// The draw of proposal `index`, whose weight is `weight`, when `sum_per_draw` is S/N. The scale is kept finite; what
-/// it multiplies is of the order of the weight.
+/// The draw of proposal `index` with the weight `weight`; `sum_per_draw` is S/N. The scale is clamped to finite values;
+/// its factors are of the order of the weight.
 #[inline(always)]
 fn draw(index: usize, weight: f32, sum_per_draw: f64) -> Draw {
     Draw { index: index as u32, scale: (sum_per_draw / f64::from(weight)).min(f64::from(f32::MAX)) as f32 }
@@ -161,7 +163,7 @@ fn invert<const LARGE: bool>(weights: &[f32], blocks: &Blocks<'_>, sum: f64, u: 
     }
     let whole = blocks.whole;
 
-    // Keep the cumulative weight at the ends of cells of whole blocks.
+    // Store the cumulative weight at the ends of cells of whole blocks.
     let per_cell = whole.len().div_ceil(CELLS).max(1);
     let (mut ends, mut cells, mut end) = ([0.0; CELLS], 0, 0.0);
     for cell in whole.chunks(per_cell) {
@@ -170,7 +172,7 @@ fn invert<const LARGE: bool>(weights: &[f32], blocks: &Blocks<'_>, sum: f64, u: 
         cells += 1;
     }
 
-    // Invert: find the cell, then the block, then the proposal.
+    // Invert by cell, block, and proposal.
     let sum_per_draw = unscaled::<LARGE>(sum) / u.len() as f64;
     out.reserve(u.len());
     for &u in u {
@@ -197,23 +199,24 @@ fn invert<const LARGE: bool>(weights: &[f32], blocks: &Blocks<'_>, sum: f64, u: 
     }
 }
 
-/// N draws by one uniform number: the proposals in which the thresholds (k+u)S/N of the cumulative weight fall, k < N,
-/// in rising order; scale = S/(N w_j) [Kitagawa 1996]. A proposal can come several times, if w_j > S/N. O(M + N).
+/// N draws by one uniform number: the proposals whose parts of the cumulative weight contain the thresholds (k+u)S/N, k
+/// < N, in ascending order; scale = S/(N w_j) [Kitagawa 1996]. A proposal can be drawn several times if w_j > S/N.
+/// O(M + N).
 ///
-/// The N draws spread evenly over the proposals in their order. If neighbours are alike, the variance is below that of
-/// [`with_replacement`]; there is no formula for it, and no guarantee, as the draws are not independent.
+/// The N draws are evenly distributed over the ordered proposals. If neighbours are similar, the variance is lower than
+/// with [`with_replacement`]. There is no formula and no guarantee for it, since the draws are not independent.
 pub fn systematic(weights: &[f32], n: u32, u: f32, out: &mut Vec<Draw>) {
     out.clear();
     draw_evenly(weights, 0, n, u, out);
 }
 
-/// One draw per stratum of consecutive proposals; scale = S_k/w_j, exactly 1 for a stratum of one proposal
-/// [Talbot 2005, Eq. 4.5]. `ends[k]` is the end (exclusive) of stratum k, and `u[k]` its uniform number; a stratum
-/// without weight draws nothing. O(M).
+/// One draw per stratum of consecutive proposals; scale = S_k/w_j, exactly 1 for a stratum of one proposal [Talbot
+/// 2005, Eq. 4.5]. `ends[k]` is the end (exclusive) of stratum k, and `u[k]` its uniform number. A stratum of weight 0
+/// draws nothing. O(M).
 ///
-/// With M strata the estimate is that of plain Monte Carlo, bit for bit if the sum is formed in the same order.
-/// Proposals after the last end are in no stratum, and their part of the integral would be missing. With strata of
-/// equal numbers of independent proposals this is one draw from each of n independent sets [Talbot et al. 2005, Eq. 1].
+/// With M strata the estimate is plain Monte Carlo, bit-identical if summed in the same order. Proposals after the last
+/// end are in no stratum, and would be missing from the integral. With strata of equal numbers of independent
+/// proposals, this is one draw from each of n independent sets [Talbot et al. 2005, Eq. 1].
 pub fn stratified(weights: &[f32], ends: &[u32], u: &[f32], out: &mut Vec<Draw>) {
     out.clear();
     let mut begin = 0;
@@ -224,7 +227,7 @@ pub fn stratified(weights: &[f32], ends: &[u32], u: &[f32], out: &mut Vec<Draw>)
     }
 }
 
-/// Appends the draws of thresholds (k+u)S/n; `offset` is the index of the first of `weights`.
+/// Appends the draws for the thresholds (k+u)S/n; `offset` is the index of the first of `weights`.
 #[inline]
 fn draw_evenly(weights: &[f32], offset: usize, n: u32, u: f32, out: &mut Vec<Draw>) {
     if n == 1 && weights.len() < BLOCK {
@@ -240,14 +243,14 @@ fn draw_evenly(weights: &[f32], offset: usize, n: u32, u: f32, out: &mut Vec<Dra
     }
 }
 
-/// One draw of fewer proposals than a block, in f64. The sum of one weight is that weight, so that its scale is 1.
+/// One draw from fewer proposals than a block, in f64. The sum of a single weight equals the weight, so its scale is 1.
 #[inline]
 fn draw_of_few(weights: &[f32], offset: usize, u: f32) -> Option<Draw> {
     let sum: f64 = weights.iter().map(|&w| f64::from(clean(w))).sum();
     let threshold = unit(u) * sum;
     let (mut chosen, mut end) = (None, 0.0);
     for (i, &w) in weights.iter().enumerate() {
-        // Of the proposals that have weight, the last that begins at or below the threshold.
+        // The last proposal with a positive weight that begins at or below the threshold.
         chosen = if clean(w) > 0.0 && end <= threshold { Some(i) } else { chosen };
         end += f64::from(clean(w));
     }
@@ -263,7 +266,7 @@ fn step_through<const LARGE: bool>(blocks: &Blocks<'_>, sum: f64, [n, offset]: [
     let sum_per_draw = unscaled::<LARGE>(step);
     out.reserve(n as usize);
 
-    // Go through the blocks and, where thresholds fall, into them.
+    // Traverse the blocks, and those that contain thresholds in detail.
     let (mut k, mut threshold, mut below) = (0, u * step, 0.0);
     for i in 0..=blocks.whole.len() {
         let Some(block) = blocks.whole.get(i).or(blocks.rest.as_ref()) else { break };
@@ -277,7 +280,7 @@ fn step_through<const LARGE: bool>(blocks: &Blocks<'_>, sum: f64, [n, offset]: [
         below = end;
     }
 
-    // With so many draws that f64 does not tell thresholds apart, the last can round up to the sum.
+    // With very many draws, the last threshold can round up to the sum.
     let of = blocks.whole.as_flattened();
     let rest = blocks.rest.as_slice().as_flattened();
     if k < n
@@ -295,7 +298,7 @@ mod tests {
 
     const EDGES: [f32; 4] = [0.0, 0.5, ONE_MINUS_EPSILON, f32::NAN];
 
-    /// The draws of every function with the same number u everywhere and n samples (or strata).
+    /// The draws of every function, with the same number u everywhere and n samples (or strata).
     fn all_ways(weights: &[f32], n: usize, u: f32) -> [Vec<Draw>; 3] {
         let mut draws = [Vec::new(), Vec::new(), Vec::new()];
         let us = vec![u; n];
@@ -371,7 +374,7 @@ mod tests {
         let indices: Vec<u32> = draws.iter().map(|d| d.index).collect();
         assert_eq!(indices, [2, 3, 6, 8, 9]);
         assert!(draws.iter().all(|d| (d.scale - 1.0).abs() < 1e-6), "{draws:?}");
-        // A number of 0 falls on the first proposal, however small: its scale is held finite.
+        // A number of 0 selects the first proposal, however small: its scale is clamped to finite values.
         with_replacement(&[1e-30, 1e30], &[0.0], &mut draws);
         assert_eq!(draws, [Draw { index: 0, scale: f32::MAX }]);
     }
@@ -389,8 +392,8 @@ mod tests {
     }
 
     proptest! {
-        /// Over a grid of u, each proposal comes N w/S times in the mean and ⌊⌋ or ⌈⌉ of that each time, and the scale
-        /// is one over it.
+        /// Over a grid of u, each proposal is drawn N w/S times on average and ⌊⌋ or ⌈⌉ of that each time, and the
+        /// scale is the inverse.
         #[test]
         fn systematic_draws_each_proposal_as_often_as_its_weight_says(weights in weights(), n in 1_u32..20) {
             const GRID: u32 = 2048;
@@ -439,7 +442,7 @@ mod tests {
             }
         }
 
-        /// Whatever the weights are, only valid proposals are drawn, and all strata with weight draw.
+        /// For any weights, only valid proposals are drawn, and all strata of positive weight draw.
         #[test]
         fn invalid_weights_are_never_drawn(
             bits in prop::collection::vec(any::<u32>(), 0..80), n in 0_usize..20, u in 0.0_f32..1.0,
@@ -454,7 +457,7 @@ mod tests {
             }
         }
 
-        /// One set with one draw is the same proposal in all ways of drawing.
+        /// With one set and one draw, all functions draw the same proposal.
         #[test]
         fn one_draw_is_the_same_in_all_ways(weights in weights(), u in 0.0_f32..1.0) {
             let [a, b, c] = all_ways(&weights, 1, u);

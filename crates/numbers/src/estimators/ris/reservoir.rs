@@ -1,24 +1,23 @@
-//! One of a stream of weighted things whose number is not known before, in one pass [Chao 1982]: thing j takes the
-//! place of what is kept with the probability w_j/(w_0 + … + w_j), so that each is kept in the end with its part of the
-//! whole weight.
+//! Reservoir sampling: one item of a weighted stream of unknown length, in one pass [Chao 1982]. Item j replaces the
+//! kept item with the probability w_j/(w_0 + … + w_j), so that the final item is chosen in proportion to its weight.
 
-/// What is kept of a stream.
+/// The state of a reservoir.
 #[derive(Clone, Copy, Debug)]
 pub struct Reservoir<T> {
     kept: Option<T>,
     sum: f64,
-    /// One number serves for all choices: what is left of it after each is uniform again.
+    /// One random number serves all choices: it is remapped to be uniform again after each.
     u: f64,
 }
 
 impl<T> Reservoir<T> {
-    /// Nothing is kept yet; `u` is a uniform number in [0, 1).
+    /// An empty reservoir; `u` is a uniform number in [0, 1).
     #[inline]
     pub fn new(u: f32) -> Self {
         Reservoir { kept: None, sum: 0.0, u: f64::from(u) }
     }
 
-    /// Offers a thing. One whose weight is not positive and finite is passed over.
+    /// Offers an item. Items whose weight is not positive and finite are ignored.
     #[inline]
     pub fn offer(&mut self, thing: T, weight: f32) {
         let weight = f64::from(weight);
@@ -35,7 +34,7 @@ impl<T> Reservoir<T> {
         }
     }
 
-    /// What is kept, and the sum of all weights; `None` if nothing had weight.
+    /// The kept item, and the sum of all weights; `None` if there was no weight.
     #[inline]
     pub fn into_kept(self) -> Option<(T, f64)> {
         Some((self.kept?, self.sum))
@@ -58,7 +57,7 @@ mod tests {
             assert_eq!(sum, 8.0);
             counts[i] += 1;
         }
-        // A thing has an interval for each time that it may be taken, whose ends may round either way
+        // An item may be chosen in several intervals, whose ends may round either way
         for (count, weight) in counts.into_iter().zip([0.0, 3.0, 0.0, 1.0, 0.0, 4.0, 0.0]) {
             assert!((f64::from(count) - weight / 8.0 * f64::from(GRID)).abs() <= 4.0, "{counts:?}");
         }

@@ -1,17 +1,16 @@
 //! Strata of the proposals for [`stratified`](super::stratified): runs of consecutive proposals, given by their ends
 //! (exclusive).
 //!
-//! Any strata are unbiased, even strata that depend on the weights. Dividing a stratum in two never increases the
-//! variance for f ≥ 0, so both functions make as many strata as allowed. Consecutive proposals are close to each other
-//! if they were generated from stratified numbers, and strata of close proposals have little variance of f/q̂ [Talbot
-//! 2005, Section 4.5.2, heuristic 2].
+//! Any strata are unbiased, even strata that depend on the weights. Splitting a stratum in two never increases the
+//! variance for f ≥ 0, so both functions make the maximum number of strata. Consecutive proposals are close to each
+//! other if they were generated from stratified numbers, and strata of close proposals have little variance of f/q̂
+//! [Talbot 2005, Section 4.5.2, heuristic 2].
 
 use super::draw::clean;
 
-/// min(n, m) strata of equal numbers of the `m` proposals; numbers differ by at most one [Talbot 2005, Section
-/// 4.5.2.1].
+/// min(n, m) strata of equal numbers of the `m` proposals, up to one [Talbot 2005, Section 4.5.2.1].
 ///
-/// For f/q that varies less than f/p, the variance is at most that of plain Monte Carlo with n samples.
+/// If f/q varies less than f/p, the variance is at most the variance of plain Monte Carlo with n samples.
 pub fn equal_proposals(m: usize, n: usize, ends: &mut Vec<u32>) {
     ends.clear();
     let n = n.min(m);
@@ -21,15 +20,17 @@ pub fn equal_proposals(m: usize, n: usize, ends: &mut Vec<u32>) {
 /// At most `n` strata of nearly equal weight; `u[k]` decides about end k, so `u.len()` ≥ n − 1 [Talbot 2005, Section
 /// 4.5.2.2].
 ///
-/// Proposals join the open stratum in order as long as its weight stays within the target w_max. The one that crosses
-/// the target joins it with probability (w_max − w_total)/w(x) and otherwise opens the next; the expected weight
+/// Proposals join the open stratum in order while its weight is within the target w_max. The proposal that crosses the
+/// target joins with probability (w_max − w_total)/w(x) and otherwise opens the next stratum; the expected weight
 /// w_total + w(x)·(w_max − w_total)/w(x) of the stratum is then w_max. The thesis prints the complement of this
-/// probability, (w_total + w(x) − w_max)/w(x), which is 1 or more once a stratum is past its target and would never end
-/// it. Measured with 6 of 24 proposals, it has 2.8 to 4.4 times the variance of no strata; this has 0.45 to 0.85 times.
+/// probability, (w_total + w(x) − w_max)/w(x), which is 1 or more once a stratum exceeds its target and would never end
+/// it. Measured with 6 of 24 proposals, the printed form has 2.8 to 4.4 times the variance of no strata; this one has
+/// 0.45 to 0.85 times.
 ///
-/// The target is the weight that is left over the strata that are left, not the fixed Σw/n of the thesis: after one
-/// heavy proposal the others still fill n − 1 strata. If no more proposals of positive weight are left than strata,
-/// each gets its own, so that there are exactly min(n, proposals of positive weight) strata (one if there are none).
+/// The target is the remaining weight divided by the number of remaining strata, not the fixed Σw/n of the thesis:
+/// after one heavy proposal the others still fill n − 1 strata. If there are no more proposals of positive weight than
+/// remaining strata, each gets its own. There are therefore exactly min(n, proposals of positive weight) strata (one if
+/// there are none).
 pub fn equal_weights(weights: &[f32], n: usize, u: &[f32], ends: &mut Vec<u32>) {
     ends.clear();
     if weights.is_empty() || n == 0 {
@@ -85,7 +86,7 @@ mod tests {
         let mut ends = Vec::new();
         equal_weights(&[1.0; 6], 3, &[0.0; 3], &mut ends);
         assert_eq!(ends, [2, 4, 6]);
-        // A heavy proposal is alone, and the others share the other strata.
+        // A heavy proposal is alone, and the others fill the other strata.
         equal_weights(&[10.0, 1.0, 1.0, 1.0], 4, &[0.0; 4], &mut ends);
         assert_eq!(ends, [1, 2, 3, 4]);
         equal_weights(&[2.0, 4.0], 2, &[0.2; 2], &mut ends);
