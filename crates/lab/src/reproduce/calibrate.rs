@@ -20,7 +20,8 @@ const CORRECTIONS: u32 = 4;
 const LEAST_TIME: f64 = 0.1;
 /// Relative tolerance of equal times.
 const MATCH: f64 = 0.01;
-/// Maximum number of proposals, which determine the size of batch buffers.
+/// Maximum number of proposals and of samples, which determine the size of batch buffers. On a busy machine the measured
+/// time of one may be next to nothing.
 const MAX_PROPOSALS: u32 = 1024;
 
 /// M and N of the timed estimates: small and large.
@@ -68,7 +69,7 @@ fn stage_times(
 /// samples.
 pub fn equal_halves(budget: f64, times: Costs) -> SampleCounts {
     let samples = (0.5 * budget / times.t2).round().max(1.0);
-    let samples = samples.min((budget / (times.t1 + times.t2)).floor().max(1.0));
+    let samples = samples.min((budget / (times.t1 + times.t2)).floor().max(1.0)).min(f64::from(MAX_PROPOSALS));
     counts_for_budget(budget, times, samples as u32)
 }
 
@@ -151,5 +152,8 @@ mod tests {
         assert_eq!(equal_halves(100.0, times).samples, 1);
         assert_eq!(equal_halves(2000.0, Costs { t1: 100.0, t2: 100.0 }), SampleCounts { samples: 10, proposals: 10 });
         assert_eq!(equal_halves(2000.0, Costs { t1: 100.0, t2: 10.0 }), SampleCounts { samples: 18, proposals: 18 });
+        // Buffers are bounded where times are next to nothing
+        let most = SampleCounts { samples: MAX_PROPOSALS, proposals: MAX_PROPOSALS };
+        assert_eq!(equal_halves(20_000.0, Costs { t1: LEAST_TIME, t2: LEAST_TIME }), most);
     }
 }
