@@ -3,6 +3,9 @@
 use super::write::NO_DATE;
 use super::*;
 use crate::imaging::ColorEncoding;
+use rayon::prelude::*;
+use std::io::Write;
+use std::path::PathBuf;
 
 fn names(names: &[&str]) -> Vec<String> {
     names.iter().map(|&n| n.to_owned()).collect()
@@ -174,5 +177,65 @@ fn files_are_written_and_read_at_the_same_time() {
     }
     for _ in 0..4 {
         all.recv_timeout(std::time::Duration::from_secs(300)).expect("a file is neither written nor refused");
+    }
+}
+
+/// A chunk of a PNG file.
+fn chunk(kind: &[u8; 4], data: &[u8]) -> Vec<u8> {
+    let mut chunk = (data.len() as u32).to_be_bytes().to_vec();
+    chunk.extend_from_slice(kind);
+    chunk.extend_from_slice(data);
+    let crc = crc32fast::hash(&chunk[4..]);
+    chunk.extend_from_slice(&crc.to_be_bytes());
+    chunk
+}
+
+fn deflated(data: &[u8]) -> Vec<u8> {
+    let mut encoder = flate2::write::ZlibEncoder::new(Vec::new(), flate2::Compression::fast());
+    encoder.write_all(data).unwrap();
+    encoder.finish().unwrap()
+}
+
+/// A PNG file of one grey pixel, whose ICC profile has these tags.
+fn png_with_profile(tags: impl ExactSizeIterator<Item = [u8; 4]>) -> Vec<u8> {
+    let (count, size) = (tags.len() as u32, 132 + 12 * tags.len() as u32 + 16);
+    let mut profile = vec![0; 128];
+    profile[0..4].copy_from_slice(&size.to_be_bytes());
+    profile[8] = 4;
+    profile[12..24].copy_from_slice(b"mntrGRAYXYZ ");
+    profile[36..40].copy_from_slice(b"acsp");
+    // The illuminant, D50
+    profile[68..80].copy_from_slice(&[0, 0, 0xf6, 0xd6, 0, 1, 0, 0, 0, 0, 0xd3, 0x2d]);
+    profile.extend_from_slice(&count.to_be_bytes());
+    for tag in tags {
+        profile.extend_from_slice(&tag);
+        profile.extend_from_slice(&(size - 16).to_be_bytes());
+        profile.extend_from_slice(&16_u32.to_be_bytes());
+    }
+    profile.extend_from_slice(b"text\0\0\0\0profile\0");
+
+    let mut file = b"\x89PNG\r\n\x1a\n".to_vec();
+    file.extend(chunk(b"IHDR", &[0, 0, 0, 1, 0, 0, 0, 1, 8, 0, 0, 0, 0]));
+    file.extend(chunk(b"iCCP", &[b"p\0\0".as_slice(), &deflated(&profile)].concat()));
+    file.extend(chunk(b"IDAT", &deflated(&[0, 128])));
+    file.extend(chunk(b"IEND", &[]));
+    file
+}
+
+#[test]
+fn files_with_profiles_are_opened_by_several_threads_at_once() {
+    // Tags that OpenImageIO does not know
+    const FILES: u16 = 400;
+    let folder = tempfile::tempdir().unwrap();
+    let paths: Vec<_> = (0..FILES).map(|i| folder.path().join(format!("{i}.png"))).collect();
+    for (i, path) in paths.iter().enumerate() {
+        let tag = |k: u16| [b'a' + (i / 26) as u8, b'a' + (i % 26) as u8, b'a' + (k / 26) as u8, b'a' + (k % 26) as u8];
+        std::fs::write(path, png_with_profile((0..60).map(tag))).unwrap();
+    }
+    let read = |path: &PathBuf| read_image(path, &ReadLimits::default()).unwrap();
+    let images: Vec<ReadImage> = paths.par_iter().map(read).collect();
+    for image in images {
+        assert!(image.metadata.keys().any(|name| name.starts_with("ICCProfile")), "{:?}", image.metadata);
+        assert!((image.image.data[0] - 128.0 / 255.0).abs() < 1e-6);
     }
 }

@@ -6,6 +6,7 @@
 #include <cstdio>
 #include <map>
 #include <memory>
+#include <mutex>
 #include <vector>
 
 static_assert(sizeof(OiioSpec) == 14 * 4, "src/types.rs declares 14 words");
@@ -40,6 +41,13 @@ OiioFormat format_of(TypeDesc type) {
   }
 }
 
+// Held while a header is read. OpenImageIO up to 2.4 looks up the tags of ICC profiles by operator[] of a static map, which
+// adds those that it lacks: two files with profiles that are opened at once destroy the map.
+std::mutex& header_mutex() {
+  static std::mutex mutex;
+  return mutex;
+}
+
 // Header of a subimage, with the strings that callers hold pointers to.
 struct Part {
   ImageSpec spec;
@@ -61,11 +69,17 @@ struct OiioInput {
 
   std::string drain() { return input->has_error() ? input->geterror() : std::string(); }
 
+  // Goes to a level of a subimage, of which most formats read the header then. Whatever is read next stays there.
+  bool seek(int32_t subimage, int32_t level = 0) {
+    const std::lock_guard<std::mutex> lock(header_mutex());
+    return input->seek_subimage(subimage, level);
+  }
+
   const Part& part(int32_t subimage) {
     require(subimage >= 0, "negative subimage index");
     auto found = parts.find(subimage);
     if (found != parts.end()) return *found->second;
-    if (!input->seek_subimage(subimage, 0))
+    if (!seek(subimage))
       throw Failure{OIIO_CANNOT_READ, or_else(drain(), "the file has no such subimage")};
 
     auto part = std::make_unique<Part>();
@@ -106,6 +120,7 @@ struct OiioInput {
   // Header of a level of a subimage.
   ImageSpec level(int32_t subimage, int32_t level) {
     require(subimage >= 0 && level >= 0, "negative index");
+    seek(subimage, level);
     const ImageSpec spec = input->spec_dimensions(subimage, level);
     drain();
     const bool usable = !spec.deep && spec.depth <= 1 && spec.width > 0 && spec.height > 0 && spec.nchannels > 0;
@@ -172,7 +187,10 @@ int32_t oiio_shim_input_open(const char* path, int32_t unassociated_alpha, OiioI
     ImageSpec config;
     if (unassociated_alpha != 0) config.attribute("oiio:UnassociatedAlpha", 1);
     auto opened = std::make_unique<OiioInput>();
-    opened->input = ImageInput::open(path, &config);
+    {
+      const std::lock_guard<std::mutex> lock(header_mutex());
+      opened->input = ImageInput::open(path, &config);
+    }
     if (!opened->input)
       throw Failure{OIIO_CANNOT_OPEN, or_else(OIIO::geterror(), "not a picture that OpenImageIO can read")};
     *input = opened.release();
@@ -190,7 +208,7 @@ int32_t oiio_shim_input_subimages(OiioInput* input, int32_t* count, char* error,
       // Some formats say the number in the header; in others only seeking tells.
       int number = input->part(0).spec.get_int_attribute("oiio:subimages", 0);
       if (number <= 0)
-        for (number = 1; number < kMaxSubimages && input->input->seek_subimage(number, 0);) ++number;
+        for (number = 1; number < kMaxSubimages && input->seek(number);) ++number;
       input->drain();
       input->subimages = number;
     }
@@ -261,6 +279,7 @@ int32_t oiio_shim_input_read(OiioInput* input, int32_t subimage, float* pixels, 
     require(input != nullptr && pixels != nullptr, "null argument");
     require(count == input->float_count(subimage, UINT64_MAX), "the number of floats is not float_count");
     const int channels = input->part(subimage).spec.nchannels;
+    input->seek(subimage);
     if (!input->input->read_image(subimage, 0, 0, channels, TypeDesc(TypeDesc::FLOAT), pixels))
       throw Failure{OIIO_CANNOT_READ, or_else(input->drain(), "the pixels cannot be read")};
   });
