@@ -1,8 +1,8 @@
-//! The ray tracer's rays per second against bare loops over Embree with the same rays, on one thread.
+//! Speed of the ray tracer against bare Embree loops with the same rays, on one thread.
 //!
 //! `cargo bench --bench embree -- [triangles in thousands, default 1000]`
 //!
-//! The scene is made here; `lumiris bench` does the same with the rays of a scene file.
+//! The scene is generated; `lumiris bench` does the same with the rays of a scene file.
 #![allow(clippy::print_stdout, missing_docs)]
 
 use lumiris::accel::embree::bare::Bare;
@@ -18,7 +18,7 @@ use std::sync::Arc;
 
 const WIDTH: u32 = 8;
 const SIDE: usize = 1024;
-/// Rays of a batch, as a tile of pixels makes them.
+/// Rays per batch, as for a tile of pixels.
 const BATCH: usize = 4096;
 const RUNS: u32 = 9;
 
@@ -55,7 +55,7 @@ fn camera_rays() -> RayBatch {
     rays
 }
 
-/// From each hit eight rays: to points of an area light, or cosine-distributed.
+/// Eight rays from every eighth hit: to points of an area light, or cosine-distributed.
 fn secondary_rays(set: &GeometrySet, rays: &RayBatch, hits: &[Option<Hit>], light: bool) -> RayBatch {
     let mut stream = pcg32([1, 2, 3]);
     let mut result = RayBatch::default();
@@ -85,13 +85,14 @@ fn batches(rays: &RayBatch) -> Vec<RayBatch> {
     result
 }
 
-/// Prints a case.
+/// Prints the result of a case.
 fn print(case: Option<RayCase>) {
     let Some(RayCase { name, rays, mrays, bare_mrays, ratio, .. }) = case else { return };
     println!("{name:20} {rays:8} rays   bare {bare_mrays:6.2}   ours {mrays:6.2} Mrays/s   ours/bare {ratio:.3}");
 }
 
 fn main() -> Result<(), EmbreeError> {
+    // Scene
     let thousands = std::env::args().skip(1).find_map(|a| a.parse::<usize>().ok()).unwrap_or(1000);
     let mesh = Shape::Mesh(displaced_sphere(thousands * 1000));
     let shape = Geometry { shape: mesh, alpha: None, visibility: Visibility::ALL };
@@ -100,12 +101,14 @@ fn main() -> Result<(), EmbreeError> {
     let accel = EmbreeAccel::new(Arc::clone(&set), None, Some(WIDTH))?;
     println!("{} triangles, {:?}", set.primitive_counts().0, accel.stats());
 
+    // Rays
     let camera = camera_rays();
     let mut hits = Vec::new();
     accel.intersect(&camera, Coherence::Coherent, &mut hits);
     let shadow = secondary_rays(&set, &camera, &hits, true);
     let bounce = secondary_rays(&set, &camera, &hits, false);
 
+    // Measurements
     let pair = Pair { accel, bare: Bare::new(set, None)?, runs: RUNS };
     print(pair.intersect("camera, coherent", &batches(&camera), Coherence::Coherent)?);
     print(pair.intersect("camera, single rays", &batches(&camera), Coherence::Incoherent)?);

@@ -1,6 +1,6 @@
-//! Time and memory of loading a scene against its number of elements, for every reader and every kind of element: growth
-//! that is not linear shows in the last column. Inputs are written to a temporary folder; each is loaded by a process of
-//! its own.
+//! Time and memory of loading a scene against its number of elements, for every reader and every kind of element.
+//! Growth that is not linear shows in the last column. Inputs are written to a temporary folder; a separate process
+//! loads each.
 //!
 //! `cargo bench --bench load -- [part of a name] [largest power of 10, 3 to 6, default 5]`
 #![allow(clippy::print_stdout, missing_docs)]
@@ -16,10 +16,11 @@ use std::time::Instant;
 /// Smallest and largest power of 10.
 const POWERS: (u32, u32) = (3, 6);
 
-/// Writes an input of `n` elements into a folder; returns the name of the scene's file.
+/// Writes an input of `n` elements into a folder, and returns the name of the scene file.
 type Make = fn(usize, &Path) -> String;
 
-/// Kinds of elements, with the largest power of 10 of each: a directory of 10⁶ files takes longer to write than to read.
+/// Kinds of elements, with the largest power of 10 for each. (A folder of 10⁶ files takes longer to write than to
+/// read.)
 const CASES: &[(&str, u32, Make)] = &[
     ("gltf/nodes side by side", 6, |n, f| gltf(f, &Gltf { nodes: leaves(n, |_| 0), ..Gltf::of_mesh(n) })),
     ("gltf/nodes in a chain", 6, |n, f| gltf(f, &Gltf { nodes: chain(n), roots: "0".into(), ..Gltf::of_mesh(n) })),
@@ -185,7 +186,7 @@ fn main() {
     }
 }
 
-/// Loads a file and prints the seconds of the import and of building all that a render needs, and the peak memory.
+/// Loads a file. Prints the times of import and of building the render job (s), and the peak memory.
 fn load_once(file: &Path) {
     let start = Instant::now();
     let loaded =
@@ -204,11 +205,14 @@ fn load_once(file: &Path) {
 }
 
 fn table(part: &str, largest: u32) {
+    // Header
     println!(
         "| elements | {} bytes each | growth |",
         (POWERS.0..=largest).map(|p| format!("10^{p}: import + build (s) |")).collect::<String>()
     );
     println!("|---|{}---|---|", "---|".repeat((largest - POWERS.0 + 1) as usize));
+
+    // One row per kind of element
     for (name, power, make) in CASES.iter().filter(|(name, ..)| name.contains(part)) {
         let powers = POWERS.0..=largest.min(*power);
         let runs: Vec<[f64; 4]> = powers.clone().map(|power| measured(10_usize.pow(power), *make)).collect();
@@ -229,7 +233,7 @@ fn table(part: &str, largest: u32) {
     }
 }
 
-/// Seconds of import and build, peak bytes, and 1 if the scene was loaded.
+/// Times of import and build (s), peak memory (bytes), and 1 if the scene was loaded.
 fn measured(n: usize, make: Make) -> [f64; 4] {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let file = folder.path().join(make(n, folder.path()));
@@ -248,20 +252,20 @@ fn list(n: usize, item: impl Fn(usize) -> String) -> String {
     (0..n).map(item).collect::<Vec<_>>().join(",")
 }
 
-/// The parts of a document; a triangle's positions are accessor 0.
+/// The parts of a glTF document. Accessor 0 has the positions of a triangle.
 struct Gltf {
     nodes: String,
     roots: String,
     meshes: String,
     accessors: String,
-    /// Members of the root, each after a comma.
+    /// Further members of the root, each after a comma.
     rest: String,
 }
 
 const POSITIONS: &str = r#"{"bufferView":0,"componentType":5126,"count":3,"type":"VEC3"}"#;
 
 impl Gltf {
-    /// One mesh of one triangle, and `n` roots.
+    /// One mesh with one triangle, and `n` root nodes.
     fn of_mesh(n: usize) -> Self {
         let (roots, nodes) = (list(n, |i| i.to_string()), leaves(n, |_| 0));
         Gltf { nodes, roots, meshes: meshes(1, ""), accessors: POSITIONS.into(), rest: String::new() }
@@ -297,11 +301,14 @@ fn gltf(folder: &Path, scene: &Gltf) -> String {
     "scene.gltf".into()
 }
 
-/// A mesh of `n` primitives, which share the accessor of 3n vertices.
+/// A mesh of `n` primitives that share an accessor of 3n vertices.
 fn shared_vertices(n: usize, folder: &Path) -> String {
+    // Positions and indices
     let positions = (0..3 * n).flat_map(|v| [v as f32, (v % 3 % 2) as f32, (v % 3 / 2) as f32].map(f32::to_le_bytes));
     let bytes: Vec<u8> = positions.chain((0..3 * n as u32).map(u32::to_le_bytes)).flatten().collect();
     write(folder, "data.bin", &bytes);
+
+    // Document
     let primitive = |i| format!(r#"{{"attributes":{{"POSITION":0}},"indices":{}}}"#, i + 1);
     let indices =
         |i| format!(r#"{{"bufferView":1,"byteOffset":{},"componentType":5125,"count":3,"type":"SCALAR"}}"#, 12 * i);
@@ -322,7 +329,7 @@ fn shared_vertices(n: usize, folder: &Path) -> String {
     "scene.gltf".into()
 }
 
-/// `n` materials with a texture each, of `images` images.
+/// `n` materials with one texture each, using `images` images in total.
 fn textured(n: usize, images: usize) -> Gltf {
     const PNG: &str =
         "iVBORw0KGgoAAAANSUhEUgAAAAIAAAACCAIAAAD91JpzAAAAEklEQVR4nGP4z8DAAMIM/4EAAB/uBfsL2WiLAAAAAElFTkSuQmCC";
@@ -339,7 +346,7 @@ fn base_color(texture: usize) -> String {
     format!(r#"{{"pbrMetallicRoughness":{{"baseColorTexture":{{"index":{texture}}}}}}}"#)
 }
 
-/// `skins` skins with all `n` nodes as joints among them, each of a mesh.
+/// `skins` skins that divide all `n` nodes as joints, one mesh each.
 fn skinned(n: usize, skins: usize) -> Gltf {
     let of_skin = n / skins;
     let skin = |s: usize| format!(r#"{{"joints":[{}]}}"#, list(of_skin, |i| (s * of_skin + i).to_string()));
@@ -376,7 +383,7 @@ fn ply_header(format: &str, vertices: usize, faces: usize) -> String {
     )
 }
 
-/// `n` triangles of as many vertices.
+/// A mesh of `n` triangles and `n` vertices.
 fn ply(folder: &Path, n: usize, binary: bool) -> String {
     let format = if binary { "binary_little_endian" } else { "ascii" };
     let mut bytes = ply_header(format, n, n).into_bytes();

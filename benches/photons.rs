@@ -1,4 +1,4 @@
-//! Photon maps: how fast photons are traced in a scene, and how fast maps are built and queried.
+//! Photon maps: speed of photon tracing in a scene, and of building and querying maps.
 //!
 //! `cargo bench --bench photons -- [scene.pbrt] [thousands of paths, default 200]`
 #![allow(clippy::print_stdout, clippy::unwrap_used, missing_docs)]
@@ -34,6 +34,7 @@ fn photons(faces: usize) -> Vec<Photon> {
 }
 
 fn maps() {
+    // Build
     for (name, faces) in [("a plane", 1), ("the faces of a box", 6)] {
         let photons = photons(faces);
         let copy = photons.clone();
@@ -42,6 +43,8 @@ fn maps() {
         let build = start.elapsed().as_secs_f64();
         let places: Vec<Place> = (0..QUERIES).map(|i| &photons[i * 19]).map(|p| Place::flat(p.p(), p.n())).collect();
         println!("10⁶ photons on {name}: built in {:.0} ms, {:.1} bytes each", build * 1e3, map.bytes() as f64 / 1e6);
+
+        // Query
         let mut scratch = GatherScratch::default();
         for (name, search) in [
             ("50 nearest", Search::Nearest { count: 50, max_radius: 0.1 }),
@@ -59,6 +62,7 @@ fn maps() {
 fn tracing(path: &Path, paths: u64) {
     let loaded = load(path, &LoadOptions::default()).map_err(|d| d.to_string()).unwrap();
     let job = loaded.job(AccelKind::Embree, None).unwrap();
+    // Photons, then importons and photons by importance
     for threads in [1, 2] {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         pool.install(|| {

@@ -1,5 +1,5 @@
-//! Nanoseconds per proposal of direct lighting: directions to one light, values of one BSDF, weights; in lanes, and how
-//! many times as long single calls take.
+//! Time per proposal of direct lighting (ns): directions to one light, values of one BSDF, and weights. In lanes, with
+//! the slowdown of single calls.
 //!
 //! `cargo bench --bench t1 -- [part of a name] [runs]`
 #![allow(clippy::print_stdout, missing_docs)]
@@ -23,10 +23,10 @@ use std::time::Instant;
 
 const SIZES: [usize; 3] = [8, 32, 128];
 
-/// Shading points, each with numbers of its own, as many as leave no cache warm by chance.
+/// Number of shading points with separate random numbers, large enough to avoid warm caches.
 const POINTS: u32 = 4096;
 
-/// Best of several runs over all points, in nanoseconds per sample.
+/// Best of several runs over all points (ns per sample).
 fn time(m: usize, mut run: impl FnMut(u32)) -> f64 {
     let points = POINTS / (m as u32 / 8);
     let mut best = f64::INFINITY;
@@ -56,7 +56,7 @@ fn is_wanted(name: &str) -> bool {
     arguments().next().is_none_or(|part| name.contains(&part))
 }
 
-/// Numbers of all points: sorted along the curve for each.
+/// Random numbers of all points, sorted along the Hilbert curve.
 fn numbers(m: usize) -> Vec<[Vec<f32>; 2]> {
     (0..POINTS / (m as u32 / 8))
         .map(|point| {
@@ -70,7 +70,7 @@ fn numbers(m: usize) -> Vec<[Vec<f32>; 2]> {
         .collect()
 }
 
-/// A map with a sky of soft gradients, some noise and a small sun.
+/// An environment map with a sky of soft gradients, some noise and a small sun.
 fn sky(size: [usize; 2], mapping: EnvironmentMapping, filter: EnvironmentFilter) -> Light {
     let mut stream = pcg32([1, 2, 3]);
     let texels = (0..size[0] * size[1])
@@ -102,6 +102,7 @@ fn lights() -> Vec<(&'static str, Make)> {
 }
 
 fn main() {
+    // Lights
     for (name, make) in lights() {
         if !is_wanted(name) {
             continue;
@@ -133,6 +134,8 @@ fn main() {
             report(name, m, lanes, single);
         }
     }
+
+    // BSDFs and kernels
     bsdfs();
     for m in SIZES {
         kernels(m);
@@ -140,6 +143,7 @@ fn main() {
 }
 
 fn bsdfs() {
+    // One BSDF of each kind
     let rgb = Rgb::new(0.2, 0.5, 0.8);
     let distribution = TrowbridgeReitz::new(0.3, 0.3);
     let (rough, smooth) = (distribution, TrowbridgeReitz::new(0.0, 0.0));
@@ -154,6 +158,8 @@ fn bsdfs() {
         ("coated, rough", Bsdf::CoatedDiffuse(CoatedDiffuse::new(&rough_coat, rough, rgb, 10))),
         ("coated, smooth", Bsdf::CoatedDiffuse(CoatedDiffuse::new(&smooth_coat, smooth, rgb, 10))),
     ];
+
+    // Many directions from one viewer
     for (name, bsdf) in all {
         if !is_wanted(name) {
             continue;
@@ -182,6 +188,7 @@ fn bsdfs() {
 }
 
 fn kernels(m: usize) {
+    // Each kernel against its scalar twin
     let (mut t, mut jitter) = (vec![0; m], vec![0; m]);
     let mut v: Vec<Vec<f32>> = (0..11).map(|k| (0..m).map(|i| (i + k) as f32 * 0.1).collect()).collect();
     if is_wanted("strata") {

@@ -1,5 +1,5 @@
-//! Nanoseconds per lookup of an image texture: at random points, one after the other or each only when the value before is
-//! there, and at those of neighbouring pixels.
+//! Time per lookup of an image texture (ns): at random points, independent or each dependent on the last value, and at
+//! points of neighbouring pixels.
 //!
 //! `cargo bench --bench textures -- [part of a name]`
 #![allow(clippy::print_stdout, missing_docs)]
@@ -10,8 +10,9 @@ use lumiris_test_support::random::{RngExt, pcg32};
 use std::hint::black_box;
 use std::time::Instant;
 
-/// Lookups that are timed at once, so few that most of them are not interrupted, and how often.
+/// Lookups per measurement: few enough that most measurements are not interrupted.
 const LOOKUPS: usize = 2048;
+/// Number of measurements.
 const RUNS: usize = 201;
 
 /// An 8-bit image in which neighbouring bytes differ.
@@ -21,7 +22,7 @@ fn image(size: [usize; 2], channels: &[&str]) -> Image {
     image
 }
 
-/// Median time of a lookup (ns), where the next point depends on the value of the last one, or not.
+/// Median time of a lookup (ns). If `is_dependent`, each point depends on the last value.
 fn time(map: &MipMap, points: &[Vec2], width: Vec2, is_dependent: bool) -> f64 {
     let mut times: Vec<f64> = points
         .chunks_exact(LOOKUPS)
@@ -42,10 +43,13 @@ fn time(map: &MipMap, points: &[Vec2], width: Vec2, is_dependent: bool) -> f64 {
 }
 
 fn main() {
+    // Random points
     let wanted = std::env::args().skip(1).find(|a| !a.starts_with('-')).unwrap_or_default();
     let mut stream = pcg32([1, 2, 3]);
     let random: Vec<Vec2> = (0..LOOKUPS * RUNS).map(|_| Vec2::from(stream.random::<[f32; 2]>())).collect();
     let rgb: &[&str] = &["R", "G", "B"];
+
+    // Sizes and filters
     for (size, channels) in [([4096; 2], rgb), ([1600, 1200], rgb), ([512; 2], rgb), ([4096; 2], &["Y"])] {
         let image = image(size, channels);
         let texel = 1.0 / Vec2::new(size[0] as f32, size[1] as f32);

@@ -1,4 +1,4 @@
-//! Rays per second of the ray tracers on one thread, on a displaced sphere made by code.
+//! Speed of the BVH on one thread, on a generated displaced sphere.
 //!
 //! `cargo bench --bench trace -- [triangles in thousands, default 1000] [rays in thousands, default 1000]`
 #![allow(clippy::print_stdout, missing_docs)]
@@ -44,7 +44,7 @@ fn camera_rays(count: usize) -> RayBatch {
     rays
 }
 
-/// Cosine-distributed rays from the hits, outward and inward by turns.
+/// Cosine-distributed rays from the hits, alternating between outward and inward.
 fn bounce_rays(set: &GeometrySet, rays: &RayBatch, hits: &[Option<Hit>]) -> RayBatch {
     let mut stream = pcg32([1, 2, 3]);
     let mut bounces = RayBatch::default();
@@ -60,7 +60,7 @@ fn bounce_rays(set: &GeometrySet, rays: &RayBatch, hits: &[Option<Hit>]) -> RayB
     bounces
 }
 
-/// Prints the rate over chunks of rays, each at its best of several runs, so that a busy machine disturbs little.
+/// Prints the rate over chunks of rays, using the best of several runs per chunk to reduce the influence of other load.
 fn measure(name: &str, rays: &RayBatch, mut trace: impl FnMut(&RayBatch) -> usize) {
     const CHUNK: usize = 10_000;
     let (mut seconds, mut found) = (0.0, 0);
@@ -81,6 +81,7 @@ fn measure(name: &str, rays: &RayBatch, mut trace: impl FnMut(&RayBatch) -> usiz
 }
 
 fn main() {
+    // Scene
     let numbers: Vec<usize> = std::env::args().filter_map(|a| a.parse().ok()).collect();
     let thousands = |i: usize| numbers.get(i).copied().unwrap_or(1000) * 1000;
     let shape = Shape::Mesh(displaced_sphere(thousands(0)));
@@ -94,10 +95,13 @@ fn main() {
     let per_triangle = stats.bytes as f64 / triangles as f64;
     println!("{triangles} triangles, build {:.3} s, {per_triangle:.1} B each", stats.build_seconds);
 
+    // Rays
     let camera = camera_rays(thousands(1));
     let mut hits = Vec::new();
     bvh.intersect(&camera, Coherence::Coherent, &mut hits);
     let bounces = bounce_rays(&set, &camera, &hits);
+
+    // Measurements
     for (name, rays) in [("camera", &camera), ("bounce", &bounces)] {
         measure(&format!("bvh {name} closest"), rays, |rays| {
             bvh.intersect(rays, Coherence::Incoherent, &mut hits);

@@ -5,8 +5,9 @@
 >>> image["beauty"].shape
 (400, 600, 3)
 
-`render` gives layers of arrays, `merge` those of parts that were rendered apart, `read` and `write` are for EXR and other files, `compare` has the metrics of
-`lumiris compare`, `denoise` is Open Image Denoise, and `lumiris.estimators` are the estimators themselves. `settings` lists what can be set.
+`render` returns layers as arrays, and `merge` merges parts of an image. `read` and `write` are for EXR and other files.
+`compare` computes the metrics of `lumiris compare`, `denoise` uses Open Image Denoise, and `lumiris.estimators` has the
+estimators themselves. `settings` lists all settings.
 """
 
 from ._compare import Comparison, compare

@@ -11,23 +11,23 @@ from numpy.typing import ArrayLike, NDArray
 from . import _lumiris
 from ._image import IMAGE, Array, Layers, Path, layer as as_layer
 
-#: What `compare` accepts as an image.
+#: Types accepted as images by `compare`.
 Image = Union[Path, ArrayLike, Mapping[str, ArrayLike]]
 
 
 class Comparison(Dict[str, Optional[float]]):
-    """Metrics by their names on the command line; None where one is not possible, as `z` without variances."""
+    """Metrics by their command-line names; None if a metric cannot be computed, such as `z` without variances."""
 
-    #: Values per pixel of `flip`, `hdrflip`, `tvi` and `z`; NaN where a pixel takes no part.
+    #: Per-pixel values of `flip`, `hdrflip`, `tvi` and `z`; NaN for pixels that are not compared.
     maps: Dict[str, NDArray[np.float32]]
-    #: Which of the two images have variances: `both`, `image` or `none`.
+    #: The images that have variances: `both`, `image` or `none`.
     noise: str
 
 
 def _colour(array: Array, name: str) -> Array:
     if array.shape[2] not in (1, 3, 4):
         raise ValueError(f"{name}: expected 1, 3 or 4 channels, but found {array.shape[2]}")
-    # Grey has three equal channels; opacity does not count
+    # Grey has three equal channels; opacity is ignored
     return np.ascontiguousarray(np.repeat(array, 3, axis=2) if array.shape[2] == 1 else array[:, :, :3])
 
 
@@ -65,11 +65,12 @@ def compare(
 ) -> Comparison:
     """Compares an image with its reference, by the metrics of `lumiris compare`.
 
-    Both may be files, arrays (rows × columns × 1, 3 or 4, or rows × columns; linear), or layers, whose variances tests use.
-    Of crops of one image, the pixels that both have are compared. `metrics` are those to compute, all by default: `mse`,
-    `rmse`, `relmse`, `nmse`, `psnr`, `flip`, `hdrflip`, `tvi`, `bias`, `z`. `layer` is compared instead of the image. The
-    other parameters are those of the command line: `exposure` (stops) is for `flip`, `epsilon` for `relmse`, `peak` for
-    `psnr`, `luminance` (cd/m² of a pixel of value 1) for `tvi`, and `ppd`, pixels per degree, for both ꟻLIPs.
+    Both may be files, linear arrays (rows × columns × 1, 3 or 4, or rows × columns), or layers, whose variances are
+    used by tests. If the images are crops of one image, their common pixels are compared. `metrics` selects metrics, by
+    default all of `mse`, `rmse`, `relmse`, `nmse`, `psnr`, `flip`, `hdrflip`, `tvi`, `bias`, `z`. `layer` is compared
+    instead of the image. The other parameters are as on the command line: `exposure` (stops) for `flip`, `epsilon` for
+    `relmse`, `peak` for `psnr`, `luminance` (cd/m² of a pixel of value 1) for `tvi`, and `ppd` (pixels per degree) for
+    both ꟻLIPs.
 
     Raises ValueError for images that cannot be compared, and OSError for files that cannot be read.
     """

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from . import _lumiris
 from ._image import IMAGE, Array, Path, layer
 
-#: Environment variable of the library.
+#: Environment variable with the path of the library.
 _LIBRARY = "LUMIRIS_OIDN"
 
 
@@ -23,22 +23,23 @@ def denoise(
     library: Optional[Path] = None,
     threads: Optional[int] = None,
 ) -> Array:
-    """Denoises an image by Open Image Denoise 2, as `lumiris denoise`: rows × columns × 3, the image itself is kept.
+    """Denoises an image with Open Image Denoise 2, as `lumiris denoise`.
 
-    `image` is an array, or layers such as `render` and `read` give, whose albedo and normal guide the denoising if no
-    others are given. A normal without albedo is not used. `library` is the library's file: by default that of the
-    environment variable LUMIRIS_OIDN, or the system's.
+    Returns an array of rows × columns × 3; `image` is unchanged.
+    `image` is an array, or layers such as the results of `render` and `read`, whose albedo and normal guide the
+    denoising unless others are given. A normal without albedo is ignored. `library` is the path of the library, by
+    default the value of the environment variable LUMIRIS_OIDN, or the system's library.
 
     >>> image["denoised"] = lumiris.denoise(image)
 
-    Raises RuntimeError without the library, and ValueError where shapes differ.
+    Raises RuntimeError without the library, and ValueError if shapes differ.
     """
     if isinstance(image, Mapping):
         albedo = image.get("albedo") if albedo is None else albedo
         normal = image.get("normal") if normal is None else normal
         image = image[IMAGE]
     name = os.fspath(library or os.environ.get(_LIBRARY, "")) or None
-    # The dynamic loader does not look for mere names in the current folder
+    # The dynamic loader does not search the current folder for plain names
     if name is not None and os.path.isfile(name):
         name = os.path.abspath(name)
 

@@ -16,27 +16,28 @@ if TYPE_CHECKING:
 Array = NDArray[np.float32]
 Path = Union[str, "os.PathLike[str]"]
 
-#: The layer of the channels R, G and B.
+#: Name of the layer with the channels R, G and B.
 IMAGE = "beauty"
-#: Names of channels by their number, where a layer does not tell them; what follows the dot.
+#: Default channel names by number of channels: the part after the dot.
 _COMPONENTS = {3: ("R", "G", "B"), 4: ("R", "G", "B", "A")}
 
 _Kind = TypeVar("_Kind", bound="Layers")
 
 
 class Layers(Dict[str, Array]):
-    """Layers of an image by their names: float32 arrays, rows × columns × channels, linear, from the top left.
+    """Layers of an image by name: linear float32 arrays, rows × columns × channels, from the top left.
 
-    The image itself is `beauty`. Others are what precedes the dot in the names of channels, such as `albedo`.
+    The image itself is `beauty`. Other layers are named by the part of their channels' names before the dot, such as
+    `albedo`.
     """
 
     #: Names of the channels of each layer, as in files.
     channels: Dict[str, Tuple[str, ...]]
-    #: What a file tells of itself; of an image of Lumiris, all that it depends on.
+    #: Metadata of the file; for images by Lumiris, everything that the image depends on.
     metadata: Dict[str, str]
     #: Column and row of the first pixel inside the full image.
     origin: Tuple[int, int]
-    #: Columns and rows of the full image, of which this may be a part.
+    #: Columns and rows of the full image, which contains this one.
     full_size: Tuple[int, int]
 
     def __init__(
@@ -71,7 +72,7 @@ class Layers(Dict[str, Array]):
 
 
 def layer(array: ArrayLike, name: str = "image") -> Array:
-    """An array as rows × columns × channels; one of two dimensions has one channel."""
+    """An array as rows × columns × channels; an array of two dimensions has one channel."""
     layer = np.asarray(array, dtype=np.float32)
     if layer.ndim == 2:
         layer = layer[:, :, np.newaxis]
@@ -92,8 +93,8 @@ def _channels(name: str, count: int) -> Tuple[str, ...]:
 def read(path: Path, *, part: int = 0) -> Layers:
     """Reads an image that OpenImageIO can read: EXR, HDR, PFM, PNG, TIFF …
 
-    Values are linear; integers of 8 and 16 bits are decoded by the sRGB curve. `part` is that of an EXR file of several
-    parts, from 0. Raises FileNotFoundError and OSError.
+    Values are linear; integers of 8 and 16 bits are decoded with the sRGB curve. `part` is the index of a part, from 0,
+    in an EXR file of several parts. Raises FileNotFoundError and OSError.
     """
     layers, metadata, place = _lumiris.read(os.fspath(path), part)
     return Layers._of(layers, metadata.items(), place)
@@ -104,8 +105,8 @@ def write(
 ) -> None:
     """Writes an array, or layers, to an EXR file of 32-bit floats.
 
-    Of `Layers` the names of channels, the place in the full image and the metadata are kept, unless `metadata` is given.
-    Either the whole file appears under its name, or none. Raises OSError.
+    For `Layers`, the names of channels, the position in the full image and the metadata are written, too; `metadata`
+    replaces the latter. The file appears under its name only when it is complete. Raises OSError.
     """
     if not os.fspath(path).lower().endswith(".exr"):
         raise ValueError(f"{os.fspath(path)}: only EXR files hold layers of floats")

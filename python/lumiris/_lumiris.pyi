@@ -14,13 +14,13 @@ Layer = Tuple[str, List[str], Array]
 __version__: str
 
 class SceneError(Exception):
-    """A scene that cannot be loaded; its text has all errors and warnings with their places in the source."""
+    """A scene that cannot be loaded. Its text has all errors and warnings with their positions in the source."""
 
     #: The first error.
     message: str
-    #: The file that it is in, or the scene.
+    #: The file with the first error, or the scene.
     file: str
-    #: Where it is, counted from 1; None if it belongs to no place.
+    #: Its line and column, from 1; None if it has no position.
     line: Optional[int]
     column: Optional[int]
 
@@ -29,13 +29,13 @@ class Progress:
 
     @property
     def fraction(self) -> float:
-        """Share of the camera samples that are done, 0 to 1."""
+        """Share of the camera samples done, 0 to 1."""
     @property
     def passes(self) -> int:
-        """Passes over the whole image that are done."""
+        """Passes over the whole image done."""
     @property
     def is_pass(self) -> bool:
-        """True after a pass over the whole image: the rendering waits."""
+        """True after a pass over the whole image, while the rendering waits."""
     @property
     def samples_done(self) -> int:
         """Camera samples done, as if every pixel had the same number."""
@@ -50,11 +50,11 @@ class Progress:
         """Time since the first sample (s)."""
     @property
     def noise(self) -> Optional[float]:
-        """Mean relative standard error of the pixels, as last determined; None before."""
+        """Median of the relative standard errors of blocks of 16 × 16 pixels; None before its first computation."""
     def image(self) -> Array:
-        """The image as it is by now."""
+        """The current image."""
     def layers(self) -> Dict[str, Array]:
-        """The image, features of the first surfaces, and numbers of samples, as they are by now."""
+        """The current image, features of the first surfaces, and sample counts."""
 
 class SettingRow(TypedDict):
     group: str

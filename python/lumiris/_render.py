@@ -18,9 +18,9 @@ if TYPE_CHECKING:
 
     from ._settings import Settings
 
-#: Name of a scene that is given as text.
+#: Name of a scene given as text.
 _TEXT = "<scene>"
-#: Time between checkpoints (s).
+#: Default time between checkpoints (s).
 _CHECKPOINT_SECONDS = 60.0
 
 
@@ -32,24 +32,24 @@ class SceneWarning(UserWarning):
 class Setting:
     """A setting of an image: a keyword of `render`, and an option of the command line with `-` in place of `_`."""
 
-    #: The heading that it stands under.
+    #: Its heading in the table.
     group: str
-    #: What it does.
+    #: Help text.
     help: str
-    #: The default in words.
+    #: The default as text.
     default: str
-    #: The values that it can have, in words.
+    #: The allowed values as text.
     values: str
-    #: The names among these values.
+    #: The names among the allowed values.
     names: Tuple[str, ...]
     #: The name in metadata and plans.
     key: str
-    #: Keywords that it had before, which are still accepted.
+    #: Former keywords, which are still accepted.
     aliases: Tuple[str, ...]
 
 
 def settings() -> Dict[str, Setting]:
-    """All settings by their keywords."""
+    """All settings by keyword."""
     return {
         name: Setting(
             group=row["group"],
@@ -65,24 +65,24 @@ def settings() -> Dict[str, Setting]:
 
 
 class Merged(Layers):
-    """An image of parts: its layers, and what is missing."""
+    """An image merged from parts: its layers, and the missing parts."""
 
-    #: What is missing, in words; none unless that was allowed.
+    #: Messages about missing parts; empty unless missing parts were allowed.
     missing: Tuple[str, ...]
     #: True if no sample is missing.
     complete: bool
-    #: Time that all parts took together (s).
+    #: Total time of all parts (s).
     seconds: float
 
 
 class Rendering(Layers):
-    """A rendered image: its layers, and how it came about."""
+    """A rendered image: its layers, and data on its rendering."""
 
-    #: What was chosen by measurements, by names in metadata: with this as `plan`, the image is the same to the bit.
+    #: Choices made by measurements, by their metadata names. With these as `plan`, the image is bit-identical.
     plan: Dict[str, str]
-    #: True if every pixel has all its samples.
+    #: True if every pixel has all of its samples.
     complete: bool
-    #: Wall-clock time of the rendering, without that of loading (s).
+    #: Wall-clock time of the rendering without loading (s).
     seconds: float
 
 
@@ -201,73 +201,77 @@ def render(
     resume: Optional[Path] = None,
     **settings: Unpack[Settings],
 ) -> Rendering:
-    """Renders a scene; the same bits as `lumiris render` with the same options.
+    """Renders a scene. The image is bit-identical to `lumiris render` with the same options.
 
-    The arrays of the result own the memory that the renderer has filled: nothing is copied.
+    The arrays of the result own the memory of the renderer: nothing is copied.
 
     Parameters
     ----------
     scene
-        A file (.pbrt, .pbrt.gz, .gltf, .glb), or the text of a pbrt file: a str is text if it has a line break or a quotation mark, or if
-        `folder` is given.
+        A file (.pbrt, .pbrt.gz, .gltf, .glb), or the text of a pbrt file. A str is text if it has a line break or a
+        quotation mark, or if `folder` is given.
     folder
-        Where files are sought that the text names; the working folder by default.
+        Folder of the files named in the text, by default the working folder.
     callback
-        Called with a `Progress` after every pass over the whole image, while the rendering waits (`is_pass`), and every
-        `interval` seconds (about) in between, while it goes on. `progress.image()` and `progress.layers()` are what there
-        is by now. Returning False ends the rendering: the result is the picture so far. An exception ends it, too, and is
-        raised. It is called in the thread that calls `render`.
+        Called with a `Progress`: after every pass over the whole image, while the rendering waits (`is_pass`), and
+        about every `interval` seconds within a pass, while the rendering continues. `progress.image()` and
+        `progress.layers()` return the current image. Returning False ends the rendering; the result is the image so
+        far. An exception ends the rendering and is raised. The callback runs in the thread that calls `render`.
     interval
-        Time between two calls within a pass (s).
+        Time between calls within a pass (s).
     plan
-        Choices that an earlier rendering made by measurements (`Rendering.plan`), or a file of `lumiris plan`. Settings
-        override them.
+        Choices that an earlier rendering made by measurements (`Rendering.plan`), or a file by `lumiris plan`. Settings
+        take precedence.
     resolution, crop, box_filter, accel, packet_width, threads, tile_size, time
-        As on the command line: columns and rows, or text such as "640x360"; x0, x1, y0, y1 in fractions of the image; a pixel filter of one pixel;
-        `embree` or `bvh`; rays per packet; threads; edge of a tile; seconds after which to stop.
+        As on the command line: columns and rows, or text such as "640x360"; x0, x1, y0, y1 in fractions of the image;
+        use a pixel filter of one pixel; `embree` or `bvh`; rays per packet; threads; edge of a tile (pixels); time
+        limit (s).
     environment, scene_in_file, camera, camera_auto, light_units, time_in_scene
-        Of glTF scenes: the image of an environment, the scene of the file and its camera by their names or indices, whether the scene
-        is framed whatever its cameras, whether candela and lux of lights are divided by 683 (`watt`, the default) or taken as they are
-        (`candela`), and the time of its animations (s).
+        Options of glTF scenes: environment map; scene and camera, by name or index; use an automatic camera; units of
+        punctual lights, whose candela and lux are divided by 683 lm/W (`watt`, the default) or taken as they are
+        (`candela`); time of the animations (s).
     aov
-        Layers beside the image: `variance`, `samples`, `albedo`, `normal`, `depth`, `material`, `object`, `ratio`, `records`.
-        None asks for all that there are; "none" or an empty list saves the time for them.
+        Additional layers: `variance`, `samples`, `albedo`, `normal`, `depth`, `material`, `object`, `ratio`, `records`.
+        None requests all available layers; "none" or an empty list saves their time.
     texture_memory
-        Most bytes that textures take in memory, as a number or a text such as `2G`; others are read by tiles from a
-        temporary file. The image is the same.
+        Memory limit for textures: a number of bytes, or a text such as `2G`. The rest is read by tiles from a temporary
+        file. The image is bit-identical.
     cryptomatte
-        Cryptomatte layers of ids and coverage: `object`, `material`, or both. Their names of ids are metadata; `lumiris.write`
-        makes a file of them that compositing programs read.
+        Cryptomatte layers of ids and coverage: `object`, `material`, or both. The names of the ids are in the metadata.
+        Compositing programs can read the layers from files by `lumiris.write`.
     part, part_by
-        The i-th of n parts of the image, `(i, n)` or `"i/n"`: a share of the samples of every pixel, or of the tiles.
+        Render the i-th of n parts of the image, `(i, n)` or `"i/n"`: a share of the samples of every pixel, or of the
+        tiles.
     samples_from, samples_to
         Index of the first sample of every pixel, and the index after the last one.
     part_file
-        Where the exact sums of what is rendered are stored, for `lumiris.merge` and `lumiris merge`; `part` needs one.
+        File for the exact sums of the rendering, for `lumiris.merge` and `lumiris merge`. Required with `part`.
     checkpoint
-        A file in which all that is needed to go on is stored every so many seconds (60 unless given: `(file, seconds)`) and
-        in the end, also after Ctrl-C. One that cannot be written is a warning.
+        File for the state needed to resume, or `(file, seconds)`. It is stored at this interval (60 s by default) and
+        at the end, also after Ctrl-C. If it cannot be written, the rendering continues with a warning.
     resume
-        A checkpoint or an unfinished part to go on from, with its settings; `spp` may ask for more samples. If it is
-        `checkpoint` and there is none yet, the rendering starts. The image is that of an uninterrupted rendering to the bit.
+        Resume from a checkpoint or an unfinished part, with its settings; `spp` may ask for more samples. If the file
+        is `checkpoint` and does not exist yet, the rendering starts from the beginning. The image is bit-identical to
+        an uninterrupted rendering.
     settings
-        The settings of the image, with the names of the command line and `_` for `-`; see `lumiris.settings()`. Values are
-        text as on the command line, numbers, or pairs of numbers; None leaves a setting to the scene. True is what an
-        option without a value is, False is `off`.
+        The settings of the image, by their command-line names with `_` instead of `-`; see `lumiris.settings()`. Values
+        are texts as on the command line, numbers, or pairs of numbers. None leaves a setting to the scene, True is the
+        same as an option without a value, and False is `off`.
 
     Raises
     ------
     SceneError
-        The scene cannot be loaded; it tells file, line and column, and its text has all errors.
+        The scene cannot be loaded. The exception has file, line and column of the first error; its text has all errors.
     TypeError, ValueError
-        An unknown keyword, or a value that is not allowed; a checkpoint that is damaged, of another scene or of other
-        settings.
+        An unknown keyword; a value that is not allowed; a checkpoint that is damaged, or belongs to another scene or
+        other settings.
     OSError
-        A file of `resume` or `part_file` cannot be read or written, or the folder of `checkpoint` or `part_file` is not there.
+        The file of `resume` or `part_file` cannot be read or written, or the folder of `checkpoint` or `part_file` is
+        missing.
     KeyboardInterrupt
-        Ctrl-C: the rendering ends with the tiles under way.
+        Ctrl-C: the rendering ends after the current tiles.
 
-    Warnings of the scene are given as `SceneWarning`. Other Python threads run meanwhile.
+    Warnings about the scene are issued as `SceneWarning`. Other Python threads run meanwhile.
     """
     options: Dict[str, object] = {
         "source": _source(scene, folder),
@@ -314,12 +318,12 @@ def render(
 def merge(
     parts: Iterable[Path], *, allow_missing: bool = False, aov: Union[None, str, Sequence[str]] = None
 ) -> Merged:
-    """Merges parts of an image, in any order: the bits of the image that is rendered at once.
+    """Merges parts of an image, in any order. The result is bit-identical to the image rendered at once.
 
-    `parts` are files that `render` has stored by `part_file`, or `lumiris render --part`; finished checkpoints are parts, too.
-    `aov` chooses layers, as for `render`; by default they are those that the parts were rendered for. If parts are missing,
-    `allow_missing` merges what there is, with a `SceneWarning`. Raises ValueError for parts that are missing, double, damaged
-    or of another image, and OSError for files that cannot be read.
+    `parts` are files stored by `render` (`part_file`) or `lumiris render --part`; finished checkpoints are parts, too.
+    `aov` selects layers, as for `render`, by default the layers for which the parts were rendered. If parts are
+    missing, `allow_missing` merges the existing parts, with a `SceneWarning`. Raises ValueError for parts that are
+    missing, repeated, damaged or of another image, and OSError for files that cannot be read.
     """
     paths = [os.fspath(part) for part in parts]
     layers, metadata, place, missing, seconds = _lumiris.merge(paths, allow_missing, _aov(aov))

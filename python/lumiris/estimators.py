@@ -1,7 +1,7 @@
 """The estimators of ∫ f that the renderer uses, on arrays: numbers in, numbers out.
 
-Arrays are float32, as in the renderer; others are converted. Leading dimensions, written `…`, are independent estimates.
-What does not fit together raises ValueError.
+Arrays are float32, as in the renderer; other arrays are converted. Leading dimensions, written `…`, are independent
+estimates. Shapes that do not fit together raise ValueError.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ def _array(values: ArrayLike) -> Array:
 
 
 def _rows(array: Array, name: str, dimensions: int) -> Array:
-    """All leading dimensions as one."""
+    """Merges all leading dimensions into one."""
     if array.ndim < dimensions:
         raise ValueError(f"{name}: expected {dimensions} dimensions or more, but found an array of shape {array.shape}")
     kept = array.shape[array.ndim - dimensions :]
@@ -40,11 +40,11 @@ def _mis(a: Tuple[ArrayLike, ArrayLike], b: Tuple[ArrayLike, ArrayLike], heurist
 def mis_weight(
     n_a: ArrayLike, p_a: ArrayLike, n_b: ArrayLike, p_b: ArrayLike, *, heuristic: str = "power"
 ) -> Array:
-    """The weight of technique a against b at samples that a drew: multiple importance sampling [Veach and Guibas 1995].
+    """The MIS weight of technique a against b at samples of a: multiple importance sampling [Veach and Guibas 1995].
 
     `n_a` and `n_b` are numbers of samples, `p_a` and `p_b` densities at the samples, which may be infinite; shapes are
-    broadcast. `heuristic` is `balance`, `power` or `maximum`. Weights are in 0..1 and finite; they are 0 where a cannot have
-    drawn the sample.
+    broadcast. `heuristic` is `balance`, `power` or `maximum`. Weights are finite and in 0..1; they are 0 where a cannot
+    have drawn the sample.
     """
     return _mis((n_a, p_a), (n_b, p_b), heuristic, False)
 
@@ -57,25 +57,25 @@ def mis_factor(
 
 
 class Draws(NamedTuple):
-    """Proposals that were drawn; Σ scale · c[indices] estimates Σ c."""
+    """Drawn proposals; Σ scale · c[indices] estimates Σ c."""
 
-    #: Which proposals (…, N).
+    #: Indices of the drawn proposals (…, N).
     indices: NDArray[np.uint32]
-    #: 1/E[number of times that the proposal is drawn] (…, N); 0 where nothing was drawn.
+    #: 1/E[number of times that the proposal is drawn] (…, N); 0 if nothing was drawn.
     scale: Array
 
 
 def ris_draws(
     weights: ArrayLike, u: ArrayLike, *, strata: str = "none", u_ends: Optional[ArrayLike] = None
 ) -> Draws:
-    """Draws N of M proposals by their weights: resampled importance sampling [Talbot et al. 2005].
+    """Draws N of M proposals in proportion to their weights: resampled importance sampling [Talbot et al. 2005].
 
-    `weights` (…, M) are q̂(x) r, where the target q̂ resembles f but is cheap, and r = 1/(M p). What is not positive and
-    finite is never drawn. `u` (…, N) are uniform numbers in [0, 1).
+    `weights` (…, M) are q̂(x) r, where the target q̂ resembles f but is cheap, and r = 1/(M p). Proposals whose weight
+    is not positive and finite are never drawn. `u` (…, N) are uniform numbers in [0, 1).
 
-    `strata` says how, in the words of the setting: `none`, independent draws; `proposals` and `weights`, one draw from each
-    of N strata of equal numbers of proposals or of nearly equal weights, for which `u_ends` (…, N - 1) decides about ends (½
-    by default); `systematic`, N draws at equal distances of the cumulative weight, by `u[…, 0]`.
+    `strata` has the values of the setting. `none`: independent draws. `proposals` and `weights`: one draw from each of
+    N strata, of equal numbers of proposals or of nearly equal weights; for the latter, `u_ends` (…, N - 1) places the
+    ends (½ by default). `systematic`: N draws at equal distances of the cumulative weight, offset by `u[…, 0]`.
     """
     w, numbers = _array(weights), _array(u)
     if w.shape[:-1] != numbers.shape[:-1] or w.ndim == 0 or numbers.ndim == 0:
@@ -99,10 +99,10 @@ def ris(
     strata: str = "none",
     u_ends: Optional[ArrayLike] = None,
 ) -> Array:
-    """The estimate Σ scale · c over the proposals that are drawn; see `ris_draws`.
+    """The estimate Σ scale · c over the drawn proposals; see `ris_draws`.
 
-    `contributions` c = f r are (…, M), or (…, M, 3) for colours; the result is (…) or (…, 3). Where contributions are
-    expensive, draw by `ris_draws` and evaluate those that are drawn only.
+    `contributions` c = f r are (…, M), or (…, M, 3) for colours; the result is (…) or (…, 3). If contributions are
+    expensive, use `ris_draws` and evaluate the drawn proposals only.
     """
     w, c = _array(weights), _array(contributions)
     if c.shape[: w.ndim] != w.shape or c.ndim > w.ndim + 1:
@@ -117,18 +117,20 @@ def ris(
 
 
 class Fit(NamedTuple):
-    """An estimate by fitted control variates."""
+    """An estimate with fitted control variates."""
 
     #: The estimate (…) or (…, channels).
     estimate: Array
-    #: The coefficients β of the columns (…, fits, m) or (…, fits, m, channels); two fits for `crossfit`, else one.
+    #: The coefficients β of the columns (…, fits, m) or (…, fits, m, channels). `crossfit` has two fits, the other
+    #: forms one.
     beta: Array
-    #: Systems that had no solution, or whose columns depend on each other; the estimate is that of MIS where there is none.
+    #: Number of systems that are singular or nearly so. For a system without a solution, the estimate is the MIS
+    #: estimate.
     ill_conditioned: int
 
 
 def _samples(columns: ArrayLike, values: ArrayLike) -> Tuple[Array, Array, bool]:
-    """Columns, values of three channels, and whether values have channels."""
+    """Columns, values with three channels, and True if `values` has channels."""
     r, y = _array(columns), _array(values)
     has_channels = y.ndim == r.ndim
     if y.shape[: r.ndim - 1] != r.shape[:-1] or y.ndim not in (r.ndim - 1, r.ndim) or r.ndim < 2:
@@ -155,13 +157,13 @@ def ocv(
 ) -> Fit:
     """Optimizing control variates [Fan et al. 2006]: ȳ − Σ β_j c̄_j, with β fitted to samples.
 
-    N samples come from a mixture p_α = Σ α_j p_j of m densities. `columns` r = p_j/p_α are (…, N, m), `values` y = f/p_α are
-    (…, N), or (…, N, 3) for colours, and `integrals` (m) are ∫ p_j, 1 by default.
+    N samples come from a mixture p_α = Σ α_j p_j of m densities. `columns` r = p_j/p_α are (…, N, m), `values` y =
+    f/p_α are (…, N), or (…, N, 3) for colours, and `integrals` (m) are ∫ p_j, 1 by default.
 
-    `form` says what β is fitted to: `regression`, the same samples, with a bias of O(1/N); `crossfit`, each half of the
-    samples, the first and the second, to the other, unbiased if they are independent (both need their share of every
-    density); `progressive`, the columns and values `others`, unbiased if they
-    are independent of these; `paper`, the same samples with the ridge of the paper, biased.
+    `form` selects the samples for fitting β. `regression`: the same samples, with a bias of O(1/N). `crossfit`: for the
+    first and the second half of the samples, the other half; unbiased if the halves are independent (both need their
+    share of every density). `progressive`: the columns and values `others`; unbiased if they are independent of the
+    samples. `paper`: the same samples with the ridge of the paper; biased.
     """
     r, y, has_channels = _samples(columns, values)
     fitted = None
@@ -180,7 +182,7 @@ def ocv(
 
 
 def optimal_mis(columns: ArrayLike, values: ArrayLike, *, integrals: Optional[ArrayLike] = None) -> Array:
-    """Optimal multiple importance sampling, its coefficients from the same samples; arguments as for `ocv`."""
+    """Optimal multiple importance sampling, with coefficients from the same samples; arguments as for `ocv`."""
     r, y, has_channels = _samples(columns, values)
     pair = (_rows(r, "columns", 2), _rows(y, "values", 2))
     estimate, _ = _lumiris.optimal_mis(pair, _integrals(integrals, r.shape[-1]))

@@ -1,4 +1,4 @@
-//! Comparison of two images, files or arrays.
+//! Comparison of two images, from files or arrays.
 
 use crate::images::Place;
 use lumiris::imaging::compare::load::read;
@@ -11,7 +11,7 @@ use pyo3::prelude::*;
 use std::collections::BTreeSet;
 use std::path::PathBuf;
 
-/// An image to compare: colours with the variances of their means and a place, or a file.
+/// An image to compare: a file, or colours with variances of their means and a position in the full image.
 #[derive(FromPyObject)]
 pub(crate) enum Input<'py> {
     #[pyo3(transparent)]
@@ -20,7 +20,7 @@ pub(crate) enum Input<'py> {
     File(PathBuf),
 }
 
-/// How images are compared.
+/// Options of a comparison.
 #[derive(Debug, FromPyObject)]
 #[pyo3(from_item_all)]
 pub(crate) struct Options {
@@ -35,6 +35,7 @@ pub(crate) struct Options {
 
 impl Options {
     fn checked(&self) -> PyResult<Settings> {
+        // Metrics
         let wrong = |text: &str| Err(PyValueError::new_err(text.to_owned()));
         let all = || Metric::ALL.map(<&str>::from).join(", ");
         let metric = |name: &String| {
@@ -43,6 +44,8 @@ impl Options {
         };
         let default = Settings::default();
         let asked = self.metrics.as_ref().map(|names| names.iter().map(metric).collect::<PyResult<BTreeSet<_>>>());
+
+        // Numbers, each with its range
         match self {
             _ if !self.exposure.is_finite() => wrong("exposure: expected a number"),
             _ if !(self.epsilon >= 0.0) => wrong("epsilon: must not be negative"),
@@ -61,7 +64,7 @@ impl Options {
     }
 }
 
-/// The colours of an array.
+/// The pixels of an array.
 fn pixels(array: &PyReadonlyArray3<'_, f32>) -> PyResult<Vec<Pixel>> {
     let (triples, rest) = array.as_slice()?.as_chunks::<3>();
     if array.shape()[2] != 3 || !rest.is_empty() {
@@ -73,11 +76,12 @@ fn pixels(array: &PyReadonlyArray3<'_, f32>) -> PyResult<Vec<Pixel>> {
     Ok(triples.to_vec())
 }
 
-/// Reads, or copies, an image.
+/// Reads a file or copies an array.
 fn load(py: Python<'_>, input: &Input<'_>, name: &str, layer: Option<&str>) -> PyResult<Raw> {
     match input {
         Input::File(path) => py.detach(|| read(path, layer)).map_err(PyOSError::new_err),
         Input::Array((array, variance, place)) => {
+            // Position in the full image
             let [height, width] = [array.shape()[0], array.shape()[1]];
             let (origin, full) = place.unwrap_or(([0, 0], [width, height]));
             let origin = origin.map(i32::try_from);
@@ -86,6 +90,8 @@ fn load(py: Python<'_>, input: &Input<'_>, name: &str, layer: Option<&str>) -> P
             if x as usize + width > full[0] || y as usize + height > full[1] {
                 return Err(PyValueError::new_err("the image does not lie in the full image"));
             }
+
+            // Pixels and variances
             if variance.as_ref().is_some_and(|v| v.shape() != array.shape()) {
                 return Err(PyValueError::new_err("the variance has another shape than the image"));
             }
@@ -95,7 +101,7 @@ fn load(py: Python<'_>, input: &Input<'_>, name: &str, layer: Option<&str>) -> P
     }
 }
 
-/// Numbers by their names; then maps of what was computed per pixel, with their sizes.
+/// Metrics by name, maps by name with the image's size, and the kind of noise.
 type Result<'py> = (Vec<(&'static str, Option<f64>)>, Vec<(&'static str, Bound<'py, PyArray2<f32>>)>, &'static str);
 
 /// Compares an image with its reference.
@@ -106,6 +112,7 @@ pub(crate) fn compare<'py>(
     reference: Input<'py>,
     options: Options,
 ) -> PyResult<Result<'py>> {
+    // Compare
     let settings = options.checked()?;
     let layer = options.layer.as_deref();
     let (image, reference) = (load(py, &image, "image", layer)?, load(py, &reference, "reference", layer)?);
@@ -118,6 +125,8 @@ pub(crate) fn compare<'py>(
     let Some(Compared { scores, maps, noise }) = compared.pop() else {
         return Err(PyValueError::new_err("there is nothing to compare"));
     };
+
+    // Metrics and maps
     let asked = COLUMNS.iter().filter(|column| column.metric.is_none_or(|metric| settings.metrics.contains(&metric)));
     let numbers = asked.map(|column| (column.key, (column.value)(&scores))).collect();
     let maps = [("flip", maps.flip), ("hdrflip", maps.hdr_flip), ("tvi", maps.tvi), ("z", maps.z)];

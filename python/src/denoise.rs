@@ -1,4 +1,4 @@
-//! Denoising by Open Image Denoise.
+//! Denoising with Open Image Denoise.
 
 use crate::images::array;
 use lumiris::imaging::Image;
@@ -10,8 +10,8 @@ use std::path::PathBuf;
 
 type Pixels<'py> = PyReadonlyArray3<'py, f32>;
 
-/// Denoises rows × columns × 3 by guides of that shape: the result, and the version of the library. `library` is that of
-/// the system by default, `threads` one per core.
+/// Denoises rows × columns × 3, guided by arrays of the same shape. Returns the result and the version of the library.
+/// By default, `library` is the system's and there is one thread per core.
 #[pyfunction]
 pub(crate) fn denoise<'py>(
     py: Python<'py>,
@@ -21,6 +21,7 @@ pub(crate) fn denoise<'py>(
     library: Option<PathBuf>,
     threads: Option<usize>,
 ) -> PyResult<(Bound<'py, PyArray3<f32>>, String)> {
+    // Copy the image and its guides
     let &[height, width, 3] = color.shape() else {
         return Err(PyValueError::new_err(format!("image: expected three channels, not shape {:?}", color.shape())));
     };
@@ -34,6 +35,8 @@ pub(crate) fn denoise<'py>(
     };
     let (albedo, normal) = (guide("albedo", &albedo)?, guide("normal", &normal)?);
     let noisy = NoisyImage { width, height, color: color.as_slice()?.to_vec(), albedo, normal };
+
+    // Denoise without the GIL
     let denoised = py.detach(|| {
         let denoiser = Denoiser::open(library.as_deref(), threads)?;
         let version = denoiser.version();
@@ -46,6 +49,8 @@ pub(crate) fn denoise<'py>(
         };
         PyRuntimeError::new_err(format!("{error}{hint}"))
     })?;
+
+    // The result as an array
     let channels = ["R", "G", "B"].map(str::to_owned).to_vec();
     Ok((array(py, Image { width, height, channels, data })?, version))
 }

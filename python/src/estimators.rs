@@ -18,7 +18,7 @@ fn wrong<T>(text: impl Into<String>) -> PyResult<T> {
     Err(PyValueError::new_err(text.into()))
 }
 
-/// Weights w of technique `a` against `b` at samples that `a` drew; with `is_factor` w/(n p) instead.
+/// Weights w of technique `a` against `b` at samples of `a`; with `is_factor`, w/(n p) instead.
 #[pyfunction]
 pub(crate) fn mis<'py>(
     py: Python<'py>,
@@ -27,6 +27,7 @@ pub(crate) fn mis<'py>(
     b: [PyReadonlyArray1<'py, f32>; 2],
     is_factor: bool,
 ) -> PyResult<Bound<'py, PyArray1<f32>>> {
+    // Check the arguments
     let Ok(heuristic) = heuristic.parse::<Heuristic>() else {
         return wrong(format!("heuristic: expected balance, power or maximum, but found `{heuristic}`"));
     };
@@ -34,6 +35,8 @@ pub(crate) fn mis<'py>(
     if [pa, nb, pb].iter().any(|v| v.len() != na.len()) {
         return wrong("numbers and densities of different lengths");
     }
+
+    // Compute without the GIL
     let weights: Vec<f32> = py.detach(|| {
         let weight = |i: usize| {
             let (a, b) = (Technique { n: na[i], p: pa[i] }, Technique { n: nb[i], p: pb[i] });
@@ -47,10 +50,10 @@ pub(crate) fn mis<'py>(
 /// Indices and scales, rows × draws.
 type Draws<'py> = (Bound<'py, PyArray2<u32>>, Bound<'py, PyArray2<f32>>);
 
-/// Draws of each row, by the words of the setting `strata`; `u` has a uniform number for each draw, and `u_ends` one for
-/// each end of strata of equal weights.
+/// Draws proposals in each row, with a value of the setting `strata`. `u` has a uniform number per draw, and `u_ends`
+/// one per end of strata of equal weights.
 ///
-/// Returns indices and scales. What cannot be drawn has scale 0.
+/// Returns indices and scales. A draw that is impossible has the scale 0.
 #[pyfunction]
 pub(crate) fn ris_draws<'py>(
     py: Python<'py>,
@@ -59,6 +62,7 @@ pub(crate) fn ris_draws<'py>(
     u: PyReadonlyArray2<'py, f32>,
     u_ends: PyReadonlyArray2<'py, f32>,
 ) -> PyResult<Draws<'py>> {
+    // Check the arguments
     let ([rows, m], [_, n], [_, ends]) = (dims(&weights), dims(&u), dims(&u_ends));
     if dims(&u)[0] != rows || dims(&u_ends)[0] != rows {
         return wrong("weights and uniform numbers of different numbers of rows");
@@ -73,6 +77,8 @@ pub(crate) fn ris_draws<'py>(
         Ok(strata) => strata,
         Err(_) => return wrong(format!("strata: expected {}, but found `{words}`", Strata::VARIANTS.join(", "))),
     };
+
+    // Draw row by row
     let (weights, u, u_ends) = (weights.as_slice()?, u.as_slice()?, u_ends.as_slice()?);
     let (mut index, mut scale) = (vec![0; rows * n], vec![0.0; rows * n]);
     py.detach(|| {
@@ -96,10 +102,10 @@ pub(crate) fn ris_draws<'py>(
     Ok((index.into_pyarray(py).reshape([rows, n])?, scale.into_pyarray(py).reshape([rows, n])?))
 }
 
-/// Samples of rows: columns r_j = p_j/p_α (rows × samples × m), and values y (rows × samples × 3).
+/// Samples of rows: columns r_j = p_j/p_α (rows × samples × m) and values y (rows × samples × 3).
 type Samples<'py> = (PyReadonlyArray3<'py, f32>, PyReadonlyArray3<'py, f32>);
 
-/// The sums of some samples of one row.
+/// Adds samples of one row to the sums.
 fn add(equations: NormalEquations, sums: &mut [f32], r: &[f32], y: &[f32]) {
     let columns: Vec<usize> = (0..equations.components()).collect();
     for (r, y) in r.chunks_exact(columns.len()).zip(y.as_chunks::<3>().0) {
@@ -108,7 +114,7 @@ fn add(equations: NormalEquations, sums: &mut [f32], r: &[f32], y: &[f32]) {
     }
 }
 
-/// The numbers of rows, samples and columns, if the shapes agree.
+/// The numbers of rows, samples and columns; fails if the shapes do not agree.
 fn shape((r, y): &Samples<'_>, integrals: &PyReadonlyArray1<'_, f32>) -> PyResult<[usize; 3]> {
     let ([rows, n, m], [y_rows, y_n, channels]) = (dims3(r), dims3(y));
     if [y_rows, y_n, channels] != [rows, n, 3] {
@@ -123,10 +129,10 @@ fn shape((r, y): &Samples<'_>, integrals: &PyReadonlyArray1<'_, f32>) -> PyResul
     Ok([rows, n, m])
 }
 
-/// Estimates (rows × 3), the coefficients (rows × fits × m × 3), and the number of ill-conditioned systems.
+/// Estimates (rows × 3), coefficients (rows × fits × m × 3), and the number of ill-conditioned systems.
 type Fitted<'py> = (Bound<'py, PyArray2<f32>>, Bound<'py, PyArray4<f32>>, usize);
 
-/// Optimizing control variates. `others` are the samples that the form `progressive` is fitted to.
+/// Optimizing control variates. `others` are the samples to which the form `progressive` is fitted.
 #[pyfunction]
 pub(crate) fn ocv<'py>(
     py: Python<'py>,
@@ -160,7 +166,7 @@ pub(crate) fn ocv<'py>(
     let mut estimates = Vec::with_capacity(3 * rows);
     let mut beta = vec![0.0; rows * fits * equations.coefficients()];
     let ill = py.detach(|| {
-        // Sums of each part of the samples of a row, centred
+        // Centred sums of each part of a row's samples
         let sums_of = |row: usize, n: usize, (r, y): (&[f32], &[f32])| {
             let mut sums = vec![0.0; fits * equations.len()];
             for (part, sums) in sums.chunks_exact_mut(equations.len()).enumerate() {
@@ -183,14 +189,15 @@ pub(crate) fn ocv<'py>(
     Ok((estimates.into_pyarray(py).reshape([rows, 3])?, beta, ill))
 }
 
-/// Optimal multiple importance sampling, its coefficients from the same samples: estimates (rows × 3), and the number of
-/// ill-conditioned systems.
+/// Optimal multiple importance sampling, with coefficients from the same samples. Returns estimates (rows × 3) and the
+/// number of ill-conditioned systems.
 #[pyfunction]
 pub(crate) fn optimal_mis<'py>(
     py: Python<'py>,
     samples: Samples<'py>,
     integrals: PyReadonlyArray1<'py, f32>,
 ) -> PyResult<(Bound<'py, PyArray2<f32>>, usize)> {
+    // One system per row
     let [rows, n, m] = shape(&samples, &integrals)?;
     let (r, y, integrals) = (samples.0.as_slice()?, samples.1.as_slice()?, integrals.as_slice()?);
     let equations = NormalEquations::new(m);

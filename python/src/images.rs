@@ -8,23 +8,23 @@ use pyo3::prelude::*;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
-/// A layer: its name, the names of its channels, and rows × columns × channels.
+/// A layer: its name, the names of its channels, and an array of rows × columns × channels.
 pub(crate) type Layer<'py> = (String, Vec<String>, Bound<'py, PyArray3<f32>>);
 
-/// Where an image lies in a larger one: column and row of its first pixel, columns and rows of the larger one.
+/// Position of an image in the full image: column and row of its first pixel, and columns and rows of the full image.
 pub(crate) type Place = ([usize; 2], [usize; 2]);
 
-/// An array that owns the values of an image.
+/// Moves the values of an image into an array.
 pub(crate) fn array(py: Python<'_>, image: Image) -> PyResult<Bound<'_, PyArray3<f32>>> {
     image.data.into_pyarray(py).reshape([image.height, image.width, image.channels.len()])
 }
 
-/// Layers as arrays that own their values.
+/// Moves the values of layers into arrays.
 pub(crate) fn arrays<'py>(py: Python<'py>, layers: Vec<(String, Image)>) -> PyResult<Vec<Layer<'py>>> {
     layers.into_iter().map(|(name, image)| Ok((name, image.channels.clone(), array(py, image)?))).collect()
 }
 
-/// The layers of an image by the names of its channels.
+/// Splits an image into layers, by the names of its channels.
 pub(crate) fn split(image: &Image) -> Vec<(String, Image)> {
     let stride = image.channels.len();
     let image_of = |layer: lumiris::imaging::Layer| {
@@ -35,7 +35,7 @@ pub(crate) fn split(image: &Image) -> Vec<(String, Image)> {
     layers(&image.channels).into_iter().map(image_of).collect()
 }
 
-/// The exception of an image that cannot be read or written.
+/// The exception for an image that cannot be read or written.
 pub(crate) fn image_error(error: ImageError) -> PyErr {
     let text = error.to_string();
     match error {
@@ -48,7 +48,7 @@ pub(crate) fn image_error(error: ImageError) -> PyErr {
     }
 }
 
-/// Reads a part of a file: layers of linear values, metadata, and the place of the pixels.
+/// Reads a part of a file: linear layers, metadata, and the position in the full image.
 #[pyfunction]
 pub(crate) fn read(
     py: Python<'_>,
@@ -70,7 +70,7 @@ pub(crate) fn read(
     Ok((arrays(py, found)?, read.metadata, place(&read.window, size)))
 }
 
-/// Where the pixels of a file lie; data outside the display window has no place in it.
+/// Position of the pixels of a file in the full image, which is extended to contain data outside the display window.
 fn place(window: &Window, size: [usize; 2]) -> Place {
     let offset = |a: usize| i64::from(window.origin[a]) - i64::from(window.full_origin[a]);
     let origin = [0, 1].map(|a| usize::try_from(offset(a)).unwrap_or(0));
@@ -78,7 +78,7 @@ fn place(window: &Window, size: [usize; 2]) -> Place {
     (origin, full)
 }
 
-/// Writes layers, by the names of their channels, to an EXR file of 32-bit floats.
+/// Writes layers, given the names of their channels, to an EXR file of 32-bit floats.
 #[pyfunction]
 pub(crate) fn write(
     py: Python<'_>,
@@ -87,6 +87,7 @@ pub(crate) fn write(
     metadata: Vec<(String, String)>,
     place: Option<Place>,
 ) -> PyResult<()> {
+    // Check the shapes
     let [height, width] = layers.first().map_or([0, 0], |(_, layer)| [layer.shape()[0], layer.shape()[1]]);
     let mut slices = Vec::with_capacity(layers.len());
     for (names, layer) in &layers {
@@ -101,6 +102,8 @@ pub(crate) fn write(
     if width * height == 0 {
         return Err(PyValueError::new_err("there is nothing to write"));
     }
+
+    // Interleave the layers and write
     let names: Vec<String> = layers.iter().flat_map(|(names, _)| names.clone()).collect();
     py.detach(|| {
         let pixel = |i: usize| slices.iter().flat_map(move |(count, data)| &data[i * count..(i + 1) * count]).copied();

@@ -1,10 +1,10 @@
-//! The native part of the Python module `lumiris`; `python/lumiris` wraps it with names, documentation and types.
+//! The native part of the Python module `lumiris`. `python/lumiris` wraps it with names, documentation and types.
 //!
-//! Numbers cross the boundary in NumPy arrays. What Rust has computed becomes an array as it is: the array owns the
-//! memory, nothing is copied. What takes long runs without the GIL.
+//! Numbers cross the boundary in NumPy arrays. Results of Rust become arrays without a copy: the array owns the memory.
+//! Long computations run without the GIL.
 //!
-//! Reading order: `settings` (keyword arguments), `images` (arrays and files), `render` with what its callback sees
-//! (`attendant`, `progress`), `parts`, `compare`, `denoise`, `estimators`.
+//! Reading order: `settings` (keyword arguments), `images` (arrays and files), `render` and its callback (`attendant`,
+//! `progress`), `parts`, `compare`, `denoise`, `estimators`.
 #![cfg(feature = "module")]
 
 mod attendant;

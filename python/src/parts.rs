@@ -29,15 +29,16 @@ pub(crate) struct PartOptions {
 #[derive(Debug)]
 pub(crate) struct Parts {
     pub(crate) extent: Extent,
-    /// Where the sums are stored in the end.
+    /// File for the exact sums at the end.
     pub(crate) file: Option<PathBuf>,
     pub(crate) checkpoint: Option<(PathBuf, Duration)>,
     resume: Option<PathBuf>,
 }
 
 impl PartOptions {
-    /// `is_limited` tells whether the time of the rendering is.
+    /// Checks the options. `is_limited` is true if the rendering has a time limit.
     pub(crate) fn checked(self, is_limited: bool) -> PyResult<Parts> {
+        // Extent
         let is_by_tiles = match self.part_by.as_str() {
             "samples" => false,
             "tiles" => true,
@@ -49,6 +50,8 @@ impl PartOptions {
         if part.is_some() && self.part_file.is_none() {
             return Err(PyValueError::new_err("part needs a part_file for lumiris.merge"));
         }
+
+        // Checkpoint
         let interval = |(path, seconds): (PathBuf, f64)| {
             let duration = Duration::try_from_secs_f64(seconds).ok().filter(|duration| !duration.is_zero());
             duration.map(|duration| (path, duration))
@@ -57,6 +60,8 @@ impl PartOptions {
             interval(given).ok_or_else(|| PyValueError::new_err("checkpoint: expected a positive number of seconds"))
         });
         let checkpoint = checkpoint.transpose()?;
+
+        // Files
         let mut files = checkpoint.iter().map(|(path, _)| path).chain(&self.part_file);
         files.try_for_each(|path| check_destination(path).map(drop))?;
         Ok(Parts { extent, file: self.part_file, checkpoint, resume: self.resume })
@@ -64,7 +69,7 @@ impl PartOptions {
 }
 
 impl Parts {
-    /// What the rendering goes on from, if it does.
+    /// The stored state to resume from, if any.
     pub(crate) fn stored(&self) -> Result<Option<Stored>, PartError> {
         let checkpoint = self.checkpoint.as_ref().map(|(path, _)| path.as_path());
         let stored = self.resume.as_ref().map(|path| Stored::read(path, checkpoint)).transpose()?;
@@ -72,7 +77,7 @@ impl Parts {
     }
 }
 
-/// A reason with names of keywords in place of options.
+/// The text of an error, with keywords in place of command-line options.
 pub(crate) fn in_words_of_python(error: &dyn std::error::Error) -> String {
     let text = error.to_string();
     let mut words = text.split("--");
@@ -83,7 +88,7 @@ pub(crate) fn in_words_of_python(error: &dyn std::error::Error) -> String {
     })
 }
 
-/// The exception of files of sums.
+/// The exception for files of parts and checkpoints.
 pub(crate) fn part_error(error: PartError) -> PyErr {
     match &error {
         PartError::Io { cause, .. } => io::Error::new(cause.kind(), error.to_string()).into(),
@@ -94,12 +99,12 @@ pub(crate) fn part_error(error: PartError) -> PyErr {
     }
 }
 
-/// Where the pixels of a film lie.
+/// Position of a film's pixels in the full image.
 pub(crate) fn place(film: &Film) -> Place {
     ([film.bounds.x0 as usize, film.bounds.y0 as usize], film.resolution.map(|n| n as usize))
 }
 
-/// What `merge` returns: layers, metadata, place, what is missing, and seconds.
+/// Return value of `merge`: layers, metadata, position, missing parts, and time (s).
 type MergedLayers<'py> = (Vec<Layer<'py>>, Vec<(String, String)>, Place, Vec<String>, f64);
 
 /// Merges parts.

@@ -1,4 +1,4 @@
-//! What a callback sees of a rendering under way.
+//! Progress of a rendering for its callback.
 
 use crate::images::array;
 use lumiris::film::{Film, FilmTile, PixelBounds};
@@ -11,11 +11,11 @@ use pyo3::types::PyDict;
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// The pixels of an image as they are by now.
+/// The current pixels of an image.
 pub(crate) struct Canvas {
     resolution: [u32; 2],
     bounds: PixelBounds,
-    /// By left and top.
+    /// Keyed by left and top.
     tiles: Mutex<BTreeMap<[u32; 2], FilmTile>>,
     aovs: Vec<Aov>,
 }
@@ -25,13 +25,13 @@ impl Canvas {
         Canvas { resolution, bounds, tiles: Mutex::default(), aovs: live_aovs(has_features) }
     }
 
-    /// Takes the film of a tile, whose sums it shares.
+    /// Stores the tiles of a film. Their sums are shared.
     pub(crate) fn set_tile(&self, film: &Film) {
         let mut tiles = self.tiles.lock().unwrap_or_else(PoisonError::into_inner);
         tiles.extend(film.tiles().iter().map(|tile| ([tile.bounds.x0, tile.bounds.y0], tile.clone())));
     }
 
-    /// The film of all tiles that there are.
+    /// The film of all tiles stored so far.
     fn film(&self) -> Film {
         let tiles = self.tiles.lock().unwrap_or_else(PoisonError::into_inner).values().cloned().collect();
         Film::new(self.resolution, self.bounds, tiles, Vec::new())
@@ -42,7 +42,7 @@ impl Canvas {
 #[pyclass(frozen, name = "Progress", module = "lumiris")]
 pub(crate) struct PassProgress {
     pub(crate) progress: Progress,
-    /// True after a pass over the whole image: the rendering waits.
+    /// True after a pass over the whole image, while the rendering waits.
     #[pyo3(get)]
     pub(crate) is_pass: bool,
     pub(crate) canvas: Arc<Canvas>,
@@ -50,13 +50,13 @@ pub(crate) struct PassProgress {
 
 #[pymethods]
 impl PassProgress {
-    /// Share of the camera samples that are done, 0 to 1.
+    /// Share of the camera samples done, 0 to 1.
     #[getter]
     fn fraction(&self) -> f64 {
         self.progress.samples_done as f64 / self.progress.samples_total.max(1) as f64
     }
 
-    /// Passes over the whole image that are done.
+    /// Passes over the whole image done.
     #[getter]
     fn passes(&self) -> u32 {
         self.progress.passes
@@ -86,20 +86,21 @@ impl PassProgress {
         self.progress.elapsed.as_secs_f64()
     }
 
-    /// Median over blocks of 16 × 16 pixels of their relative standard error, as last determined; `None` before.
+    /// Median of the relative standard errors of blocks of 16 × 16 pixels, at its last computation; `None` before the
+    /// first.
     #[getter]
     fn noise(&self) -> Option<f64> {
         self.progress.noise
     }
 
-    /// The image as it is by now.
+    /// The current image.
     fn image<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray3<f32>>> {
         let mut images = self.images(py, &[]);
         let (_, image) = images.remove(0);
         array(py, image)
     }
 
-    /// The image, features of the first surfaces, and numbers of samples, as they are by now.
+    /// The current image, features of the first surfaces, and sample counts.
     fn layers<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let layers = PyDict::new(py);
         for (name, image) in self.images(py, &self.canvas.aovs) {

@@ -1,4 +1,4 @@
-//! Rendering: options, and the work in a thread of its own.
+//! Rendering: options, and the work in a separate thread.
 
 use crate::attendant::{Attendant, Event};
 use crate::images::{Layer, Place, arrays, split};
@@ -33,7 +33,7 @@ use std::time::{Duration, Instant};
 
 pyo3::create_exception!(lumiris, SceneError, PyException, "A scene that cannot be loaded.");
 
-/// What to render: a file, or a text with a name and the folder of the files that it names.
+/// The scene: a file, or a text with a name and the folder of its files.
 #[derive(Debug, FromPyObject)]
 enum Source {
     #[pyo3(transparent)]
@@ -42,7 +42,7 @@ enum Source {
     File(PathBuf),
 }
 
-/// Options that are no settings of the image.
+/// Options of a rendering. Settings of the image are texts in `settings`.
 #[derive(Debug, FromPyObject)]
 #[pyo3(from_item_all)]
 pub(crate) struct Options {
@@ -74,7 +74,7 @@ pub(crate) struct Options {
 struct Request {
     source: Source,
     asked: Asked,
-    /// Most bytes of textures in memory.
+    /// Memory limit for textures (bytes).
     texture_memory: Option<u64>,
     packet_width: Option<u32>,
     render: RenderSettings,
@@ -88,7 +88,7 @@ struct Request {
 /// Layers by their names.
 type NamedImages = Vec<(String, Image)>;
 
-/// A rendering with all that is told of it.
+/// Results of a rendering.
 struct Done {
     layers: NamedImages,
     metadata: Vec<(String, String)>,
@@ -99,18 +99,19 @@ struct Done {
     warnings: Vec<String>,
 }
 
-/// Why there is no image.
+/// Reason for a rendering without a result.
 enum Failure {
     Scene(Box<Report>),
     Value(String),
     Part(PartError),
     Other(String),
-    /// Ctrl-C, or an exception, ended the work before there was anything to keep.
+    /// Ctrl-C or an exception ended the work before the first sample.
     Stopped,
 }
 
 impl Options {
     fn checked(self) -> PyResult<Request> {
+        // Names
         let wrong = |text: String| Err(PyValueError::new_err(text));
         let accel = self.accel.parse().map_err(|_| PyValueError::new_err("accel: expected embree or bvh"))?;
         let parse_aov =
@@ -123,6 +124,8 @@ impl Options {
         };
         let cryptomatte = self.cryptomatte.iter().map(cryptomatte).collect::<PyResult<Vec<Cryptomatte>>>()?;
         let texture_memory = self.texture_memory.as_deref().map(bytes).transpose()?;
+
+        // Ranges of numbers
         if self.resolution.is_some_and(|size| size.iter().any(|n| !(1..=65_536).contains(n))) {
             return wrong("resolution: expected two whole numbers from 1 to 65536".to_owned());
         }
@@ -139,6 +142,8 @@ impl Options {
                 return wrong(format!("{name}: expected a whole number from 1 to 4096"));
             }
         }
+
+        // Times, part and light units
         let seconds = |name: &str, seconds: f64| {
             let duration = Duration::try_from_secs_f64(seconds).ok().filter(|duration| !duration.is_zero());
             duration.ok_or_else(|| PyValueError::new_err(format!("{name}: expected a positive number of seconds")))
@@ -191,7 +196,7 @@ impl Source {
 }
 
 impl Request {
-    /// Loads the scene and applies the settings, after those of what is stored.
+    /// Loads the scene and applies the settings, after the settings of the stored state.
     fn load(&self, asked: &Asked, stored: Option<&Stored>) -> Result<Loaded, Failure> {
         let files = FileCache::default();
         if let Some(bytes) = self.texture_memory {
@@ -214,7 +219,7 @@ impl Request {
         }
         complete_for_noise(&mut loaded.settings, self.spp().is_some())
             .map_err(|needs| Failure::Value(format!("noise {needs}")))?;
-        // More samples belong to what the first ones were prepared for
+        // Additional samples use the same preparation as the first ones
         if let Some(stored) = stored {
             loaded.settings.sampling.spp = stored.spp().map_err(Failure::Part)?;
         }
@@ -224,13 +229,13 @@ impl Request {
         Ok(loaded)
     }
 
-    /// The number of samples that is asked for.
+    /// The requested number of samples per pixel.
     fn spp(&self) -> Option<u32> {
         let (_, value) = self.settings.iter().find(|(row, _)| row.flag == "spp")?;
         value.integer().and_then(|n| u32::try_from(n).ok())
     }
 
-    /// All the work. `hooks` are there if someone is called back.
+    /// Does all the work. `events` is given if there is a callback.
     fn run(
         &self,
         stop: &AtomicBool,
@@ -239,6 +244,7 @@ impl Request {
     ) -> Result<Done, Failure> {
         let goes_on = || if stop.load(Ordering::Relaxed) { Err(Failure::Stopped) } else { Ok(()) };
         let other = |error: &dyn std::error::Error| Failure::Other(error.to_string());
+        // Load
         let mut asked = self.asked.clone();
         let stored = self.parts.stored().map_err(Failure::Part)?;
         stored.as_ref().map_or(Ok(()), |stored| asked.complete(stored)).map_err(Failure::Part)?;
@@ -249,12 +255,16 @@ impl Request {
             warnings.push("without samples on non-contributing lights, direct light is biased".to_owned());
         }
         goes_on()?;
+
+        // Build the ray tracer
         let (files, given) = (std::mem::take(&mut loaded.files), std::mem::take(&mut loaded.given));
         let mut job = loaded.job(asked.accel, self.packet_width).map_err(|error| other(&error))?;
         let extent = &self.parts.extent;
         let divided = extent.check_settings(job.settings());
         divided.map_err(|error| Failure::Value(in_words_of_python(&error)))?;
         goes_on()?;
+
+        // Choose open settings
         let asks_for_ratio = asked.aovs.as_ref().is_some_and(|list| list.contains(&Aov::Ratio));
         let limit = self.render.time_limit.filter(|_| stored.is_none());
         let how = Preparation {
@@ -272,6 +282,7 @@ impl Request {
         warnings.extend(plan.warnings);
         warnings.extend(given.without_effect(&before, job.settings()));
 
+        // Render
         let mut settings = self.render_settings(&asked, &job);
         settings.time_limit = settings.time_limit.map(|limit| limit.saturating_sub(start.elapsed()));
         let (mut film_file, told) = self.film_file(&asked, (&job, &files), &mut settings, stored)?;
@@ -283,6 +294,8 @@ impl Request {
             film_file.end(&rendering);
             film_file.write(path, &rendering).map_err(Failure::Part)?;
         }
+
+        // Layers and metadata
         let (layers, metadata) = self.layers(&asked, (&job, &settings), &rendering)?;
         Ok(Done {
             layers,
@@ -295,7 +308,7 @@ impl Request {
         })
     }
 
-    /// How to render what is asked for.
+    /// The render settings for the requested layers.
     fn render_settings(&self, asked: &Asked, job: &RenderJob) -> RenderSettings {
         let needs = |is_shown: fn(&Aov) -> bool| asked.aovs.as_ref().is_none_or(|list| list.iter().any(is_shown));
         RenderSettings {
@@ -306,7 +319,7 @@ impl Request {
         }
     }
 
-    /// Sets what is rendered; what is stored of it, if anything is, and where warnings of that arrive.
+    /// Sets the sample range of the rendering. Returns the file of sums, if any, and the receiver of its warnings.
     fn film_file(
         &self,
         asked: &Asked,
@@ -323,19 +336,20 @@ impl Request {
             return Ok((None, told));
         }
         let storage = Storage { checkpoint: checkpoint.clone(), keeps_sums: file.is_some(), stored, plan: None };
-        // Nobody listens any more once the image is there: that is no error
+        // Nobody receives after the rendering has ended: that is no error
         let warn = move |text: &str| drop(warn.send(text.to_owned()));
         let film_file = FilmFile::new(asked, job, (settings, spp), storage, warn).map_err(Failure::Part)?;
         Ok((Some(film_file), told))
     }
 
-    /// The layers of the image, and its metadata.
+    /// The layers and the metadata of the image.
     fn layers(
         &self,
         asked: &Asked,
         (job, settings): (&RenderJob, &RenderSettings),
         rendering: &Rendering,
     ) -> Result<(NamedImages, Vec<(String, String)>), Failure> {
+        // Layers of the film
         let has = (job.sample_count_map.is_some(), rendering.cache.is_some());
         let aovs = asked.aovs.clone().unwrap_or_else(|| output::default_aovs(&rendering.film, has.0, has.1));
         let mut layers = output::layers(&rendering.film, &aovs, job.sample_count_map.as_ref());
@@ -343,6 +357,8 @@ impl Request {
         metadata.push(("lumiris:scene".to_owned(), asked.scene.clone()));
         metadata.push(("lumiris:accel".to_owned(), <&str>::from(asked.accel).to_owned()));
         metadata.extend(output::progress_metadata(rendering));
+
+        // Cryptomattes
         let ids = cryptomattes(job, settings, &rendering.film, &self.cryptomatte);
         for ids in ids.map_err(|error| Failure::Other(error.to_string()))? {
             let PixelBounds { x0, y0, x1, y1 } = rendering.film.bounds;
@@ -356,7 +372,7 @@ impl Request {
     }
 }
 
-/// A number of bytes, as on the command line.
+/// Parses a number of bytes as on the command line.
 fn bytes(text: &str) -> PyResult<u64> {
     match Kind::Bytes.parse(text) {
         Ok(Value::Integer(bytes)) => Ok(bytes),
@@ -365,7 +381,7 @@ fn bytes(text: &str) -> PyResult<u64> {
     }
 }
 
-/// Renders; tells of tiles and passes if there is someone to tell.
+/// Renders; sends tiles and passes if there is a callback.
 fn observed(
     (job, settings): (&RenderJob, &RenderSettings),
     (stop, latest): (&AtomicBool, &Mutex<Option<Progress>>),
@@ -375,7 +391,7 @@ fn observed(
     let Some(events) = events else { return go_on(job, settings, stop, &|_| (), continuation) };
     let film = &job.world.scene.film;
     let canvas = Arc::new(Canvas::new(film.resolution, film.bounds, settings.with_features));
-    // Nobody listens any more once the rendering is to stop: that is no error
+    // Nobody receives once the rendering is to stop: that is no error
     let _ = events.send(Event::Begin(Arc::clone(&canvas)));
     let observe = |progress: &Progress| *latest.lock().unwrap_or_else(PoisonError::into_inner) = Some(*progress);
     let set_tile = |tile: &Film| canvas.set_tile(tile);
@@ -389,7 +405,7 @@ fn observed(
     go_on(job, settings, stop, &observe, hooks)
 }
 
-/// The exception of a failure.
+/// The exception for a failure.
 fn exception(py: Python<'_>, request: &Request, failure: Failure) -> PyErr {
     match failure {
         Failure::Value(text) => PyValueError::new_err(text),
@@ -400,7 +416,7 @@ fn exception(py: Python<'_>, request: &Request, failure: Failure) -> PyErr {
             let error = SceneError::new_err(report.to_string().trim_end().to_owned());
             let first = report.errors().next();
             let place = first.and_then(|entry| entry.location.as_ref());
-            // Binary files have neither
+            // Positions in binary files have neither line nor column
             let text = place.and_then(|place| match place.position {
                 Position::Text { line, column } => Some((line, column)),
                 Position::Byte(_) => None,
@@ -417,13 +433,14 @@ fn exception(py: Python<'_>, request: &Request, failure: Failure) -> PyErr {
     }
 }
 
-/// What `render` returns: layers, metadata, place, plan, whether all samples are done, seconds, and warnings.
+/// Return value of `render`: layers, metadata, position, plan, true if all samples are done, time (s), and warnings.
 type Rendered<'py> =
     (Vec<Layer<'py>>, Vec<(String, String)>, Place, Vec<(&'static str, String)>, bool, f64, Vec<String>);
 
-/// Renders.
+/// Renders in another thread, while this one calls back and checks for Ctrl-C.
 #[pyfunction]
 pub(crate) fn render(py: Python<'_>, options: Options, callback: Option<Py<PyAny>>) -> PyResult<Rendered<'_>> {
+    // Arguments
     let request = options.checked()?;
     let (stop, latest) = (AtomicBool::new(false), Mutex::new(None));
     let mut attendant = Attendant {
@@ -435,6 +452,8 @@ pub(crate) fn render(py: Python<'_>, options: Options, callback: Option<Py<PyAny
         called: Instant::now(),
         raised: None,
     };
+
+    // Render without the GIL
     let result = py.detach(|| {
         std::thread::scope(|scope| {
             let (sender, events) = channel();
@@ -449,6 +468,8 @@ pub(crate) fn render(py: Python<'_>, options: Options, callback: Option<Py<PyAny
             worker.join()
         })
     });
+
+    // Exceptions of this thread come first
     if let Some(error) = attendant.raised {
         return Err(error);
     }

@@ -1,4 +1,4 @@
-//! The table of settings as keyword arguments: the names of the command line with underscores.
+//! The table of settings as keyword arguments: command-line names with underscores.
 
 use lumiris::settings::Settings;
 use lumiris::settings::table::{GROUPS, Removed, Setting, rows};
@@ -8,15 +8,15 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::ffi::CString;
 
-/// Settings with their values, in the order of the table.
+/// Settings with their values, in table order.
 pub(crate) type Given = Vec<(&'static Setting, Value)>;
 
-/// The keyword of a name of the command line.
+/// The keyword for a command-line name.
 fn keyword(flag: &str) -> String {
     flag.replace('-', "_")
 }
 
-/// Parses keyword arguments that are written as on the command line.
+/// Parses keyword arguments whose values are texts as on the command line.
 pub(crate) fn parse(given: &[(String, String)]) -> PyResult<Given> {
     let is_called = |row: &Setting, name: &str| row.aliases.iter().chain([&row.flag]).any(|f| keyword(f) == name);
     if let Some((name, _)) = given.iter().find(|(name, _)| !rows().any(|row| is_called(row, name))) {
@@ -36,7 +36,7 @@ pub(crate) fn parse(given: &[(String, String)]) -> PyResult<Given> {
         .collect()
 }
 
-/// Parses the settings of a plan, by their names in metadata.
+/// Parses the settings of a plan, by their metadata names.
 pub(crate) fn parse_plan(plan: &[(String, String)]) -> PyResult<Given> {
     let parse = |(key, text): &(String, String)| {
         let row = rows().find(|row| row.key == key);
@@ -52,23 +52,24 @@ pub(crate) fn parse_plan(plan: &[(String, String)]) -> PyResult<Given> {
     present.into_iter().map(parse).collect()
 }
 
-/// The settings as messages name them.
+/// The settings with their text for messages.
 pub(crate) fn named(given: &Given) -> lumiris::settings::Given {
     let mut named = lumiris::settings::Given::default();
     given.iter().for_each(|(row, value)| named.add(row, *value, format!("{}={value}", keyword(row.flag))));
     named
 }
 
-/// Sets all values.
+/// Applies all values.
 pub(crate) fn apply(given: &Given, settings: &mut Settings) {
     for (row, value) in given {
         (row.set)(settings, *value).expect("the parser of a setting accepts only values of its kind");
     }
 }
 
-/// All settings by their keywords: help, default, group, allowed values in words, and the names that are allowed.
+/// All settings by keyword: help, default, group, allowed values as text, and allowed names.
 #[pyfunction]
 pub(crate) fn settings(py: Python<'_>) -> PyResult<Bound<'_, PyDict>> {
+    // Names and kind of numbers; then the row's texts
     let table = PyDict::new(py);
     for group in GROUPS {
         for row in group.rows {

@@ -1,4 +1,4 @@
-"""What the tests share."""
+"""Fixtures of the tests."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import pytest
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 
-#: A floor of known colour under a constant sky; half of it is covered by a box.
+#: A floor of known colour with a sphere, under a constant sky and a point light.
 SCENE = """
 LookAt 0 -3 2  0 0 0  0 0 1
 Camera "perspective" "float fov" [ 60 ]
@@ -35,7 +35,7 @@ def scene_file(tmp_path: pathlib.Path) -> pathlib.Path:
 
 @pytest.fixture
 def program() -> str:
-    """The program of the command line."""
+    """The command-line program."""
     path = os.environ.get("LUMIRIS")
     if path is None:
         pytest.skip("LUMIRIS does not name the program to compare with")

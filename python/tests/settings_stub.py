@@ -1,22 +1,22 @@
-"""Makes lumiris/_settings.pyi of the table of settings: `python settings_stub.py > ../lumiris/_settings.pyi`."""
+"""Generates lumiris/_settings.pyi from the table of settings: `python settings_stub.py > ../lumiris/_settings.pyi`."""
 
 from __future__ import annotations
 
 from lumiris import _lumiris
 
-#: Types of the numbers that settings can be.
+#: Types of the numbers in settings.
 NUMBERS = {
     "int": "int",
     "float": "float",
     "pair": "Tuple[float, float]",
-    # A name, or one with a number after a colon
+    # A name, with or without a number after a colon
     "graded": "str",
     "bytes": "Union[int, str]",
 }
 
 
 def value_type(row: _lumiris.SettingRow) -> str:
-    """What a value of a setting can be, in Python."""
+    """The Python type of a setting."""
     types = [NUMBERS[row["numbers"]]] if row["numbers"] else []
     names = [name for name in row["names"] if row["numbers"] != "graded"]
     if names:

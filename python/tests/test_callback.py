@@ -29,7 +29,7 @@ def test_every_pass_is_told_with_its_image() -> None:
     assert [passes for passes, _, _ in told] == [1, 2, 3, 4, 5]
     assert [fraction for _, fraction, _ in told] == [1 / 16, 1 / 8, 1 / 4, 1 / 2, 1.0]
     assert np.array_equal(told[-1][2], image["beauty"])
-    # The image of a pass is that of its samples alone
+    # The image of a pass contains its samples only
     assert np.array_equal(told[1][2], lumiris.render(SCENE, spp=2)["beauty"])
     assert not np.array_equal(told[0][2], told[1][2])
 
@@ -62,7 +62,7 @@ def test_exceptions_of_the_callback_are_raised() -> None:
     with pytest.raises(KeyError, match="no more"):
         lumiris.render(SCENE, spp=1024, resolution=(200, 200), estimator="mc", callback=callback)
     assert len(calls) == 1
-    # What is kept of the rendering remains readable
+    # A stored progress object remains readable
     assert calls[0].image().shape == (200, 200, 3)
 
 
@@ -83,7 +83,7 @@ def test_other_threads_run_meanwhile() -> None:
     done, elapsed = turns - before, time.monotonic() - start
     ended.set()
     thread.join()
-    # With the GIL held there would be one or none
+    # With the GIL held there would be at most one
     assert done >= 10 * elapsed and done > 3, f"{done} turns in {elapsed:.2f} s"
 
 

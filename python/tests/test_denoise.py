@@ -15,7 +15,7 @@ from conftest import SCENE
 
 @pytest.fixture
 def library() -> str:
-    """Open Image Denoise."""
+    """Path of Open Image Denoise."""
     path = os.environ.get("LUMIRIS_OIDN")
     if not path:
         pytest.skip("LUMIRIS_OIDN does not name Open Image Denoise")

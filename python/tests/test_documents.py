@@ -1,4 +1,4 @@
-"""What is written of the module: types of settings, and the example."""
+"""Documentation of the module: types of the settings, and the examples."""
 
 from __future__ import annotations
 

@@ -28,7 +28,7 @@ def test_weights_follow_their_formulas_and_sum_to_one() -> None:
 
 
 def test_mis_integrates() -> None:
-    # ∫ 3x² over 0..1 by densities 1 and 2x
+    # ∫ 3x² over 0..1 with the densities 1 and 2x
     rng = np.random.default_rng(2)
     n = 20_000
     x, y = rng.random(n), np.sqrt(rng.random(n))
@@ -51,7 +51,7 @@ def test_resampling_is_unbiased(strata: str, channels: Tuple[int, ...]) -> None:
     estimates = estimators.ris(np.broadcast_to(w, (rows, m)), contributions, u, strata=strata, u_ends=ends)
     assert estimates.shape == (rows, *channels) and estimates.dtype == np.float32
     error = estimates.std(axis=0) / np.sqrt(rows)
-    # 4.5 standard errors: one right estimate in 10⁵ fails; a bias of 1 % of the sum is five of them or more
+    # 4.5 standard errors: one correct estimate in 10⁵ fails; a bias of 1 % of the sum is at least five of them
     assert (abs(estimates.mean(axis=0) - c.sum(axis=0)) < 4.5 * error).all()
     assert (error < 0.002 * c.sum(axis=0)).all()
 
@@ -61,7 +61,7 @@ def test_draws_are_indices_with_scales() -> None:
     assert draws.indices.tolist() == [1, 2] and np.allclose(draws.scale, [4 / 2 / 1, 4 / 2 / 3])
     nothing = estimators.ris_draws(np.zeros((2, 3)), np.full((2, 4), 0.5))
     assert nothing.indices.shape == (2, 4) and (nothing.scale == 0).all()
-    # As many strata as proposals: each is drawn once
+    # With one stratum per proposal, each is drawn once
     w = np.array([0.2, 0.3, 0.5])
     assert estimators.ris(w, [1, 2, 4], [0.5] * 3, strata="proposals") == 7
     for weights, u in ((np.ones((2, 3)), np.ones((3, 2))), (np.ones(3), 0.5), (np.ones((2, 3)), np.ones(2))):
@@ -76,7 +76,7 @@ def test_draws_are_indices_with_scales() -> None:
 
 
 def _samples(rng: np.random.Generator, rows: int, n: int) -> Tuple[np.ndarray, np.ndarray]:
-    """Columns of two densities 1 and 2x, half of the samples of each, and values of f = 1 + 4x + sin(9x)/4."""
+    """Columns for the densities 1 and 2x, with half of the samples each, and values of f = 1 + 4x + sin(9x)/4."""
     x = rng.random((rows, n))
     x[:, 1::2] = np.sqrt(x[:, 1::2])
     mixture = 0.5 + x
@@ -113,7 +113,7 @@ def test_colours_and_single_estimates_are_rows_of_many() -> None:
     assert np.allclose(many.estimate[:, 1], 2 * many.estimate[:, 0], rtol=1e-3)
     grey = estimators.ocv(r.reshape(2, 3, 20, 2), y.reshape(2, 3, 20))
     assert np.array_equal(grey.estimate, many.estimate[:, 0].reshape(2, 3))
-    # The paper's ridge is felt with few samples
+    # The paper's ridge has an effect with few samples
     paper = estimators.ocv(r, y, form="paper").estimate
     assert paper.shape == (6,) and not np.allclose(paper, grey.estimate.reshape(-1))
 

@@ -73,7 +73,7 @@ def test_a_checkpoint_goes_on_to_the_bits_of_the_uninterrupted_image(program: st
     subprocess.run([program, "render", "-q", str(scene_file), "--resume", film, "-o", exr], check=True)
     assert_same(lumiris.read(exr), whole)
 
-    # The same call starts, goes on, and asks for more
+    # The same call starts, resumes, and renders more samples
     again = scene_file.parent / "again.film"
     for _ in range(2):
         image = lumiris.render(scene_file, **OPTIONS, checkpoint=again, resume=again)

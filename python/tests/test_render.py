@@ -22,7 +22,7 @@ def test_layers_are_float_arrays_of_the_memory_that_the_renderer_has_filled() ->
         assert layer.dtype == np.float32 and layer.shape[:2] == (30, 40), name
         assert layer.shape[2] == len(image.channels[name])
         assert layer.flags.c_contiguous and layer.flags.writeable
-        # A view of an array whose memory belongs to an object that is no array
+        # A view of an array whose memory belongs to an object that is not an array
         base = layer.base
         assert not layer.flags.owndata and isinstance(base, np.ndarray) and not base.flags.owndata
         assert base.base is not None and type(base.base).__name__ == "PySliceContainer"
@@ -101,7 +101,7 @@ def test_every_name_that_a_setting_can_have_is_accepted_and_recorded() -> None:
                 options[keyword] = f"{name}:0.5"
             metadata = lumiris.render(SCENE, **options).metadata
             recorded += metadata.get(f"lumiris:{setting.key}") == options[keyword]
-    # Some are recorded as what is chosen for `auto`, some belong to other estimators
+    # Some are recorded as the choice made for `auto`, some apply to other estimators only
     assert recorded > 25
 
 
@@ -196,7 +196,7 @@ def test_textures_beyond_a_limit_give_the_same_image(
         lumiris.render(scene, folder=tmp_path, **TINY, texture_memory=limit)["beauty"] for limit in (None, 100_000, "1K")
     ]
     assert len({image.tobytes() for image in images}) == 1
-    # They are in a file, and only those that do not fit
+    # The file holds only textures beyond the limit
     monkeypatch.setenv("TMPDIR", str(tmp_path / "nowhere"))
     lumiris.render(scene, folder=tmp_path, **TINY, texture_memory="1G")
     with pytest.raises(lumiris.SceneError, match="no temporary file"):
@@ -214,7 +214,7 @@ def test_cryptomattes_are_those_of_the_program(scene_file: pathlib.Path, program
     assert len(names) == 3
     for name in names:
         assert np.array_equal(image[name].view(np.uint32), expected[name].view(np.uint32)), name
-    # The floor and the sphere cover what is no sky
+    # The floor and the sphere cover everything except the sky
     coverage = sum(image[name][:, :, 1::2].sum(axis=2) for name in names)
     assert np.all(coverage <= 1.0 + 1e-6) and np.mean(coverage > 0.99) > 0.5
     entries = {key: value for key, value in image.metadata.items() if key.startswith("cryptomatte/")}

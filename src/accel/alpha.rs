@@ -1,4 +1,4 @@
-//! Alpha masks: which hits on a geometry with an alpha texture stop a ray. Both ray tracers call this.
+//! Alpha masks: decides whether a hit on a geometry with an alpha texture stops a ray. Used by both ray tracers.
 
 use super::Hit;
 use crate::geometry::{AlphaSource, GeometrySet};
@@ -14,16 +14,16 @@ pub struct AlphaTest {
 }
 
 impl AlphaTest {
-    /// The test for the geometries of `geometry`, whose `alpha` are textures of `source`.
+    /// The test for `geometry`, whose `alpha` are textures of `source`.
     pub fn new(geometry: Arc<GeometrySet>, source: Arc<dyn AlphaSource>) -> Self {
         AlphaTest { geometry, source }
     }
 
-    /// True if the ray is stopped, which happens with probability alpha. `world_ray` is the ray in world space, not one
-    /// transformed into an instance; `crossing` tells the hits of one primitive apart, 0 or 1.
+    /// True if the hit stops the ray, which happens with probability alpha. `world_ray` is the ray in world space, not
+    /// transformed into an instance. `crossing`, 0 or 1, distinguishes hits on the same primitive.
     ///
-    /// The decision is a hash of the ray and of the hit, so it is the same however often and in whatever order a tracer
-    /// calls this, and independent between the hits along a ray.
+    /// The decision is a hash of the ray and of the hit. It is therefore independent of the number and order of calls,
+    /// and independent between the hits along a ray.
     pub fn stops(&self, (hit, crossing): (&Hit, usize), world_ray: &Ray) -> bool {
         let geometry = &self.geometry.geometries[hit.geometry as usize];
         let Some(texture) = geometry.alpha else { return true };

@@ -1,7 +1,10 @@
-//! Ray tracing: one interface and two implementations that check each other.
+//! Ray tracing: one interface, and two implementations that check each other.
 //!
-//! [`embree`] is the fast one, [`bvh`] the pure-Rust reference. Rays come in structure-of-arrays batches; the results
-//! of a batch do not depend on how it is divided into packets.
+//! * [`embree`]: the fast tracer
+//! * [`bvh`]: the pure-Rust reference
+//! * [`alpha`]: alpha masks of both
+//!
+//! Rays come in structure-of-arrays batches. The results of a batch do not depend on its division into packets.
 
 pub mod alpha;
 pub mod bvh;
@@ -24,7 +27,7 @@ pub struct RayBatch {
     pub oy: Vec<f32>,
     /// Origins, z.
     pub oz: Vec<f32>,
-    /// Directions, x; directions need not be unit.
+    /// Directions, x. Directions need not be normalised.
     pub dx: Vec<f32>,
     /// Directions, y.
     pub dy: Vec<f32>,
@@ -43,13 +46,13 @@ impl RayBatch {
         self.ox.len()
     }
 
-    /// True if there is no ray.
+    /// True if there are no rays.
     #[inline]
     pub fn is_empty(&self) -> bool {
         self.ox.is_empty()
     }
 
-    /// Removes all rays, keeps the memory.
+    /// Removes all rays, but keeps the memory.
     pub fn clear(&mut self) {
         for v in [&mut self.ox, &mut self.oy, &mut self.oz, &mut self.dx, &mut self.dy, &mut self.dz] {
             v.clear();
@@ -100,39 +103,39 @@ impl RayBatch {
     }
 }
 
-/// What a ray met first.
+/// The first hit of a ray.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Hit {
     /// Ray parameter.
     pub t: f32,
-    /// Parametric position on the primitive: barycentric weights of vertices 1 and 2 of a triangle; (u, v) of a
-    /// bilinear patch; (φ/φ_max, v) of a quadric as its docs say.
+    /// Parametric position on the primitive: barycentric weights of vertices 1 and 2 of a triangle, (u, v) of a
+    /// bilinear patch, (φ/φ_max, v) of a quadric (see there).
     pub uv: [f32; 2],
-    /// The hit.
+    /// The geometry.
     pub geometry: GeometryId,
-    /// Triangle or patch inside the geometry; 0 for a quadric.
+    /// Index of the triangle or patch in the geometry; 0 for a quadric.
     pub primitive: u32,
-    /// Instance, or [`Hit::NO_INSTANCE`].
+    /// Index of the instance, or [`Hit::NO_INSTANCE`].
     pub instance: u32,
 }
 
 impl Hit {
-    /// The value of `instance` of a hit in the root group.
+    /// `instance` of hits in the root group.
     pub const NO_INSTANCE: u32 = crate::geometry::NO_INSTANCE;
 }
 
-/// What a tracer may assume about neighbouring rays of a batch. It never changes a result.
+/// Coherence of neighbouring rays in a batch, as a hint to the tracer. It never changes a result.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Coherence {
-    /// Neighbours have similar origins and directions (camera rays of a tile).
+    /// Similar origins and directions (camera rays of a tile).
     Coherent,
-    /// Neighbours share an origin or an end (shadow segments of a shading point): packets without frustum culling.
+    /// A common origin or end (shadow segments of a shading point): packets without frustum culling.
     Packets,
-    /// Nothing (bounces): first hits in packets without frustum culling, occlusion by single rays.
+    /// None (bounces): first hits in packets without frustum culling, occlusion by single rays.
     Incoherent,
 }
 
-/// Memory and time of a built structure.
+/// Memory and build time of an acceleration structure.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct AccelStats {
     /// Bytes held by the structure.
@@ -143,12 +146,12 @@ pub struct AccelStats {
     pub build_seconds: f64,
 }
 
-/// A built ray tracer. Queries may come from any number of threads.
+/// A ray tracer with built structures. Queries may come from any number of threads.
 pub trait Accel: Send + Sync {
-    /// Nearest hits: `hits[i]` becomes the result of ray `i`; `hits` is resized. Sees geometries of `Visibility::PATH`.
+    /// Nearest hits with geometries of `Visibility::PATH`. `hits` is resized; `hits[i]` is the result of ray `i`.
     fn intersect(&self, rays: &RayBatch, coherence: Coherence, hits: &mut Vec<Option<Hit>>);
 
-    /// `occluded[i]` becomes true if anything of `Visibility::SHADOW` lies inside (0, t_max) of ray `i`.
+    /// Occlusion by geometries of `Visibility::SHADOW`: `occluded[i]` is true if one lies inside (0, t_max) of ray `i`.
     fn occluded(&self, rays: &RayBatch, coherence: Coherence, occluded: &mut Vec<bool>);
 
     /// Memory and build time.

@@ -10,7 +10,7 @@ use lumiris_numbers::math::{Affine3A, Quat, Ray, Vec2, Vec3};
 use lumiris_test_support::random::{Pcg32, RngExt, pcg32};
 use std::sync::Arc;
 
-/// Opacities: none, two fifths, stripes along u, and waves along x.
+/// Opacities 0 and 0.4, stripes along u, and waves along x.
 pub(super) struct Stripes;
 
 impl AlphaSource for Stripes {
@@ -24,13 +24,13 @@ impl AlphaSource for Stripes {
     }
 }
 
-/// Triangles by their corners.
+/// Triangles from their corners, without shared vertices.
 pub(super) fn separate_triangles(corners: Vec<Vec3>) -> TriangleMesh {
     let count = corners.len() as u32 / 3;
     TriangleMesh::new(corners, (0..count).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect()).unwrap()
 }
 
-/// Triangles anywhere.
+/// Triangles at random positions.
 pub(super) fn soup(s: &mut Pcg32, triangles: u32, size: f32) -> TriangleMesh {
     let mut corners = Vec::new();
     for _ in 0..triangles {
@@ -84,8 +84,10 @@ pub(super) fn random_patches(s: &mut Pcg32, count: u32) -> Shape {
     Shape::Bilinear(BilinearMesh { positions, indices, ..BilinearMesh::default() })
 }
 
-/// All kinds of shapes, some cut out or hidden from some rays, in the root and in instances with up to `samples` times.
+/// Shapes of all kinds, some with alpha or hidden from some rays, in the root and in instances with up to `samples`
+/// time samples.
 pub(super) fn mixed_scene(seed: u32, samples: usize) -> Arc<GeometrySet> {
+    // Geometries
     let mut s = pcg32([seed, 77, 0]);
     let mut geometries = Vec::new();
     for k in 0..24_u32 {
@@ -99,6 +101,8 @@ pub(super) fn mixed_scene(seed: u32, samples: usize) -> Arc<GeometrySet> {
         let alpha = [None, None, Some(0), Some(1), Some(2), Some(3)][k as usize * 5 % 6];
         geometries.push(Geometry { shape, alpha, visibility });
     }
+
+    // Groups and moving instances
     let groups =
         vec![Group { geometries: (8..16).collect() }, Group { geometries: (16..24).collect() }, Group::default()];
     let instances = (0..9_u32)

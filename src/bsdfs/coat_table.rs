@@ -256,12 +256,15 @@ fn scatter(interface: &Dielectric, w: Vec3, thickness: f32) -> Scatter {
     let mut sum = [0.0_f64; 3];
     for i in 0..NORMALS[0] {
         for j in 0..NORMALS[1] {
+            // Visible normals, stratified
             let u = [(i as f32 + 0.5) / NORMALS[0] as f32, (j as f32 + 0.5) / NORMALS[1] as f32];
             let m = distribution.sample_m(w, u);
             let cos_m = w.dot(m);
             if cos_m <= 0.0 {
                 continue;
             }
+
+            // Reflection
             let fresnel = fr_dielectric(cos_m, interface.eta);
             let r = reflect(w, m);
             if r.z > 0.0 {
@@ -269,6 +272,8 @@ fn scatter(interface: &Dielectric, w: Vec3, thickness: f32) -> Scatter {
                 sum[1] += value;
                 sum[2] += value * f64::from((-thickness / r.z).exp());
             }
+
+            // Transmission
             if let Some((t, _)) = refract(w, m, interface.eta)
                 && t.z < 0.0
             {

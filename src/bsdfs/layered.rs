@@ -259,6 +259,8 @@ impl Layered {
     pub fn sample(&self, wo: Vec3, uc: f32, u: [f32; 2]) -> Option<BsdfSample> {
         let flip = if wo.z < 0.0 { -1.0 } else { 1.0 };
         let wo = wo * flip;
+
+        // Choose a lobe
         let lobes = self.lobes(wo);
         let (wi, lobe) = if uc < lobes.interface {
             if self.top.is_specular() {
@@ -273,6 +275,8 @@ impl Layered {
         } else {
             (warp::sample_cosine_hemisphere(u), Lobe::DIFFUSE)
         };
+
+        // Density of all lobes
         let pdf = self.pdf_upper(wo, wi, &lobes);
         if wi.z <= 0.0 || pdf <= 0.0 {
             return None;

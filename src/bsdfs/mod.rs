@@ -152,6 +152,8 @@ impl<'a> Bsdf<'a> {
             Bsdf::CoatedDiffuse(b) => return b.f_cos_and_pdf(wo, wi),
             Bsdf::Principled(b) => return b.f_cos_and_pdf(wo, wi),
             Bsdf::ThinDielectric(_) => return (Rgb::BLACK, 0.0),
+
+            // BSDFs without a kernel
             _ if (wo.z == 0.0 || wi.z == 0.0) && self.has_surface() => return (Rgb::BLACK, 0.0),
             Bsdf::Layered(b) => (b.f(wo, wi), b.pdf(wo, wi)),
             Bsdf::Hair(b) => (b.f(wo, wi), b.pdf(wo, wi)),
@@ -159,6 +161,8 @@ impl<'a> Bsdf<'a> {
             Bsdf::Evaluated(b) => (b.f(wo, wi), b.pdf(wo, wi)),
             Bsdf::Phase(b) => (Rgb::splat(b.p(wo, wi)), b.p(wo, wi)),
         };
+
+        // Overflow counts as black
         let f_cos = f * self.cos(wi);
         (if f_cos.is_finite() { f_cos } else { Rgb::BLACK }, if pdf.is_finite() { pdf } else { 0.0 })
     }
@@ -349,6 +353,8 @@ impl<'a> Bsdf<'a> {
             Bsdf::Evaluated(b) => b.sample(wo, uc, u),
             Bsdf::Phase(b) => b.sample(wo, u),
         };
+
+        // Directions in the plane of the surface have no density
         sample.filter(|s| s.pdf > 0.0 && s.pdf.is_finite() && (s.wi.z != 0.0 || !has_surface))
     }
 
@@ -439,6 +445,7 @@ impl<'a> Bsdf<'a> {
             | Bsdf::Hair(_)
             | Bsdf::Measured(_)
             | Bsdf::Evaluated(_) => {
+                // f |cos θ|/pdf of one sample
                 let [uc, u0, u1] = u();
                 self.sample(wo, uc, [u0, u1]).map_or(Rgb::BLACK, |s| s.f * (s.wi.z.abs() / s.pdf))
             }

@@ -1,4 +1,4 @@
-//! T1 by BSDF sampling, one sample at a time: a direction, and the emitter that it points at.
+//! T1 by BSDF sampling, one sample at a time: a direction, and the emitter in that direction.
 
 use super::candidates::{Candidate, Drawn, SampleAllocation};
 use super::point::ShadingPoint;
@@ -7,7 +7,7 @@ use crate::lights::{LightCtx, LightHit, LightId};
 use crate::scene::{EmitterHit, RenderJob};
 use lumiris_numbers::math::{Rgb, Vec3};
 
-/// A BSDF sample whose emitter has not been determined yet.
+/// A BSDF sample before the lookup of its emitter.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct PendingBsdf {
     pub point: u32,
@@ -15,12 +15,12 @@ pub(super) struct PendingBsdf {
     pub f_cos: Rgb,
     pub pdf: f32,
     pub specular: bool,
-    /// The sampled lobe, as a component of the mixture.
+    /// The sampled lobe: index of a mixture component.
     pub lobe: usize,
     pub allocation: SampleAllocation,
 }
 
-/// Draws a BSDF sample up to the question which emitter it points at; `None` if its value is zero.
+/// Draws a BSDF sample without its emitter; `None` if its value is zero.
 pub(super) fn draw(
     (index, point): (u32, &ShadingPoint<'_>),
     allocation: SampleAllocation,
@@ -33,7 +33,7 @@ pub(super) fn draw(
     (!f_cos.is_black()).then_some(PendingBsdf { point: index, wi: s.wi, f_cos, pdf: s.pdf, specular, lobe, allocation })
 }
 
-/// Completes a BSDF sample with the emitter that it has found; `None` if it points at none.
+/// Completes a BSDF sample with its emitter; `None` if it hits none.
 pub(super) fn bsdf_candidate(
     job: &RenderJob,
     point: &ShadingPoint<'_>,
@@ -45,7 +45,7 @@ pub(super) fn bsdf_candidate(
     let light = match hit {
         Some(hit) => hit.light,
         None => {
-            // An infinite light that can be chosen, if there is one, so that it has a group
+            // Prefer an infinite light that belongs to a group
             let has_group = |&&l: &&LightId| lights.groups.group_of(l).is_some();
             lights.infinite.iter().find(has_group).or(lights.infinite.first()).copied()
         }
@@ -68,19 +68,19 @@ pub(super) fn bsdf_candidate(
     })
 }
 
-/// What a direction of BSDF sampling points at.
+/// The emitter in the direction of a BSDF sample.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct EmitterInDirection {
     /// Radiance.
     pub(super) li: Rgb,
     /// Density of light sampling (1/sr).
     pub(super) p_light: f32,
-    /// The point on the light, the bound of its error, and its normal; `None` at infinity.
+    /// Point on the light, bound of its rounding error, and normal; `None` for infinite lights.
     pub(super) end: Option<(Vec3, Vec3, Vec3)>,
 }
 
-/// What the samples of some points point at, whose rays among the emitters have met `hits`; `None` where that is dark.
-/// `pmf` is the probability of the choice of a light at a point, and `far` is memory.
+/// The emitters of pending samples, whose rays have the emitter hits `hits`; `None` if an emitter is dark. `pmf` is the
+/// probability of the choice of a light at a point; `far` is a buffer.
 pub(super) fn find_emitters(
     job: &RenderJob,
     points: &[ShadingPoint<'_>],
@@ -92,11 +92,15 @@ pub(super) fn find_emitters(
     let ctx = |sample: &PendingBsdf| points[sample.point as usize].light_ctx();
     far.clear();
     far.extend((0_u32..).zip(hits).filter(|(_, hit)| hit.is_none()).map(|(i, _)| i));
+
+    // Emitters hit
     out.clear();
     out.extend(pending.iter().zip(hits).map(|(sample, hit)| {
         let (time, pmf) = (points[sample.point as usize].time, |ctx: &_, light| pmf(sample.point, ctx, light));
         emitter_at(job, &ctx(sample), sample.wi, hit.as_ref()?, time, pmf)
     }));
+
+    // Infinite lights for rays without a hit
     let sample = |k: usize| &pending[far[k] as usize];
     job.lights.infinite_in_directions_by(
         far.len(),
@@ -109,8 +113,8 @@ pub(super) fn find_emitters(
     );
 }
 
-/// What the direction `wi` points at by meeting `hit`, where lights are chosen with probability `pmf`; `None` if that is
-/// dark.
+/// The emitter in the direction `wi` for the emitter hit `hit`; `None` if it is dark. Lights are chosen with
+/// probability `pmf`.
 pub(super) fn emitter_at(
     job: &RenderJob,
     ctx: &LightCtx,

@@ -8,21 +8,21 @@ use lumiris_numbers::estimators::mis::{Heuristic, Technique};
 use lumiris_numbers::math::{Ray, Rgb};
 use lumiris_numbers::samplers::SampleStream;
 
-/// Which technique drew a candidate.
+/// The technique that sampled a candidate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Drawn {
     /// Light sampling.
     Light,
-    /// Light sampling of a light without extent in solid angle.
+    /// Light sampling of a delta light.
     DeltaLight,
     /// BSDF sampling.
     Bsdf,
-    /// A specular lobe.
+    /// BSDF sampling of a specular lobe.
     DeltaBsdf,
 }
 
 impl Drawn {
-    /// True if no other technique can draw the direction.
+    /// True if no other technique can sample the direction.
     pub fn is_delta(self) -> bool {
         match self {
             Drawn::DeltaLight | Drawn::DeltaBsdf => true,
@@ -31,7 +31,7 @@ impl Drawn {
     }
 }
 
-/// A candidate: one direction of light at one point.
+/// A candidate: a sample of incident light at a point.
 #[derive(Clone, Copy, Debug)]
 pub struct Candidate {
     /// Index of the shading point.
@@ -40,28 +40,28 @@ pub struct Candidate {
     pub drawn: Drawn,
     /// Unshadowed integrand f_s·|cos θ|·L.
     pub f: Rgb,
-    /// The radiance L in it.
+    /// The radiance L in `f`.
     pub li: Rgb,
-    /// The light; one of those at infinity for a direction of BSDF sampling that meets no surface.
+    /// The light. For a BSDF sample that hits no surface, one of the infinite lights.
     pub light: LightId,
-    /// Density of light sampling at the direction (per steradian, light choice included; a probability for deltas).
+    /// Density of light sampling (1/sr), including the choice of the light; a probability for delta lights.
     pub p_light: f32,
-    /// Density of BSDF sampling (per steradian; as the BSDF gives it for specular lobes).
+    /// Density of BSDF sampling (1/sr); for specular lobes, the pdf returned by the BSDF.
     pub p_bsdf: f32,
     /// Expected number of light samples of the point.
     pub n_light: f32,
     /// Expected number of BSDF samples of the point.
     pub n_bsdf: f32,
-    /// The part of `p_bsdf` that is the first lobe's; kept for estimators with components.
+    /// Part of `p_bsdf` of the first lobe, for estimators with components.
     pub p_lobe: f32,
-    /// Group of the light; kept for estimators with components. Without meaning where `p_light` is 0.
+    /// Group of the light, for estimators with components. Undefined if `p_light` is 0.
     pub group: u8,
-    /// The segment that must be unoccluded for the candidate to count.
+    /// The shadow segment.
     pub segment: Ray,
 }
 
 impl Candidate {
-    /// The factor 1/(n·p) of f in the estimate over the samples of the candidate's own technique.
+    /// The factor 1/(n·p) of f in the estimate by the candidate's own technique.
     #[inline]
     pub fn own_factor(&self) -> f32 {
         match self.drawn {
@@ -70,7 +70,7 @@ impl Candidate {
         }
     }
 
-    /// The factor w/(n·p) of f in the estimate over all candidates of a point, if both techniques are used.
+    /// The factor w/(n·p) of f in the MIS estimate of both techniques.
     #[inline]
     pub fn factor(&self, heuristic: Heuristic) -> f32 {
         let light = Technique { n: self.n_light, p: self.p_light };
@@ -83,28 +83,28 @@ impl Candidate {
     }
 }
 
-/// The number of samples per technique at a point.
+/// Number of samples per technique at a point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct SampleAllocation {
     pub light_draws: u32,
     pub bsdf_draws: u32,
-    /// Expected numbers.
+    /// Expected number of light samples.
     pub n_light: f32,
     pub n_bsdf: f32,
 }
 
 impl SampleAllocation {
-    /// Fixed numbers of samples.
+    /// Fixed sample counts.
     pub(super) fn fixed(light: u32, bsdf: u32) -> Self {
         SampleAllocation { light_draws: light, bsdf_draws: bsdf, n_light: light as f32, n_bsdf: bsdf as f32 }
     }
 
-    /// The same, where the BSDF sample may be drawn by the path.
+    /// The same without BSDF samples if `by_path` is true: the next path segment is the BSDF sample.
     pub(super) fn drawn_by_path(self, by_path: bool) -> Self {
         if by_path { SampleAllocation { bsdf_draws: 0, ..self } } else { self }
     }
 
-    /// A single sample that chooses its technique at random: the expected numbers are one half each.
+    /// A single sample of a random technique; each has an expected number of one half.
     pub(super) fn one_of_both(stream: &SampleStream) -> Self {
         let light = stream.domain(domain::TECHNIQUE).draw::<1>()[0] < 0.5;
         SampleAllocation { light_draws: u32::from(light), bsdf_draws: u32::from(!light), n_light: 0.5, n_bsdf: 0.5 }
@@ -114,23 +114,23 @@ impl SampleAllocation {
 /// All candidates of a batch.
 #[derive(Debug, Default)]
 pub struct Candidates {
-    /// Those with a non-zero integrand.
+    /// Candidates with a non-zero integrand.
     pub records: Vec<Candidate>,
-    /// What each of them contributes if its segment is unoccluded: the result of select.
+    /// Unshadowed contribution of each candidate: the result of select.
     pub contributions: Vec<Rgb>,
-    /// Counts of the batch, and those of its times that are parts of stages.
+    /// Counts of the batch, and times of parts of its stages.
     pub stats: DirectStats,
 }
 
 impl Candidates {
-    /// Removes all.
+    /// Removes all candidates.
     pub(super) fn clear(&mut self) {
         self.records.clear();
         self.contributions.clear();
         self.stats = DirectStats::default();
     }
 
-    /// Select where all candidates are traced: the contribution of each is f times its factor.
+    /// Select for estimators that trace all candidates: the contribution is f times `factor`.
     pub(super) fn weigh(&mut self, factor: impl Fn(&Candidate) -> f32) {
         self.contributions.extend(self.records.iter().map(|c| c.f * factor(c)));
     }

@@ -1,5 +1,5 @@
-//! What `ocv` and `optimal-mis` have in common: samples drawn from a mixture of densities, the density of each
-//! component of it at each sample, and sums of normal equations over them.
+//! Common code of `ocv` and `optimal-mis`: samples of a mixture of densities, the component densities of each sample,
+//! and the sums of the normal equations.
 
 use super::candidates::{Candidate, Candidates, Drawn, SampleAllocation};
 use super::mixture::Mixture;
@@ -11,12 +11,12 @@ use crate::scene::RenderJob;
 use lumiris_numbers::estimators::ocv::NormalEquations;
 use lumiris_numbers::math::Rgb;
 
-/// The mixtures of a batch, and the sums over their samples.
+/// The mixtures of a batch, and their normal equations.
 #[derive(Debug, Default)]
 pub(super) struct Components {
     /// The mixture of each point.
     pub mixtures: Vec<Mixture>,
-    /// Sums of the normal equations of each point, in the columns r_j.
+    /// Normal equations of each point in the columns r_j, as sums over samples.
     pub sums: Vec<f32>,
     /// Coefficients fitted to these sums.
     pub beta: Vec<f32>,
@@ -27,7 +27,7 @@ pub(super) struct Components {
 }
 
 impl Components {
-    /// T1: light samples as `draw` makes them, and BSDF samples.
+    /// T1: light samples by `draw`, and BSDF samples.
     pub(super) fn propose(
         &mut self,
         t1: &mut T1<'_>,
@@ -42,11 +42,13 @@ impl Components {
         t1.draw_bsdf(allocate, &mut self.mixtures, choice_by_sampler(t1.job));
     }
 
-    /// Adds up the normal equations of each point from its traced candidates.
+    /// Accumulates the normal equations of each point from its traced candidates.
     pub(super) fn sum(&mut self, job: &RenderJob, candidates: &mut Candidates, segments: &Segments) -> NormalEquations {
         self.find_hidden(job, candidates, segments);
         let equations = NormalEquations::new(job.components());
         let (m, len) = (equations.components(), equations.len());
+
+        // Candidates; y = 0 if occluded
         self.sums.clear();
         self.sums.resize(self.mixtures.len() * len, 0.0);
         let traced = candidates.records.iter().zip(&candidates.contributions).zip(&self.is_free);
@@ -56,6 +58,8 @@ impl Components {
             let (count, columns) = mixture.columns(c);
             equations.add_sparse(&mut self.sums[c.point as usize * len..][..len], &columns[..count], y.to_array());
         }
+
+        // Zero-valued and failed samples
         for (mixture, sums) in self.mixtures.iter().zip(self.sums.chunks_mut(len)) {
             for (component, &count) in mixture.zero_valued[..m].iter().enumerate().filter(|(_, count)| **count > 0) {
                 equations.add_zeros(sums, (component, mixture.zero_column(component)), count);
@@ -65,7 +69,7 @@ impl Components {
         equations
     }
 
-    /// Determines which samples are unoccluded, and sets the density of BSDF sampling to zero for those hidden by an
+    /// Determines the visibility of the samples. Sets the density of BSDF sampling to zero for samples hidden by an
     /// emitter.
     fn find_hidden(&mut self, job: &RenderJob, candidates: &mut Candidates, segments: &Segments) {
         self.is_free.clear();

@@ -1,15 +1,15 @@
-//! What estimators keep of a pixel: coefficients fitted to its earlier estimates, or the sums of its control variates.
+//! Per-pixel state of estimators: coefficients fitted to earlier estimates, or sums of control variates.
 
 use crate::film::exact::FixedSum;
 use crate::film::packed::PackedRows;
 use lumiris_numbers::estimators::ocv::NormalEquations;
 
-/// Solves the systems of all fits from their sums. Returns how many are ill-conditioned.
+/// Solves the systems of all fits from their sums. Returns the number of ill-conditioned systems.
 pub(super) type Solver = fn(NormalEquations, &[f32], &mut [f32]) -> u64;
 
-/// Fits shared by estimates: the sums so far, and coefficients for later estimates.
+/// Sums over earlier estimates, and coefficients for later estimates.
 ///
-/// An estimate uses the coefficients of its fit and adds its samples to the sums; [`Self::solve`] begins a new block
+/// An estimate uses the coefficients of its fit and adds its samples to the sums. [`Self::solve`] begins a new block
 /// with coefficients fitted to all sums. Later estimates must be independent of earlier ones.
 #[derive(Clone, Debug)]
 pub struct Fits {
@@ -20,16 +20,16 @@ pub struct Fits {
     controls: Controls,
 }
 
-/// Sums over all estimates of a pixel: of their values, by channel, and of their control variates, which have the
-/// expectation 0. Both are weighted as samples of the film are.
+/// Sums over all estimates of a pixel: values by channel, and control variates, whose expectation is 0. Both have the
+/// weights of film samples.
 #[derive(Clone, Debug, Default)]
 struct Controls {
     components: usize,
-    /// The sums but while some are added.
+    /// The sums, except while samples are being added.
     packed: PackedRows,
-    /// The sums while some are added; none else.
+    /// The sums while samples are being added; otherwise empty.
     sums: Vec<FixedSum>,
-    /// Those of the batch that is being traced, by camera sample.
+    /// Values and controls of the current batch, by camera sample.
     batch: Vec<f32>,
 }
 
@@ -39,7 +39,7 @@ impl Controls {
         index * len..(index + 1) * len
     }
 
-    /// The sums, to be changed.
+    /// The unpacked sums.
     fn unpack(&mut self) -> &mut Vec<FixedSum> {
         if self.sums.is_empty() {
             self.sums = self.packed.unpacked();
@@ -61,7 +61,7 @@ impl Fits {
         Fits { equations, solver, sums, beta, controls: Controls::default() }
     }
 
-    /// Sums of values and of `components` control variates without estimates, of `count` pixels.
+    /// Empty sums of values and of `components` control variates for `count` pixels.
     pub fn of_pixels(components: usize, count: usize) -> Self {
         let packed = PackedRows::new(count, 3 + components);
         let controls = Controls { components, packed, ..Controls::default() };
@@ -76,7 +76,7 @@ impl Fits {
         }
     }
 
-    /// Sets the value of the estimate of a camera sample of the batch and its controls, if there are sums of controls.
+    /// Sets value and controls of a camera sample of the batch, if sums of controls are enabled.
     pub(crate) fn set_controls(&mut self, sample: u32, value: [f32; 3], controls: &[f32]) {
         if !self.controls.batch.is_empty() && value.iter().chain(controls).all(|v| v.is_finite()) {
             let row = self.controls.row(sample as usize);
@@ -84,7 +84,7 @@ impl Fits {
         }
     }
 
-    /// Adds the estimates of the batch to the sums of their pixels. The camera samples are given by fit and weight.
+    /// Adds the batch to the sums of its pixels. The camera samples are given by fit and weight.
     pub(crate) fn end_batch(&mut self, samples: impl Iterator<Item = (u32, f32)>) {
         if self.controls.batch.is_empty() {
             return;
@@ -98,18 +98,17 @@ impl Fits {
         }
     }
 
-    /// Number of control variates that are summed.
+    /// Number of control variates.
     pub fn controls(&self) -> usize {
         self.controls.components
     }
 
-    /// Number of sums: of the values, by channel, and of the control variates of all pixels.
+    /// Number of sums of all pixels: values by channel, and control variates.
     pub fn sum_count(&self) -> usize {
         self.controls.packed.len()
     }
 
-    /// The sums of the values, by channel, and of the control variates of all pixels, one pixel after the other; none if they
-    /// are not summed.
+    /// The sums of all pixels, pixel by pixel: values by channel, and control variates. Empty if there are none.
     pub fn exact_sums(&self) -> Vec<FixedSum> {
         match self.controls.sums.is_empty() {
             true => self.controls.packed.unpacked(),
@@ -117,14 +116,14 @@ impl Fits {
         }
     }
 
-    /// Adds sums of values and control variates to those of a pixel. False if these are not as many.
+    /// Adds sums of values and control variates to a pixel. Returns false if their numbers differ.
     pub fn merge_sums(&mut self, fit: u32, sums: &[FixedSum]) -> bool {
         let row = self.controls.row(fit as usize);
         let own = self.controls.unpack().get_mut(row).filter(|own| own.len() == sums.len());
         own.map(|own| own.iter_mut().zip(sums).for_each(|(a, b)| a.merge(b))).is_some()
     }
 
-    /// Keeps the sums in the bytes that they need until some are added; `scratch` is memory that calls share.
+    /// Packs the sums until samples are added again; `scratch` is a shared buffer.
     pub fn pack(&mut self, scratch: &mut Vec<u8>) {
         let Controls { packed, sums, batch, .. } = &mut self.controls;
         if !sums.is_empty() {
@@ -133,12 +132,12 @@ impl Fits {
         (*sums, *batch) = (Vec::new(), Vec::new());
     }
 
-    /// What later estimates follow from: the sums of all fits, and their coefficients.
+    /// The state for later estimates: sums and coefficients of all fits.
     pub fn memory(&self) -> [&[f32]; 2] {
         [&self.sums, &self.beta]
     }
 
-    /// Goes on with what [`Self::memory`] was. False if that belongs to other fits.
+    /// Restores the state of [`Self::memory`]. Returns false if its size does not fit.
     pub fn restore(&mut self, [sums, beta]: [Vec<f32>; 2]) -> bool {
         let fits = sums.len() == self.sums.len() && beta.len() == self.beta.len();
         if fits {
@@ -147,8 +146,7 @@ impl Fits {
         fits
     }
 
-    /// Begins a block. Returns the number of fits whose system is ill-conditioned; without a solution, estimates are
-    /// those of MIS.
+    /// Begins a block. Returns the number of ill-conditioned systems. Without a solution, the MIS estimate is used.
     pub fn solve(&mut self) -> u64 {
         (self.solver)(self.equations, &self.sums, &mut self.beta)
     }
@@ -159,7 +157,7 @@ impl Fits {
         (!self.sums.is_empty()).then(|| &self.beta[fit as usize * len..][..len])
     }
 
-    /// Adds the sums of an estimate to those of its fit, if there are fits.
+    /// Adds the sums of an estimate to its fit, if there are fits.
     pub(super) fn add(&mut self, fit: u32, sums: &[f32]) {
         if !self.sums.is_empty() {
             let len = self.equations.len();

@@ -6,7 +6,7 @@ use super::point::ShadingPoint;
 use crate::lights::{LightCtx, LightId, LightSample};
 use crate::scene::RenderJob;
 
-/// Draws the light samples of a point, each of a light chosen by the light sampler. Returns their number.
+/// Draws the light samples of a point, with lights chosen by the light sampler. Returns the number of samples.
 pub(super) fn draw(
     job: &RenderJob,
     (index, point): (u32, &ShadingPoint<'_>),
@@ -22,8 +22,8 @@ pub(super) fn draw(
     n
 }
 
-/// A light sample; for an infinite light, with the radiance of all infinite lights and the density of choosing any of
-/// them.
+/// A light sample. If the light is infinite, the radiance is the sum of all infinite lights, and the density the sum of
+/// their densities.
 pub(super) fn with_infinite(
     job: &RenderJob,
     ctx: &LightCtx,
@@ -36,22 +36,23 @@ pub(super) fn with_infinite(
     (light, sample)
 }
 
-/// A sample of a light, whose density includes the choice; `None` if its integrand is zero.
+/// The candidate of a light sample, whose density includes the choice of the light; `None` if its integrand is zero.
 pub(super) fn light_candidate(
     job: &RenderJob,
     (index, point): (u32, &ShadingPoint<'_>),
     allocation: &SampleAllocation,
     drawn: (LightId, LightSample),
 ) -> Option<Candidate> {
-    // What media send out would have no other technique near by: it is left to the next segment of the path
+    // Nearby, no other technique would sample the emission of media: it is left to the next segment of the path
     if job.lights.medium_of(drawn.0).is_some() {
         return None;
     }
-    // Infinite lights overlap: a direction belongs to all of them together
+    // Infinite lights overlap: all of them contribute to a direction
     unshadowed_candidate((index, point), allocation, with_infinite(job, &point.light_ctx(), drawn))
 }
 
-/// A sample of a light by itself, whose density includes the choice; `None` if its integrand is zero.
+/// The candidate of a light sample without other infinite lights. Its density includes the choice of the light. `None`
+/// if its integrand is zero.
 pub(super) fn unshadowed_candidate(
     (index, point): (u32, &ShadingPoint<'_>),
     allocation: &SampleAllocation,
@@ -64,7 +65,7 @@ pub(super) fn unshadowed_candidate(
         return None;
     }
 
-    // A technique without samples has no weight, whatever its density
+    // A technique without samples has no weight
     let drawn = if sample.is_delta { Drawn::DeltaLight } else { Drawn::Light };
     let p_bsdf = if sample.is_delta || allocation.n_bsdf == 0.0 { 0.0 } else { point.bsdf.pdf(point.wo, sample.wi) };
     Some(Candidate {

@@ -1,14 +1,14 @@
-//! The mixture of densities from which a point's samples are drawn, and the densities of its components at each sample.
+//! The mixture of densities of the samples of a point, and the component densities of each sample.
 //!
-//! A sample is a direction together with the point on an emitter that it refers to, or with none. The components are
-//! the lobes of the BSDF and the groups of lights, with densities h_j whose integrals I_j are known: the probability of
-//! a lobe or of a group within its technique. So p_α = (n_L/N) Σ_groups h_j + (n_B/N) Σ_lobes h_j, and the columns r_j
-//! = h_j/p_α have expectation I_j under the mixture, exactly. This requires that
+//! A sample is a direction with the emitter point in that direction, or with none. The components are the lobes of the
+//! BSDF and the groups of lights. Their densities h_j have known integrals I_j: the probability of a lobe or of a group
+//! within its technique. So p_α = (n_L/N) Σ_groups h_j + (n_B/N) Σ_lobes h_j, and the columns r_j = h_j/p_α have the
+//! exact expectation I_j under the mixture. This has two requirements:
 //!
-//! * the density of BSDF sampling, which stops at the first emitter, is zero for a light sample that another emitter
-//!   hides;
-//! * a *zero-valued* sample, whose unshadowed integrand is zero, belongs only to the component that drew it, as if
-//!   every component had one such location of its own: its other densities need not be computed.
+//! * The density of BSDF sampling, which stops at the first emitter, is zero for a light sample hidden by another
+//!   emitter.
+//! * A *zero-valued* sample, whose unshadowed integrand is zero, belongs only to the component that drew it, as if
+//!   every component had one such location. Its other densities need not be computed.
 
 use super::candidates::{Candidate, SampleAllocation};
 use super::domain;
@@ -21,20 +21,20 @@ use crate::scene::RenderJob;
 use lumiris_numbers::estimators::ocv::MAX_COMPONENTS;
 use lumiris_numbers::math::Vec3;
 
-/// Tolerance for an expected number of samples that should be whole.
+/// Tolerance for an expected number of samples that should be an integer.
 const COUNT_ROUNDING: f32 = 1e-3;
 
 /// The columns of a sample.
 pub type Columns = [f32; MAX_COMPONENTS];
 
-/// What the samples of a point have in common: the mixture, and counts of samples without contribution.
+/// The mixture of the samples of a point, and counts of samples without contribution.
 #[derive(Clone, Copy, Debug)]
 pub struct Mixture {
     /// I_j: lobes, then groups.
     pub integrals: Columns,
     /// Zero-valued samples by the component that drew them.
     pub zero_valued: [u32; MAX_COMPONENTS],
-    /// Failed light samples, for which there was no light to choose.
+    /// Failed light samples: no light could be chosen.
     pub failed: u32,
     /// N.
     pub n: f32,
@@ -44,7 +44,7 @@ pub struct Mixture {
 }
 
 impl Mixture {
-    /// The mixture at a point where groups are chosen with probabilities `pmfs`.
+    /// The mixture at a point; groups are chosen with probabilities `pmfs`.
     fn new(job: &RenderJob, point: &ShadingPoint<'_>, allocation: &SampleAllocation, pmfs: &[f32; MAX_GROUPS]) -> Self {
         let lobes = job.lobes();
         let mut integrals = [0.0; MAX_COMPONENTS];
@@ -64,25 +64,25 @@ impl Mixture {
         Mixture { integrals, zero_valued: [0; MAX_COMPONENTS], failed: 0, n, n_light, n_bsdf, lobes }
     }
 
-    /// The lobe from which a BSDF sample with random number `uc` is drawn.
+    /// The lobe that a BSDF sample with the random number `uc` is drawn from.
     #[inline]
     pub fn lobe(&self, uc: f32) -> usize {
         usize::from(self.lobes == MAX_LOBES && uc >= self.integrals[0])
     }
 
-    /// Density of the first lobe in the direction `wi`, given that of all lobes, `pdf`.
+    /// Density of the first lobe in the direction `wi`; `pdf` is the density of all lobes.
     #[inline]
     pub(super) fn p_lobe(&self, point: &ShadingPoint<'_>, wi: Vec3, pdf: f32) -> f32 {
         if self.lobes == MAX_LOBES && pdf > 0.0 { point.bsdf.pdf_first_lobe(point.wo, wi, pdf) } else { pdf }
     }
 
-    /// The component of a group of lights.
+    /// The component of a light group.
     #[inline]
     pub fn component(&self, group: usize) -> usize {
         self.lobes + group
     }
 
-    /// The candidate of a light sample of a group, which is counted if it is zero-valued.
+    /// The candidate of a light sample of a group. Counts zero-valued samples.
     fn candidate(
         &mut self,
         job: &RenderJob,
@@ -101,8 +101,8 @@ impl Mixture {
         candidate
     }
 
-    /// r_j of a sample, by component, of those that are not 0; none if its densities cannot be divided. How many there
-    /// are, and they.
+    /// The non-zero r_j of a sample with their components, and their number. None if the sum of the densities is zero
+    /// or not finite.
     #[inline]
     pub fn columns(&self, c: &Candidate) -> (usize, [(usize, f32); MAX_LOBES + 1]) {
         let scale = self.n / (c.n_light * c.p_light + c.n_bsdf * c.p_bsdf);
@@ -127,7 +127,7 @@ impl Mixture {
     }
 }
 
-/// Draws the light samples of a point as `mis` does, each of a light chosen by the light sampler. Returns the mixture at
+/// Draws the light samples of a point as `mis` does, with lights chosen by the light sampler. Returns the mixture at
 /// the point.
 pub(super) fn draw_together(
     job: &RenderJob,
@@ -135,11 +135,14 @@ pub(super) fn draw_together(
     allocation: &SampleAllocation,
     records: &mut Vec<Candidate>,
 ) -> Mixture {
+    // Mixture
     let lights = &job.lights;
     let ctx = point.light_ctx();
     let n = allocation.light_draws;
     let pmfs = if allocation.n_light > 0.0 { lights.groups.pmfs(&lights.sampler, &ctx) } else { [0.0; MAX_GROUPS] };
     let mut mixture = Mixture::new(job, point, allocation, &pmfs);
+
+    // Samples, counted by component
     for i in 0..n {
         let [u_choice, u0, u1] = point.stream.split(domain::LIGHT, n, i).draw::<3>();
         let choice = lights.sampler.sample(&ctx, u_choice);
@@ -153,8 +156,8 @@ pub(super) fn draw_together(
     mixture
 }
 
-/// Draws the light samples of a point separately for each group of lights, N times its probability, rounded by one
-/// random number for all groups. Returns the mixture at the point.
+/// Draws the light samples of a point separately for each light group. A group gets N times its probability, rounded by
+/// one random number for all groups. Returns the mixture at the point.
 pub(super) fn draw_groups(
     job: &RenderJob,
     (index, point): (u32, &ShadingPoint<'_>),
@@ -167,13 +170,14 @@ pub(super) fn draw_groups(
     let pmfs = if allocation.n_light > 0.0 { lights.groups.pmfs(&lights.sampler, &ctx) } else { [0.0; MAX_GROUPS] };
     let mut mixture = Mixture::new(job, point, allocation, &pmfs);
 
-    // Samples stand at (i + u)/N; those of a group lie between the sums of probabilities
+    // Systematic sampling: sample i is at (i + u)/N, and belongs to the group whose interval of cumulative probability
+    // contains it
     let [u] = point.stream.domain(domain::GROUPS).draw::<1>();
     let (mut first, mut sum) = (0, 0.0);
     for (group, &pmf) in pmfs[..lights.groups.len()].iter().enumerate().filter(|(_, pmf)| **pmf > 0.0) {
         sum += f64::from(pmf) * f64::from(n);
         let end = ((sum - f64::from(u)).ceil() as u32).clamp(first, n);
-        // A count that does not depend on u, so that the samples of a pixel are points of one set
+        // The count is independent of u, so that the samples of a pixel are points of one set
         let count = ((pmf * n as f32 - COUNT_ROUNDING).ceil() as u32).max(end - first);
         for i in 0..end - first {
             let stream = point.stream.split(domain::GROUP + group as u32, count, i);

@@ -1,25 +1,26 @@
-//! Direct lighting of a batch of shading points, in four explicit stages.
+//! Direct light at a batch of shading points, in four stages.
 //!
 //! ```text
 //! points ─T1 propose─▶ candidates ─select─▶ contributions + segments ─T2 trace─▶ bits ─resolve─▶ radiance
 //! ```
 //!
-//! * **T1, propose**: light and BSDF samples with their unshadowed integrand f = f_s·|cos θ|·L and the densities of
-//!   every technique. It traces rays against emitters only, and does not know visibility.
-//! * **select**: an estimator turns f and densities into contributions, and drops those that are zero.
+//! * **T1, propose**: light and BSDF samples with the unshadowed integrand f = f_s·|cos θ|·L and the densities of every
+//!   technique. It traces rays against emitters only, and ignores visibility.
+//! * **select**: an estimator computes contributions from f and densities, and drops those that are zero.
 //! * **T2, trace**: shadow segments in packets.
-//! * **resolve**: the sum of the contributions whose segments are unoccluded, or what the estimator makes of them.
+//! * **resolve**: the sum of the unoccluded contributions, or another combination by the estimator.
 //!
-//! Which estimator it is, [`estimators`] decides: each has a file there with its part in every stage. All other files
-//! are what estimators share, in reading order:
+//! [`estimators`] has a file for each estimator with its part in every stage. `mc`, `mis` and `ocv --ocv pixels` can
+//! also estimate direct light in [`columns`] of [`vertices`]. The other files are shared by all estimators, in reading
+//! order:
 //!
 //! | file | |
 //! |---|---|
 //! | [`point`], [`domain`] | shading points, and the domains of their random numbers |
 //! | [`candidates`], [`stats`] | candidates, their contributions, counts and times |
 //! | [`light_samples`], [`bsdf_samples`], [`t1`] | T1 by light sampling and by BSDF sampling |
-//! | [`mixture`], [`components`], [`fits`] | samples with the densities of the components of their mixture, the normal equations of their estimates, and coefficients for later ones |
-//! | [`proposal_columns`] | the many light samples of resampling, in columns |
+//! | [`mixture`], [`components`], [`fits`] | component densities, normal equations, coefficients for later estimates |
+//! | [`proposal_columns`] | light samples of resampling, in columns |
 //! | [`shadow_segments`], [`transmittance`] | T2, in empty space and through media |
 
 mod bsdf_samples;
@@ -61,24 +62,25 @@ pub struct DirectStage {
 }
 
 impl DirectStage {
-    /// The shadow segments of the last batch of points, in the order in which they were traced.
+    /// The shadow segments of the last batch of points, in the order of tracing.
     pub fn segments(&self) -> &RayBatch {
         self.batch.segments.rays()
     }
 
-    /// The samples of the last batch, in the order of their points: point, contribution if visible, visibility.
+    /// The samples of the last batch, in the order of their points: index of the point, unshadowed contribution,
+    /// visibility.
     pub fn outcomes(&self) -> impl Iterator<Item = (u32, Rgb, bool)> {
         self.batch.segments.outcomes()
     }
 
-    /// Point, light with the direction to it, and contribution of the samples of the last batch that are visible, for
-    /// estimators that add these up.
+    /// The visible samples of the last batch, for estimators that add contributions up: index of the point, light with
+    /// the direction to it, and contribution.
     pub fn visible(&self) -> impl Iterator<Item = (u32, (LightId, Vec3), Rgb)> {
         self.batch.segments.visible()
     }
 
-    /// Estimates ∫ f_s L_direct |cos θ| dω for each point; `out[i]` belongs to `points[i]`. Estimators that are
-    /// progressive use the points' `fits` and add to them.
+    /// Estimates ∫ f_s L_direct |cos θ| dω for each point; `out[i]` belongs to `points[i]`. Progressive estimators use
+    /// the `fits` of the points and add to them.
     pub fn estimate(
         &mut self,
         job: &RenderJob,
@@ -91,13 +93,13 @@ impl DirectStage {
         out.resize(points.len(), Rgb::BLACK);
         let batch = &mut self.batch;
 
-        // T1: propose candidates. `ris` selects as well: it makes proposals and draws from them, chunk by chunk
+        // T1: propose candidates. `ris` also selects: it draws from the proposals, chunk by chunk
         let start = Instant::now();
         estimator.propose(job, points, batch);
         let proposed = Instant::now();
         let drawing = batch.candidates.stats.select;
 
-        // Select: contributions of the estimator, and the segments that decide them
+        // Select: contributions of the estimator, and their shadow segments
         estimator.select(&mut batch.candidates);
         batch.segments.gather(&batch.candidates);
         let selected = Instant::now();

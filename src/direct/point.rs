@@ -19,7 +19,7 @@ pub struct ShadingPoint<'a> {
     pub wo: Vec3,
     /// Scattering at the point, with the frame and the geometric normal.
     pub bsdf: SurfaceBsdf<'a>,
-    /// The lobe that lights are chosen by, see [`lobe_for_lights`].
+    /// The lobe used by the choice of lights, see [`lobe_for_lights`].
     pub lobe: GlossyLobe,
     /// Time in 0..1.
     pub time: f32,
@@ -27,15 +27,15 @@ pub struct ShadingPoint<'a> {
     pub stream: SampleStream,
     /// Sample and proposal counts.
     pub sample_counts: SampleCounts,
-    /// Index of the point's fit, if there are fits.
+    /// Index of the fit of the point, if there are fits.
     pub fit: u32,
     /// Index of the camera sample in its batch.
     pub sample: u32,
-    /// What rays that leave the point go through.
+    /// The media on both sides of the surface.
     pub media: Sides,
 }
 
-/// The lobe that is reflected to `wo`, if the choice of a light depends on it.
+/// The glossy lobe reflected to `wo`, if the light sampler uses it.
 #[inline]
 pub fn lobe_for_lights(lights: &LightSampling, bsdf: &SurfaceBsdf<'_>, wo: Vec3) -> GlossyLobe {
     if !lights.sampler.needs_lobes() {

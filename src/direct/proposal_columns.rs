@@ -1,13 +1,12 @@
-//! T1 of resampling: many light samples of a shading point at once, as a structure of arrays, with the target and the
-//! weight of each.
+//! T1 of resampling: many light samples of a shading point at once, in columns, with their targets and weights.
 //!
-//! Proposals lie along one curve that visits all lights in turn and fills each of them: positions in [0, 1) choose a
-//! light by inversion, and what remains of a position is a point on a Hilbert curve over the light's sample space.
-//! Stratified positions are thus stratified over the lights and over each light [He and Owen 2016], and consecutive
-//! proposals are neighbours on a light, as stratified resampling requires [Talbot 2005, §4.5.2, heuristic 2].
+//! Proposals lie along one curve that visits all lights and fills each of them. A position in [0, 1) chooses a light by
+//! inversion; its remainder is a point on a Hilbert curve over the sample space of the light. Stratified positions are
+//! thus stratified over the lights and over each light [He and Owen 2016]. Consecutive proposals are neighbours on a
+//! light, as stratified resampling requires [Talbot 2005, §4.5.2, heuristic 2].
 //!
-//! All light samples of a chunk of points are made together, sorted by light, and kept: those that are drawn need no
-//! second sampling.
+//! All light samples of a chunk of points are made together, sorted by light, and kept, so that selected samples are
+//! not sampled again.
 
 use super::candidates::Candidate;
 use super::point::ShadingPoint;
@@ -31,7 +30,7 @@ const POSITIONS: u32 = 0x517c_c1b7;
 #[derive(Debug, Default)]
 pub struct ProposalColumns {
     points: Vec<PointProposals>,
-    /// Light and probability of the choice; none for BSDF samples.
+    /// Light and probability of its choice; [`NO_LIGHT`] for BSDF samples.
     chosen: Vec<(LightId, f32)>,
     u: [Column; 2],
     /// Positions of the shading points.
@@ -40,13 +39,13 @@ pub struct ProposalColumns {
     scratch: Scratch,
     f_cos: [Vec<f32>; 3],
     p_bsdf: Vec<f32>,
-    /// Their targets.
+    /// Target density of each proposal (unnormalised).
     pub p_hat: Vec<f32>,
-    /// Of each, the factor r of its f in the estimate over all proposals; 1/(M·p) for a single technique.
+    /// Factor r of f in the estimate over all proposals; 1/(M·p) for a single technique.
     pub r: Vec<f32>,
-    /// The weight p_hat·r of each.
+    /// Resampling weight p_hat·r of each proposal.
     pub weight: Vec<f32>,
-    /// V̂ of each, where it is a control variate.
+    /// V̂ of each proposal, for targets with learned visibility.
     pub visibility: Vec<f32>,
     positions: Vec<u32>,
     jitter: Vec<u32>,
@@ -64,7 +63,7 @@ pub struct PointProposals {
     pub end: usize,
 }
 
-/// Expected numbers of proposals per technique at a point, and how they are weighted.
+/// Expected numbers of proposals per technique at a point, MIS heuristic and target.
 #[derive(Clone, Copy, Debug)]
 pub struct Techniques {
     /// Expected number of light samples.
@@ -78,7 +77,7 @@ pub struct Techniques {
 }
 
 impl ProposalColumns {
-    /// Removes all.
+    /// Removes all proposals.
     pub fn clear(&mut self) {
         self.points.clear();
     }
@@ -88,22 +87,22 @@ impl ProposalColumns {
         self.points.last().map_or(0, |p| p.end)
     }
 
-    /// The points to which the proposals belong.
+    /// The ranges of proposals by point.
     pub fn points(&self) -> &[PointProposals] {
         &self.points
     }
 
-    /// A proposal by light sampling.
+    /// A light sample; `None` if it failed.
     pub fn light_sample(&self, proposal: usize) -> Option<(LightId, LightSample)> {
         let sample = self.samples.get(proposal, self.p.vec3(proposal))?;
         Some((self.chosen[proposal].0, sample))
     }
 
-    /// Σ c·V̂ over the proposals of a point, of which `bsdf_samples` are those by BSDF sampling.
+    /// Σ c·V̂ over the proposals of a point; `bsdf_samples` are its BSDF samples.
     pub fn known(&self, range: PointProposals, bsdf_samples: &[Candidate]) -> Known {
         let PointProposals { start, bsdf_start, end } = range;
         let mut known = Known::default();
-        // What has no weight is never drawn, and has no part in either sum
+        // A proposal without weight is never drawn, and has no part in either sum
         for i in (start..bsdf_start).filter(|&i| self.weight[i] > 0.0) {
             let f_cos = self.f_cos.each_ref().map(|a| a[i]);
             known.propose(Rgb::from_array(f_cos) * self.samples.li.rgb(i) * self.r[i], self.visibility[i]);
@@ -114,7 +113,7 @@ impl ProposalColumns {
         known
     }
 
-    /// Makes room for `len` proposals, keeping existing ones.
+    /// Reserves memory for `len` proposals, keeping existing ones.
     fn grow(&mut self, len: usize) {
         self.chosen.resize(len, (NO_LIGHT, 0.0));
         if self.r.len() < len {
@@ -126,8 +125,8 @@ impl ProposalColumns {
         }
     }
 
-    /// Adds a point with `light_draws` light samples, which [`evaluate`](Self::evaluate) completes, and the given BSDF
-    /// samples. `phi` is a uniform number, well distributed over the samples of a pixel.
+    /// Adds a point with the given BSDF samples and `light_draws` light samples; [`evaluate`](Self::evaluate) completes
+    /// the light samples. `phi` is a uniform number, well distributed over the samples of a pixel.
     pub fn add(
         &mut self,
         job: &RenderJob,
@@ -136,6 +135,7 @@ impl ProposalColumns {
         (light_draws, positions, phi): (u32, ProposalPoints, f32),
         bsdf_samples: &[Candidate],
     ) {
+        // Light samples: positions and lights
         let start = self.count();
         let bsdf_start = start + light_draws as usize;
         let end = bsdf_start + bsdf_samples.len();
@@ -146,6 +146,8 @@ impl ProposalColumns {
             self.place(positions, phi, light_draws);
             self.choose_lights(job, point, start, bsdf_start);
         }
+
+        // BSDF samples: targets and weights
         let ctx = point.light_ctx();
         let contributing = job.lights.contributing_lights(&ctx);
         for (i, c) in (bsdf_start..end).zip(bsdf_samples) {
@@ -156,7 +158,7 @@ impl ProposalColumns {
                     self.visibility[i] = job.lights.visibility(&ctx, &contributing, c.light);
                     c.f.luminance() * factor(techniques.target, self.visibility[i])
                 }
-                // The cosine of a delta is part of its weight
+                // The cosine of a delta sample is part of its weight
                 Target::Gv | Target::Gvl if c.drawn.is_delta() => c.f.luminance(),
                 Target::Gv => cos(),
                 Target::Gvl => cos() * c.li.luminance(),
@@ -166,7 +168,7 @@ impl ProposalColumns {
         }
     }
 
-    /// Positions along the curve, ascending.
+    /// Sets the positions along the curve, in ascending order.
     fn place(&mut self, points: ProposalPoints, phi: f32, count: u32) {
         let phi = (f64::from(phi) * 4_294_967_296.0) as u32;
         self.positions.resize(count as usize, 0);
@@ -184,7 +186,7 @@ impl ProposalColumns {
         }
     }
 
-    /// Lights at the positions, and places on them.
+    /// Sets the lights at the positions, and the sample points on them.
     fn choose_lights(&mut self, job: &RenderJob, point: &ShadingPoint<'_>, start: usize, end: usize) {
         job.lights.sampler.runs(&point.light_ctx(), &self.positions, &mut self.runs);
         for run in &self.runs {
@@ -200,7 +202,7 @@ impl ProposalColumns {
         (start..end).for_each(|i| self.p.set(i, point.p));
     }
 
-    /// Directions, targets and weights of the light samples of all `points`, which were added in this order.
+    /// Computes directions, targets and weights of the light samples of all `points`, which were added in this order.
     pub fn evaluate(
         &mut self,
         job: &RenderJob,
@@ -220,7 +222,7 @@ impl ProposalColumns {
         }
     }
 
-    /// Targets and weights of light samples.
+    /// Computes targets and weights of light samples.
     fn weigh_lights(
         &mut self,
         job: &RenderJob,
@@ -245,6 +247,8 @@ impl ProposalColumns {
                 }
             }
         }
+
+        // Weights, by targets without visibility
         for (p_bsdf, is_delta) in self.p_bsdf[start..end].iter_mut().zip(&is_delta[start..end]) {
             *p_bsdf = if *is_delta { 0.0 } else { *p_bsdf };
         }
@@ -263,6 +267,8 @@ impl ProposalColumns {
             w: &mut self.weight[start..end],
         };
         combine::combine(lumiris_lanes::level(), &proposals, &mut out);
+
+        // Adapt them to the target
         match techniques.target {
             Target::Fgl | Target::Gvl => {}
             Target::Gv => {
@@ -290,7 +296,7 @@ impl ProposalColumns {
     }
 }
 
-/// The factor of the target where visibility is estimated as `v`.
+/// Factor of the target for the estimated visibility `v`.
 #[inline]
 fn factor(target: Target, v: f32) -> f32 {
     if target == Target::VisibilityControl { doubt(v) } else { v.sqrt() }

@@ -1,4 +1,4 @@
-//! T2: shadow segments, packed in the order of their shading points, and the resulting visibility bits.
+//! T2: shadow segments in the order of their shading points, and their visibility bits.
 
 use super::candidates::Candidates;
 use super::domain;
@@ -9,13 +9,13 @@ use crate::lights::LightId;
 use crate::scene::RenderJob;
 use lumiris_numbers::math::{Ray, Rgb, Vec3};
 
-/// True if a candidate with this contribution needs a segment: it is finite and not zero.
+/// True if a candidate with this contribution needs a shadow segment: the contribution is finite and not zero.
 #[inline]
 fn is_traced(contribution: &Rgb) -> bool {
     !contribution.is_black() && contribution.is_finite()
 }
 
-/// Segments of the candidates with a contribution, and these contributions.
+/// Shadow segments with the unshadowed contributions.
 #[derive(Debug, Default)]
 pub struct Segments {
     rays: RayBatch,
@@ -24,12 +24,12 @@ pub struct Segments {
     lights: Vec<LightId>,
     occluded: Vec<bool>,
     crossing: Crossing,
-    /// Number of segments of each point so far.
+    /// Number of segments per point so far.
     counts: Vec<u32>,
 }
 
 impl Segments {
-    /// Removes all.
+    /// Removes all segments.
     pub fn clear(&mut self) {
         self.rays.clear();
         self.contributions.clear();
@@ -37,7 +37,7 @@ impl Segments {
         self.lights.clear();
     }
 
-    /// Adds a segment from a point to a light, with the contribution if it is unoccluded.
+    /// Adds a segment from a point to a light, with its unshadowed contribution.
     pub fn push(&mut self, segment: &Ray, (point, light): (u32, LightId), contribution: Rgb) {
         self.rays.push(segment);
         self.contributions.push(contribution);
@@ -45,8 +45,8 @@ impl Segments {
         self.lights.push(light);
     }
 
-    /// Takes the segments of all candidates whose contribution is finite and not zero, in candidate order:
-    /// those of one shading point, which share their origin, stay together.
+    /// Collects the segments of all candidates with a finite, non-zero contribution, in candidate order. The segments
+    /// of a shading point, which share their origin, stay together.
     pub fn gather(&mut self, candidates: &Candidates) {
         self.clear();
         for (candidate, &contribution) in candidates.records.iter().zip(&candidates.contributions) {
@@ -61,13 +61,15 @@ impl Segments {
         &self.rays
     }
 
-    /// Traces all segments, which leave `points`. Where there are media, or surfaces that rays may pass, contributions are
-    /// multiplied by an estimate of the transmittance. Returns the numbers of rays and of tentative collisions.
+    /// Traces all segments, which start at `points`. With media or passable surfaces, contributions are multiplied by
+    /// an estimate of the transmittance. Returns the numbers of rays and of tentative collisions.
     pub fn trace(&mut self, job: &RenderJob, points: &[ShadingPoint<'_>]) -> [u64; 2] {
         if job.world.scene.media.is_empty() && !job.shadows_pass() {
             job.world.accel.occluded(&self.rays, Coherence::Packets, &mut self.occluded);
             return [self.rays.len() as u64, 0];
         }
+
+        // Transmittance, with random numbers by the index of the segment at its point
         let Segments { rays, contributions, points: of, lights, occluded, crossing, counts } = self;
         counts.clear();
         counts.resize(points.len(), 0);
@@ -77,6 +79,8 @@ impl Segments {
             let stream = point.stream.domain(domain::TRANSMITTANCE + *count - 1);
             Departure { light: lights[i], medium: point.medium(d), stream }
         });
+
+        // Visibility and contributions
         let traced = crossing.trace(job);
         occluded.clear();
         occluded.extend(crossing.transmittance().map(Rgb::is_black));
@@ -92,24 +96,24 @@ impl Segments {
         self.occluded.resize(self.rays.len(), false);
     }
 
-    /// For each segment, whether it is occluded.
+    /// Occlusion of each segment.
     pub fn occluded(&self) -> &[bool] {
         &self.occluded
     }
 
-    /// For each candidate, whether its segment was traced and is unoccluded.
+    /// For each candidate: true if its segment was traced and is unoccluded.
     pub fn are_free(&self, contributions: &[Rgb]) -> impl Iterator<Item = bool> {
         let mut occluded = self.occluded.iter();
         contributions.iter().map(move |contribution| is_traced(contribution) && occluded.next() == Some(&false))
     }
 
-    /// Point, contribution if unoccluded, and visibility of each segment.
+    /// Index of the point, unshadowed contribution, and visibility of each segment.
     pub fn outcomes(&self) -> impl Iterator<Item = (u32, Rgb, bool)> {
         let segments = self.points.iter().zip(&self.contributions).zip(&self.occluded);
         segments.map(|((&point, &contribution), &occluded)| (point, contribution, !occluded))
     }
 
-    /// Point, light with the direction to it, and contribution of each segment that is unoccluded.
+    /// Index of the point, light with the direction to it, and contribution of each unoccluded segment.
     pub fn visible(&self) -> impl Iterator<Item = (u32, (LightId, Vec3), Rgb)> {
         let free = self.outcomes().enumerate().filter(|(_, (_, _, is_free))| *is_free);
         free.map(|(i, (point, contribution, _))| {

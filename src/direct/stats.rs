@@ -7,28 +7,28 @@ use std::time::Duration;
 pub struct DirectStats {
     /// Candidates drawn by T1.
     pub proposals: u64,
-    /// Those of them that are light samples.
+    /// Candidates that are light samples.
     pub light_proposals: u64,
     /// Rays traced against emitters.
     pub emitter_rays: u64,
     /// Shadow segments traced by T2.
     pub segments: u64,
-    /// Tentative collisions of segments in media, about.
+    /// Approximate number of tentative collisions of segments in media.
     pub collisions: u64,
     /// Time in T1.
     pub t1: Duration,
-    /// Its part for light samples.
+    /// Part of `t1` for light samples.
     pub t1_light: Duration,
     /// Time in select and resolve.
     pub select: Duration,
     /// Time in T2.
     pub t2: Duration,
-    /// Time for normal equations and their solutions, which is part of `select`.
+    /// Time for normal equations and their solutions; part of `select`.
     pub solve: Duration,
-    /// Systems solved or found to have no solution.
+    /// Number of linear systems.
     pub systems: u64,
-    /// Those without a solution, for which the MIS estimate is used, and those with linearly dependent columns, some of
-    /// which were dropped.
+    /// Ill-conditioned systems. Without a solution, the MIS estimate is used. If columns are linearly dependent, some
+    /// of them are dropped.
     pub ill_conditioned: u64,
 }
 

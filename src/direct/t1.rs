@@ -10,7 +10,7 @@ use crate::lights::{LightCtx, LightId};
 use crate::scene::{EmitterHit, EmitterScratch, RenderJob};
 use std::time::Instant;
 
-/// What T1 reads and what it fills.
+/// Input and output of T1.
 pub(super) struct T1<'a> {
     pub job: &'a RenderJob,
     pub points: &'a [ShadingPoint<'a>],
@@ -18,7 +18,7 @@ pub(super) struct T1<'a> {
     pub candidates: &'a mut Candidates,
 }
 
-/// What is kept of BSDF samples from batch to batch.
+/// Buffers of BSDF samples.
 #[derive(Debug, Default)]
 pub(super) struct BsdfBuffers {
     pending: Vec<PendingBsdf>,
@@ -29,7 +29,7 @@ pub(super) struct BsdfBuffers {
     found: Vec<Option<EmitterInDirection>>,
 }
 
-/// Probability of the choice of a light by the light sampler.
+/// The probability with which the light sampler chooses a light.
 pub(super) fn choice_by_sampler(job: &RenderJob) -> impl Fn(u32, &LightCtx, LightId) -> f32 {
     |_, ctx, light| job.lights.sampler.pmf(ctx, light)
 }
@@ -45,8 +45,8 @@ impl T1<'_> {
         self.draw_bsdf(allocate, &mut [], choice_by_sampler(self.job));
     }
 
-    /// Draws the light samples of all points, those of a point with `draw`, which adds the candidates and returns how
-    /// many samples it drew. Counts the samples of both techniques.
+    /// Draws the light samples of all points. `draw` adds the candidates of a point and returns its number of samples.
+    /// Counts the samples of both techniques.
     pub(super) fn draw_lights(
         &mut self,
         allocate: impl Fn(&ShadingPoint<'_>) -> SampleAllocation,
@@ -63,8 +63,9 @@ impl T1<'_> {
         stats.t1_light += start.elapsed();
     }
 
-    /// Draws the BSDF samples of all points; those that point at an emitter become candidates. `mixtures` are those of
-    /// the points, or none; `pmf(point, ctx, light)` is the probability of the choice of a light, or a number of samples.
+    /// Draws the BSDF samples of all points; samples that hit an emitter become candidates. `mixtures` belong to the
+    /// points, or are empty. `pmf(point, ctx, light)` is the probability of the choice of a light, or its expected
+    /// number of samples.
     pub(super) fn draw_bsdf(
         &mut self,
         allocate: impl Fn(&ShadingPoint<'_>) -> SampleAllocation,
@@ -90,7 +91,7 @@ impl T1<'_> {
             }
         }
 
-        // The emitters that they point at
+        // Emitters in these directions
         self.candidates.stats.emitter_rays += rays.len() as u64;
         self.job.world.intersect_emitters(rays, hits, emitter_hits);
         find_emitters(self.job, self.points, (pending, emitter_hits), pmf, far, found);

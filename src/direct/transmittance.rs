@@ -1,8 +1,8 @@
-//! T2 through media: segments go on through surfaces that only bound a medium, and carry an estimate of how much light
-//! passes, per channel.
+//! T2 through media: shadow segments continue through surfaces that only bound a medium, with an estimate of the
+//! transmittance per channel.
 //!
-//! The estimate has the expectation exp(−∫σ_t) and is independent of the sample that the segment belongs to, so the
-//! expectation of its contribution is that of the sample times T. Densities of directions do not know of it.
+//! The estimate has the expectation exp(−∫σ_t) and is independent of the sample of the segment. So the expected
+//! contribution is the contribution of the sample times T. Densities of directions do not include the transmittance.
 
 use crate::accel::{Coherence, Hit, RayBatch};
 use crate::lights::LightId;
@@ -12,14 +12,14 @@ use lumiris_numbers::math::ray::SEGMENT_END;
 use lumiris_numbers::math::{Ray, Rgb, Vec3};
 use lumiris_numbers::samplers::SampleStream;
 
-/// Surfaces that a segment may pass: it counts as occluded behind them.
+/// Maximum number of surfaces that a segment passes; after that it counts as occluded.
 const MAX_PASSED: u32 = 64;
 
-/// Segments on their way through media.
+/// Segments through media.
 #[derive(Debug, Default)]
 pub(super) struct Crossing {
     all: Vec<Crossed>,
-    /// Those that are under way, their rays, and what these meet.
+    /// Indices, rays and hits of the unfinished segments.
     active: Vec<u32>,
     rays: RayBatch,
     hits: Vec<Option<Hit>>,
@@ -28,32 +28,32 @@ pub(super) struct Crossing {
 /// A segment.
 #[derive(Clone, Copy, Debug)]
 struct Crossed {
-    /// What is left of it.
+    /// The remaining part.
     ray: Ray,
-    /// Where it ends; `None` for a direction.
+    /// The end point; `None` for an infinite segment.
     end: Option<Vec3>,
-    /// The medium that has to be there, if it is one that glows.
+    /// The medium at the end, if the light is an emitting medium.
     medium_of_end: Option<MediumId>,
-    /// What it goes through.
+    /// The current medium.
     medium: Option<MediumId>,
     numbers: Numbers,
-    /// Estimate of what passes.
+    /// Estimate of the transmittance.
     transmittance: Rgb,
 }
 
-/// How a segment begins.
+/// The start of a segment.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Departure {
-    /// The light that it leads to.
+    /// The light at its end.
     pub(super) light: LightId,
-    /// What it goes through.
+    /// The medium at its start.
     pub(super) medium: Option<MediumId>,
-    /// Its random numbers. They follow from its place among the segments of the same point, not of the batch.
+    /// Random numbers, determined by the index of the segment at its point, not in the batch.
     pub(super) stream: SampleStream,
 }
 
 impl Crossing {
-    /// Begins with segments; `departure` has the index and the direction of each.
+    /// Starts segments along `rays`. `departure` is called with the index and the direction of each.
     pub(super) fn start(
         &mut self,
         job: &RenderJob,
@@ -61,6 +61,8 @@ impl Crossing {
         mut departure: impl FnMut(usize, Vec3) -> Departure,
     ) {
         self.all.clear();
+
+        // A finite t_max marks a segment to a point on a light
         self.all.extend((0..rays.len()).map(|i| {
             let ray = rays.get(i);
             let Departure { light, medium, stream } = departure(i, ray.d);
@@ -75,12 +77,12 @@ impl Crossing {
         }));
     }
 
-    /// What passes of each segment; black where it is occluded.
+    /// Transmittance of each segment; black if occluded.
     pub(super) fn transmittance(&self) -> impl Iterator<Item = Rgb> {
         self.all.iter().map(|crossed| crossed.transmittance)
     }
 
-    /// Tentative collisions of all segments, about.
+    /// Approximate number of tentative collisions of all segments.
     pub(super) fn collisions(&self) -> u64 {
         self.all.iter().map(|crossed| u64::from(crossed.numbers.drawn)).sum()
     }
@@ -96,6 +98,8 @@ impl Crossing {
             if active.is_empty() {
                 return traced;
             }
+
+            // Trace the unfinished segments to their next surface
             rays.clear();
             active.iter().for_each(|&i| rays.push(&all[i as usize].ray));
             traced += active.len() as u64;
@@ -104,6 +108,8 @@ impl Crossing {
             let mut hit = hits.iter();
             active.retain(|&i| all[i as usize].goes_on(job, hit.next().and_then(Option::as_ref)));
         }
+
+        // Too many surfaces: occluded
         for &i in &self.active {
             self.all[i as usize].transmittance = Rgb::BLACK;
         }
@@ -112,8 +118,9 @@ impl Crossing {
 }
 
 impl Crossed {
-    /// Goes as far as what the ray meets; true if it goes on from there.
+    /// Advances the segment to the hit of its ray; true if it continues from there.
     fn goes_on(&mut self, job: &RenderJob, hit: Option<&Hit>) -> bool {
+        // The surface, if it only bounds a medium; any other surface occludes
         let passed = match hit {
             None => None,
             Some(hit) if !job.may_pass(hit) => {
@@ -129,6 +136,8 @@ impl Crossed {
                 Some(interaction)
             }
         };
+
+        // Transmittance up to the surface or the end
         if let Some(id) = self.medium {
             let length = self.ray.d.length();
             let d = self.ray.d / length;
@@ -137,6 +146,8 @@ impl Crossed {
             let medium = &job.world.scene.media.media[id as usize];
             self.transmittance *= medium.transmittance(&segment, &mut self.numbers);
         }
+
+        // Continue beyond the surface
         let Some(interaction) = passed.filter(|_| !self.transmittance.is_black()) else { return self.ends() };
         let d = self.ray.d;
         self.medium = interaction.medium_beyond(job, d, self.medium);
@@ -149,7 +160,7 @@ impl Crossed {
         true
     }
 
-    /// At its end: what glows is seen only where it is, which is not all of its box.
+    /// Ends the segment. An emitting medium fills only a part of its box: outside of it there is no emission.
     fn ends(&mut self) -> bool {
         if self.medium_of_end.is_some() && self.medium != self.medium_of_end {
             self.transmittance = Rgb::BLACK;

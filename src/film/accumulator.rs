@@ -1,5 +1,5 @@
-//! What the renderer adds the samples of a pixel to: exact sums, so that neither the order of the samples nor how they
-//! are split over passes, processes and machines changes a bit. [`super::PixelSums`] is what is read from them.
+//! Exact sums over the samples of a pixel. They do not depend, bit for bit, on the order of the samples and their
+//! division over passes, processes and machines. [`super::PixelSums`] has their values as floating-point numbers.
 
 use super::exact::{FixedSum, LIMIT, SquareSum, UnitSum};
 use super::{PixelSample, PixelSums};
@@ -7,9 +7,9 @@ use lumiris_lanes::level;
 use lumiris_lanes::sums::{self, Sums, TERM, Term};
 use lumiris_numbers::math::Rgb;
 
-/// Samples of which fewer are added one by one: that takes less time.
+/// Fewer samples are added one by one, which takes less time.
 const FEW: usize = 3;
-/// Digits between the parts of sums.
+/// Number of binary digits between the two parts of a sum.
 const FIXED_SHIFT: u32 = (sums::HIGH[0] - sums::QUANTA[0]) as u32;
 const SQUARE_SHIFT: u32 = (sums::HIGH[1] - sums::QUANTA[1]) as u32;
 
@@ -18,7 +18,7 @@ impl Term for PixelSample {
     fn numbers(&self) -> [f32; TERM] {
         let Rgb { r, g, b } = self.radiance;
         let Some(f) = &self.features else { return [r, g, b, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0] };
-        // Beside the albedo, the hit counts
+        // The number after the albedo counts hits
         [r, g, b, f.depth, f.albedo.r, f.albedo.g, f.albedo.b, 1.0, f.normal.x, f.normal.y, f.normal.z, 0.0]
     }
 }
@@ -28,19 +28,19 @@ impl Term for PixelSample {
 pub struct RadianceAccumulator {
     /// Number of samples.
     pub count: u32,
-    /// Samples whose radiance was not finite, or beyond [`LIMIT`]; they count as black.
+    /// Samples with a radiance that is not finite, or beyond [`LIMIT`]. They count as black.
     pub invalid: u32,
     /// Σ radiance.
     pub radiance: [FixedSum; 3],
 }
 
 impl RadianceAccumulator {
-    /// Adds a sample; false if it is invalid.
+    /// Adds a sample. Returns false if it is invalid.
     #[inline(always)]
     pub fn add(&mut self, radiance: Rgb) -> bool {
         self.count = self.count.wrapping_add(1);
         let channels = radiance.to_array();
-        // NaN is not below the limit
+        // False for NaN
         let is_valid = channels.iter().all(|value| value.abs() < LIMIT);
         if is_valid {
             self.radiance.iter_mut().zip(channels).for_each(|(sum, value)| sum.add(value));
@@ -50,7 +50,7 @@ impl RadianceAccumulator {
         is_valid
     }
 
-    /// Adds other samples.
+    /// Adds the sums of other samples.
     pub fn merge(&mut self, other: &RadianceAccumulator) {
         self.count = self.count.wrapping_add(other.count);
         self.invalid = self.invalid.wrapping_add(other.invalid);
@@ -66,7 +66,7 @@ impl RadianceAccumulator {
 /// Exact sums over the samples of a pixel: 216 bytes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct PixelAccumulator {
-    /// Samples and Σ radiance.
+    /// Number of samples and Σ radiance.
     pub radiance: RadianceAccumulator,
     /// Σ radiance², per channel.
     pub squares: [SquareSum; 3],
@@ -74,17 +74,17 @@ pub struct PixelAccumulator {
     pub albedo: [UnitSum; 3],
     /// Σ normal.
     pub normal: [UnitSum; 3],
-    /// Σ depth of the samples that met a surface.
+    /// Σ depth of the samples that hit a surface.
     pub depth: FixedSum,
-    /// Number of samples that met a surface.
+    /// Number of samples that hit a surface.
     pub hits: u32,
-    /// Lowest index of these; 0 if there are none.
+    /// Lowest index of a sample that hit a surface; 0 if there is none.
     pub first_hit: u32,
-    /// Material of that sample, plus one; 0 if there is none.
+    /// Material index of that sample, plus one; 0 if there is none.
     pub material: u32,
-    /// Geometry of that sample, plus one; 0 if there is none.
+    /// Geometry index of that sample, plus one; 0 if there is none.
     pub object: u32,
-    /// Records of the irradiance cache that this pixel asked for.
+    /// Records of the irradiance cache requested by this pixel.
     pub records: u32,
 }
 
@@ -106,7 +106,7 @@ impl PixelAccumulator {
         self.first(1, index, features.material + 1, features.object + 1);
     }
 
-    /// Adds samples one after the other, of which the first has the given index.
+    /// Adds consecutive samples; `index` is the index of the first one.
     pub fn add_all(&mut self, index: u32, samples: &[PixelSample]) {
         let mut index = index;
         for samples in samples.chunks(sums::MOST) {
@@ -119,7 +119,7 @@ impl PixelAccumulator {
         }
     }
 
-    /// Adds samples, whose sums are given.
+    /// Adds samples with their sums computed in lanes.
     #[inline]
     fn add_sums(&mut self, index: u32, samples: &[PixelSample], sums: &Sums) {
         self.radiance.count = self.radiance.count.wrapping_add(samples.len() as u32);
@@ -140,7 +140,7 @@ impl PixelAccumulator {
         }
     }
 
-    /// Adds other samples. Records are those of the whole image, which all parts have.
+    /// Adds the sums of other samples. All parts of an image have the records of the whole image.
     pub fn merge(&mut self, other: &PixelAccumulator) {
         self.radiance.merge(&other.radiance);
         for c in 0..3 {
@@ -155,7 +155,7 @@ impl PixelAccumulator {
         }
     }
 
-    /// Counts samples that met a surface, of which the first is given.
+    /// Counts `hits` samples that hit a surface. Index, material and geometry belong to the first of them.
     #[inline(always)]
     fn first(&mut self, hits: u32, index: u32, material: u32, object: u32) {
         if self.hits == 0 || index < self.first_hit {
@@ -164,7 +164,7 @@ impl PixelAccumulator {
         self.hits = self.hits.wrapping_add(hits);
     }
 
-    /// The sums as numbers.
+    /// The sums as floating-point numbers.
     pub fn sums(&self) -> PixelSums {
         PixelSums {
             count: self.radiance.count.into(),
@@ -191,7 +191,7 @@ mod tests {
 
     #[test]
     fn sums_do_not_drift_at_high_sample_counts() {
-        // 0.1 as f32, 10⁷ times: an f32 sum would be off by percents.
+        // 0.1 as f32, 10⁷ times: an f32 sum would have an error of some percent
         let sample = PixelSample { radiance: Rgb::splat(0.1), ..PixelSample::default() };
         let mut sums = PixelAccumulator::default();
         (0..10_000_000).for_each(|i| sums.add(i, &sample));
@@ -278,6 +278,8 @@ mod tests {
                 PixelSample { radiance, features: (i > 3 && b < 0.7).then_some(features), ..PixelSample::default() }
             })
             .collect();
+
+        // Parts in reverse order
         let part = |range: std::ops::Range<usize>| {
             let mut sums = PixelAccumulator::default();
             range.rev().for_each(|i| sums.add(i as u32, &samples[i]));
@@ -286,6 +288,8 @@ mod tests {
         let mut whole = PixelAccumulator::default();
         (0..).zip(&samples).for_each(|(i, sample)| whole.add(i, sample));
         assert!(whole.hits > 20 && whole.material == whole.first_hit + 1 && whole.first_hit > 3);
+
+        // Any division gives the same sums
         for parts in [vec![0..1, 1..64], vec![32..64, 0..32], vec![60..64, 5..60, 0..2, 2..5]] {
             let mut merged = PixelAccumulator::default();
             parts.into_iter().for_each(|range| merged.merge(&part(range)));

@@ -1,14 +1,14 @@
-//! Sums as bytes, little-endian, without what is zero at both ends of a number: a film whose pixels have some hundred
-//! samples takes about half of its memory.
+//! Sums as bytes, little-endian, without zero bytes at both ends of a number. With a few hundred samples per pixel, a
+//! film takes about half of its memory.
 //!
-//! A number is a byte, whose five lower bits say how many bytes follow and whose three upper bits say how many pairs of
-//! zero bytes belong below them. Signed numbers are doubled, and odd if negative.
+//! A number begins with a byte: its five lower bits are the number of the following bytes, its three upper bits the
+//! number of pairs of zero bytes below them. A signed number is doubled, and odd if negative.
 
 use super::accumulator::{PixelAccumulator, RadianceAccumulator};
 use super::exact::{FixedSum, SquareSum, UnitSum};
 use super::replicas::ReplicaAccumulator;
 
-/// Appends numbers.
+/// Appends numbers to a byte vector.
 #[derive(Debug, Default)]
 pub struct Encoder {
     /// The bytes so far.
@@ -16,18 +16,18 @@ pub struct Encoder {
 }
 
 impl Encoder {
-    /// A number of 32 bits, in all its bytes.
+    /// A 32-bit number in four bytes.
     pub fn word(&mut self, value: u32) {
         self.bytes.extend(value.to_le_bytes());
     }
 
-    /// A whole number.
+    /// A compressed integer.
     #[inline]
     pub fn count(&mut self, value: u32) {
         self.number(&value.to_le_bytes());
     }
 
-    /// A sum.
+    /// A compressed sum.
     #[inline]
     pub fn fixed(&mut self, sum: &FixedSum) {
         let bits = sum.bits();
@@ -63,7 +63,7 @@ impl Encoder {
         sums.radiance.iter().for_each(|sum| self.fixed(sum));
     }
 
-    /// The sums of a pixel. A byte says whether any sample met a surface.
+    /// The sums of a pixel. Features follow if the number of hits is not 0.
     pub fn pixel(&mut self, sums: &PixelAccumulator) {
         self.radiance(&sums.radiance);
         sums.squares.iter().for_each(|sum| self.square(sum));
@@ -83,26 +83,26 @@ impl Encoder {
         replica.squares.iter().for_each(|sum| self.square(sum));
     }
 
-    /// Floats, in all their bytes.
+    /// Floats in four bytes each.
     pub fn floats(&mut self, values: &[f32]) {
         self.word(values.len() as u32);
         values.iter().for_each(|value| self.word(value.to_bits()));
     }
 }
 
-/// Reads what an [`Encoder`] wrote; `None` where the bytes end too early or mean nothing.
+/// Reads the numbers of an [`Encoder`]. Returns `None` if the bytes end too early or are invalid.
 #[derive(Debug)]
 pub struct Decoder<'a> {
     bytes: &'a [u8],
 }
 
 impl<'a> Decoder<'a> {
-    /// From the first byte on.
+    /// A decoder at the first byte.
     pub fn new(bytes: &'a [u8]) -> Self {
         Decoder { bytes }
     }
 
-    /// True if all is read.
+    /// True if all bytes are read.
     pub fn is_at_end(&self) -> bool {
         self.bytes.is_empty()
     }
@@ -113,7 +113,7 @@ impl<'a> Decoder<'a> {
         Some(head)
     }
 
-    /// A number of 32 bits.
+    /// A 32-bit number.
     pub fn word(&mut self) -> Option<u32> {
         Some(u32::from_le_bytes(self.take(4)?.try_into().ok()?))
     }
@@ -127,12 +127,12 @@ impl<'a> Decoder<'a> {
         Some(bytes)
     }
 
-    /// A whole number.
+    /// A compressed integer.
     pub fn count(&mut self) -> Option<u32> {
         self.number().map(u32::from_le_bytes)
     }
 
-    /// A sum.
+    /// A compressed sum.
     pub fn fixed(&mut self) -> Option<FixedSum> {
         let doubled = u128::from_le_bytes(self.number()?);
         Some(FixedSum::from_bits((doubled >> 1) as i128 ^ -((doubled & 1) as i128)))
@@ -195,7 +195,7 @@ mod tests {
         let mut s = pcg32([seed, 1, 9]);
         let mut number = |limit: f32| {
             let x: f32 = s.random();
-            // Zeros, negative and very different numbers
+            // Zeros, negative numbers, and numbers of different magnitudes
             if x < 0.2 { 0.0 } else { (x - 0.6).signum() * limit.powf(x) }
         };
         let mut sums = PixelAccumulator::default();
@@ -238,7 +238,7 @@ mod tests {
         for end in 0..encoder.bytes.len() {
             assert_eq!(Decoder::new(&encoder.bytes[..end]).pixel(), None);
         }
-        // A count of more than four bytes; floats without end
+        // An integer of more than four bytes; more floats than bytes
         assert_eq!(Decoder::new(&[5, 1, 1, 1, 1, 1]).count(), None);
         assert_eq!(Decoder::new(&[1 | 3 << 5, 1]).count(), None);
         assert_eq!(Decoder::new(&[0xff; 64]).floats(), None);

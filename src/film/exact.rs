@@ -1,33 +1,33 @@
-//! Sums that depend neither on the order of their terms nor on how these are split: integers of fixed point.
+//! Sums that do not depend on the order and division of their terms: fixed-point integers.
 //!
-//! Each term is rounded to a multiple of a quantum, by itself; sums of integers are exact. Wherever a term has all its
-//! bits, which is so for f32 numbers above the given magnitude, the sum is that of the terms themselves.
+//! Each term is rounded to a multiple of a quantum; sums of integers are exact. Terms above the magnitude in the column
+//! "exact from" are not rounded, since all bits of an f32 fit.
 //!
-//! | sum | of | quantum | terms below | all bits from | bytes |
+//! | sum | terms | quantum | limit | exact from | bytes |
 //! |---|---|---|---|---|---|
 //! | [`FixedSum`] | radiance, depth, control variates | 2⁻⁵⁶ | 2³⁹ = 5.5·10¹¹ | 1.2·10⁻¹⁰ | 16 |
 //! | [`SquareSum`] | radiance² | 2⁻⁸⁰ | 2⁷⁸ | (7.6·10⁻⁶)² | 24 |
-//! | [`UnitSum`] | albedos, normals | 2⁻²⁹ | 4, where they are cut off | 0.03 | 8 |
+//! | [`UnitSum`] | albedos, normals | 2⁻²⁹ | 4 (clamped) | 0.03 | 8 |
 //!
-//! Sums of 2³² such terms do not overflow.
+//! Sums of 2³² terms do not overflow.
 
 use lumiris_lanes::sums;
 
-/// Magnitude from which on a term is too large for [`FixedSum`], and its square for [`SquareSum`].
+/// Limit of the magnitude of terms of [`FixedSum`], and of the roots of terms of [`SquareSum`]; exclusive.
 pub const LIMIT: f32 = 549_755_813_888.0;
-/// The same for albedos and normals.
+/// Limit of albedos and normals.
 const UNIT_LIMIT: f32 = 4.0;
-/// Magnitude below which terms of [`FixedSum`] are less than 2⁶³ quanta.
+/// Terms of [`FixedSum`] with a smaller magnitude are less than 2⁶³ quanta.
 const SMALL: f64 = 64.0;
-/// Binary digits after the point.
+/// Binary digits after the binary point.
 const FIXED_BITS: i32 = 56;
 const SQUARE_BITS: i32 = 80;
 const UNIT_SCALE: f64 = (1_u64 << 29) as f64;
 
-// Those of sums of many at once
+// The same quanta as sums in lanes
 const _: () = assert!(sums::QUANTA[0] == -FIXED_BITS && sums::QUANTA[1] == -SQUARE_BITS && sums::QUANTA[2] == -29);
 
-/// m·2^shift for whole numbers, rounded to the nearest one.
+/// m·2^shift, rounded to the nearest integer.
 #[inline(always)]
 fn shifted(m: u64, shift: i32) -> u128 {
     match shift {
@@ -56,19 +56,19 @@ impl FixedSum {
     pub fn add(&mut self, x: f32) {
         let bits = x.to_bits();
         let exponent = ((bits >> 23) & 0xff) as i32;
-        // Without the digit that is implied, numbers below 10⁻³⁷ count less; they are below the quantum
+        // Subnormal numbers have no implicit digit, but are far below the quantum
         let m = (bits & 0x7f_ffff) | 0x80_0000;
         let term = shifted(m.into(), exponent - 150 + FIXED_BITS) as i128;
         self.0 = { self.0 }.wrapping_add(if x < 0.0 { -term } else { term });
     }
 
-    /// Adds the product of two numbers, if its magnitude is below [`LIMIT`]; what is not is left out.
+    /// Adds the product of two numbers, if its magnitude is below [`LIMIT`]; otherwise, adds nothing.
     #[inline(always)]
     pub fn add_product(&mut self, a: f32, b: f32) {
-        // All digits fit
+        // The f64 product is exact
         let x = f64::from(a) * f64::from(b);
         if x.abs() < SMALL {
-            // Beyond 2⁵¹ quanta, products of two f32 numbers are whole numbers of them
+            // From 2⁵¹ quanta on, the product of two f32 numbers is a multiple of the quantum
             let quanta = x * power(FIXED_BITS);
             let half = if quanta.abs() < (1_u64 << 51) as f64 { 0.5_f64.copysign(quanta) } else { 0.0 };
             self.0 = { self.0 }.wrapping_add(((quanta + half) as i64).into());
@@ -84,7 +84,7 @@ impl FixedSum {
         self.0 = { self.0 }.wrapping_add(if x < 0.0 { -term } else { term });
     }
 
-    /// Adds whole numbers of quanta: 2^`shift` times one, and another.
+    /// Adds high·2^`shift` + low quanta; both numbers are integers.
     #[inline(always)]
     pub fn add_parts(&mut self, [high, low]: [f64; 2], shift: u32) {
         self.0 = { self.0 }.wrapping_add((i128::from(high as i64) << shift) + i128::from(low as i64));
@@ -98,7 +98,7 @@ impl FixedSum {
     /// The sum.
     pub fn value(&self) -> f64 {
         let sum = self.0;
-        // Numbers of 64 bits are converted by the processor
+        // The processor converts 64-bit integers
         i64::try_from(sum).map_or_else(|_| sum as f64, |sum| sum as f64) * power(-FIXED_BITS)
     }
 
@@ -107,7 +107,7 @@ impl FixedSum {
         self.0
     }
 
-    /// The sum of so many quanta.
+    /// The sum with the given number of quanta.
     pub fn from_bits(bits: i128) -> Self {
         FixedSum(bits)
     }
@@ -144,7 +144,7 @@ impl SquareSum {
         }
     }
 
-    /// Adds whole numbers of quanta: 2^`shift` times one, and another.
+    /// Adds high·2^`shift` + low quanta; both numbers are integers.
     #[inline(always)]
     pub fn add_parts(&mut self, [high, low]: [f64; 2], shift: u32) {
         let term = ((i128::from(high as i64) << shift) + i128::from(low as i64)) as u128;
@@ -162,18 +162,18 @@ impl SquareSum {
         of_limb(2) + (of_limb(1) + of_limb(0))
     }
 
-    /// The sum in quanta, lowest digits first.
+    /// The sum in quanta, least significant word first.
     pub fn bits(&self) -> [u64; 3] {
         self.0
     }
 
-    /// The sum of so many quanta.
+    /// The sum with the given number of quanta.
     pub fn from_bits(bits: [u64; 3]) -> Self {
         SquareSum(bits)
     }
 }
 
-/// A sum of numbers around 1.
+/// A sum of numbers with a magnitude of about 1.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct UnitSum(i64);
 
@@ -181,12 +181,12 @@ impl UnitSum {
     /// Adds a number. NaN counts as 0.
     #[inline(always)]
     pub fn add(&mut self, x: f32) {
-        // Rust's conversions saturate, and make 0 of NaN
+        // Conversion by `as` saturates, and converts NaN to 0
         let quanta = f64::from(x.clamp(-UNIT_LIMIT, UNIT_LIMIT)) * UNIT_SCALE;
         self.0 = self.0.wrapping_add((quanta + 0.5_f64.copysign(quanta)) as i64);
     }
 
-    /// Adds a whole number of quanta.
+    /// Adds an integral number of quanta.
     #[inline(always)]
     pub fn add_quanta(&mut self, quanta: f64) {
         self.0 = self.0.wrapping_add(quanta as i64);
@@ -207,7 +207,7 @@ impl UnitSum {
         self.0
     }
 
-    /// The sum of so many quanta.
+    /// The sum with the given number of quanta.
     pub fn from_bits(bits: i64) -> Self {
         UnitSum(bits)
     }
@@ -218,7 +218,7 @@ mod tests {
     use super::*;
     use lumiris_test_support::random::{RngExt, pcg32};
 
-    /// Numbers from 10⁻⁶ to 10⁹ of either sign.
+    /// Numbers of magnitudes from 10⁻⁶ to 10⁹, with both signs.
     fn numbers(seed: u32, count: usize) -> Vec<f32> {
         let mut s = pcg32([seed, 2, 3]);
         let mut number = || {

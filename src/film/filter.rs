@@ -1,19 +1,18 @@
 //! Pixel filters and their importance sampling.
 //!
-//! A sample's position in the pixel is drawn from |f|/∫|f| and has the weight f/(pdf·∫f) = ±∫|f|/∫f, so that the mean
-//! weight is 1 and the weighted mean of radiance is the filtered image [Ernst, Stamminger and Greiner 2006; Pharr et
-//! al. 2023, §8.8]. All filters are products of a function of x and one of y. Box and triangle are sampled in closed
-//! form, the others from tables of [`ENTRIES_PER_UNIT`] equal steps per pixel, within which they are taken to be
-//! constant.
+//! The position of a sample in the pixel has the density |f|/∫|f| and the weight f/(pdf·∫f) = ±∫|f|/∫f. So the mean
+//! weight is 1, and the weighted mean of radiance is the filtered image [Ernst, Stamminger and Greiner 2006; Pharr et
+//! al. 2023, §8.8]. All filters are products of a function of x and a function of y. Box and triangle are sampled in
+//! closed form; all others from piecewise constant tables of [`ENTRIES_PER_UNIT`] equal steps per pixel.
 
 use lumiris_numbers::math::warp::sample_tent;
 use lumiris_numbers::math::{PiecewiseConstant1D, Vec2};
 use std::f32::consts::PI;
 
-/// Table entries per unit of radius, as in pbrt-v4 (the table covers twice the radius).
+/// Table entries per pixel, as in pbrt-v4. The table covers twice the radius.
 pub const ENTRIES_PER_UNIT: f32 = 32.0;
 
-/// A filter over pixels; radii in pixels.
+/// A pixel filter; radii in pixels.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum PixelFilter {
     /// Constant.
@@ -23,14 +22,14 @@ pub enum PixelFilter {
         /// Radius in y.
         ry: f32,
     },
-    /// Falls linearly to 0 at the radius.
+    /// Tent that is 0 at the radius.
     Triangle {
         /// Radius in x.
         rx: f32,
         /// Radius in y.
         ry: f32,
     },
-    /// Gaussian, lowered to be 0 at the radius.
+    /// Gaussian, shifted down to 0 at the radius.
     Gaussian {
         /// Radius in x.
         rx: f32,
@@ -39,7 +38,7 @@ pub enum PixelFilter {
         /// Standard deviation.
         sigma: f32,
     },
-    /// Cubic of [Mitchell and Netravali 1988], stretched to the radius.
+    /// Cubic of [Mitchell and Netravali 1988], scaled to the radius.
     Mitchell {
         /// Radius in x.
         rx: f32,
@@ -50,7 +49,7 @@ pub enum PixelFilter {
         /// Ringing.
         c: f32,
     },
-    /// sinc(x)·sinc(x/τ), cut at the radius.
+    /// sinc(x)·sinc(x/τ), truncated at the radius.
     LanczosSinc {
         /// Radius in x.
         rx: f32,
@@ -64,7 +63,7 @@ pub enum PixelFilter {
 /// A position in the filter.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FilterSample {
-    /// Offset from the pixel's centre, in pixels.
+    /// Offset from the centre of the pixel, in pixels.
     pub offset: Vec2,
     /// f/(pdf·∫f).
     pub weight: f32,
@@ -103,7 +102,7 @@ impl PixelFilter {
         }
     }
 
-    /// Value at `offset` from the pixel's centre, not normalised; 0 outside the radius.
+    /// Value at `offset` from the centre of the pixel, not normalised; 0 outside the radius.
     pub fn evaluate(&self, offset: Vec2) -> f32 {
         let r = self.radius();
         self.evaluate_axis(offset.x, r.x) * self.evaluate_axis(offset.y, r.y)
@@ -190,7 +189,7 @@ impl AxisSampler {
         }
     }
 
-    /// The filter whose samples these are, over its integral.
+    /// The sampled filter, normalised.
     fn value(&self, x: f32) -> f32 {
         match self {
             AxisSampler::Point => 0.0,
@@ -210,7 +209,7 @@ impl AxisSampler {
     }
 }
 
-/// Draws places from a [`PixelFilter`].
+/// Samples positions from a [`PixelFilter`].
 #[derive(Clone, Debug)]
 pub struct FilterSampler {
     x: AxisSampler,
@@ -218,20 +217,20 @@ pub struct FilterSampler {
 }
 
 impl FilterSampler {
-    /// The place for two uniforms in [0, 1).
+    /// The position for two uniform numbers in [0, 1).
     #[inline]
     pub fn sample(&self, u: [f32; 2]) -> FilterSample {
         let ((x, wx), (y, wy)) = (self.x.sample(u[0]), self.y.sample(u[1]));
         FilterSample { offset: Vec2::new(x, y), weight: wx * wy }
     }
 
-    /// The filter whose samples [`Self::sample`] draws at an offset from the pixel's centre, over its integral: the table,
-    /// where that is sampled.
+    /// The filter sampled by [`Self::sample`], normalised, at an offset from the centre of the pixel. For filters
+    /// sampled from a table, the value of the table.
     pub fn value(&self, offset: Vec2) -> f32 {
         self.x.value(offset.x) * self.y.value(offset.y)
     }
 
-    /// Radii beyond which it is 0, in pixels.
+    /// Radii in pixels; the filter is 0 beyond.
     pub fn radius(&self) -> Vec2 {
         Vec2::new(self.x.radius(), self.y.radius())
     }
@@ -280,6 +279,8 @@ mod tests {
             let cells: Vec<[f64; 2]> = (0..N * N).map(|c| cell_integrals(&filter, N, c)).collect();
             let total: f64 = cells.iter().map(|c| c[0]).sum();
             let magnitude: f64 = cells.iter().map(|c| c[1]).sum();
+
+            // Sample, and check signs and magnitudes
             let (sampler, r) = (filter.sampler(), filter.radius());
             let mut stream = pcg32([k as u32, 8, 8]);
             let count = 100_000;
@@ -296,6 +297,8 @@ mod tests {
                 let cell = ((s.offset / r + 1.0) * 0.5 * N as f32).min(Vec2::splat(N as f32 - 1.0));
                 observed[cell.y as usize * N + cell.x as usize] += 1.0;
             }
+
+            // Check the mean weight and the density
             weights.assert_mean(1.0, 1e-5, 1e-5);
             let expected: Vec<f64> = cells.iter().map(|c| (c[1] / magnitude * f64::from(count)).max(0.05)).collect();
             assert_chi_squared(&observed, &expected, 1e-5);
@@ -321,7 +324,7 @@ mod tests {
                 let s = sampler.sample(stream.random::<[f32; 2]>());
                 moments.add(f64::from(s.weight * s.offset.x * s.offset.x));
             }
-            // 0.004 of the squared radius for the steps of the table.
+            // Tolerance for the steps of the table: 0.004 of the squared radius
             let expected = exact / total;
             let slack = 0.004 * f64::from(r.x * r.x) / expected.abs();
             moments.assert_mean(expected, 1e-5, slack);
@@ -334,6 +337,8 @@ mod tests {
             let (sampler, r) = (filter.sampler(), filter.radius());
             let mut stream = pcg32([k as u32, 10, 10]);
             let n = 480;
+
+            // Integrate the values
             let (mut integral, mut moment) = (0.0, 0.0);
             for i in 0..n * n {
                 let [x, y] = [i % n, i / n].map(|i| (i as f32 + 0.5) / n as f32 * 2.0 - 1.0);
@@ -342,6 +347,8 @@ mod tests {
                 moment += value * f64::from(x * x);
             }
             assert!((integral - 1.0).abs() < 2e-3, "{filter:?}: {integral}");
+
+            // Compare the second moment of samples
             let mut sampled = Moments::default();
             for _ in 0..100_000 {
                 let s = sampler.sample(stream.random::<[f32; 2]>());

@@ -1,9 +1,9 @@
-//! The film: sums per pixel, from which means, variances and AOVs are read.
+//! The film: sums per pixel, for means, variances and AOVs.
 //!
-//! Pixel filters work by importance sampling: a sample belongs to one pixel, and its weight is the sign of the
-//! filter ([`filter`]). Samples are added to exact sums ([`exact`], [`accumulator`]), so that the film is the same
-//! however they are ordered and split. [`packed`] keeps those of a tile in few bytes, [`encoding`] stores them in files;
-//! [`variance`] estimates that of pixel means by [`replicas`], and [`noise`] is that of the image.
+//! Pixel filters are importance-sampled: a sample belongs to one pixel, and its weight is the sign of the filter
+//! ([`filter`]). Samples are added to exact sums ([`exact`], [`accumulator`]), so that the film does not depend on
+//! their order and division. [`packed`] compresses the sums of a tile in memory, and [`encoding`] in files.
+//! [`variance`] estimates the variance of pixel means by [`replicas`], and [`noise`] the noise of the image.
 
 pub mod accumulator;
 pub mod encoding;
@@ -24,31 +24,31 @@ use std::ops::Range;
 use std::sync::{Arc, OnceLock};
 use variance::VarianceScale;
 
-/// What one camera sample says of its pixel.
+/// The result of one camera sample.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct PixelSample {
     /// Radiance times the filter weight.
     pub radiance: Rgb,
-    /// What a replica's mean has beside it, and its spread has not: the difference of light paths that it shares with its
-    /// pixel ([`replicas`]).
+    /// Added to the mean of a replica, but not to the spread of its samples: the difference of the light paths that it
+    /// shares with its pixel ([`replicas`]).
     pub offset: Rgb,
-    /// Features of the first surface; `None` if the ray met nothing.
+    /// Features of the first surface; `None` if the ray hits nothing.
     pub features: Option<Features>,
 }
 
-/// Which features samples have.
+/// The features recorded by samples.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum FeatureSet {
     /// None.
     None,
-    /// All but the albedo, which takes a while where it has to be estimated.
+    /// All but the albedo, whose estimation may be slow.
     NoAlbedo,
     /// All.
     #[default]
     All,
 }
 
-/// Features of the first surface that a camera ray meets.
+/// Features of the first surface hit by a camera ray.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Features {
     /// Albedo estimate.
@@ -63,7 +63,7 @@ pub struct Features {
     pub object: u32,
 }
 
-/// Sums over the samples of a pixel, as numbers.
+/// Sums over the samples of a pixel, as floating-point numbers.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct PixelSums {
     /// Number of samples.
@@ -72,21 +72,21 @@ pub struct PixelSums {
     pub radiance: [f64; 3],
     /// Σ radiance², per channel.
     pub radiance_squared: [f64; 3],
-    /// Number of samples that met a surface.
+    /// Number of samples that hit a surface.
     pub hits: u64,
     /// Σ albedo.
     pub albedo: [f64; 3],
     /// Σ normal.
     pub normal: [f64; 3],
-    /// Σ depth of the samples that met a surface.
+    /// Σ depth of the samples that hit a surface.
     pub depth: f64,
-    /// Material of the first sample that met a surface, by its index, plus one; 0 if none did.
+    /// Material index of the first sample (by index) that hit a surface, plus one; 0 if there is none.
     pub material: u32,
-    /// Geometry of that sample, plus one; 0 if none did.
+    /// Geometry index of that sample, plus one; 0 if there is none.
     pub object: u32,
-    /// Samples whose radiance was not finite, or beyond [`exact::LIMIT`]; they count as black.
+    /// Samples with a radiance that is not finite, or beyond [`exact::LIMIT`]. They count as black.
     pub invalid: u64,
-    /// Records of the irradiance cache that this pixel asked for.
+    /// Records of the irradiance cache requested by this pixel.
     pub records: u32,
 }
 
@@ -96,8 +96,8 @@ impl PixelSums {
         self.radiance.map(|s| s / self.count.max(1) as f64)
     }
 
-    /// Variance of the mean per channel if the samples are independent, from their spread; see
-    /// [`Film::read_rows_with_variances`] for others. 0 with fewer than two samples.
+    /// Variance of the mean per channel, from the spread of the samples, if they are independent. 0 with fewer than two
+    /// samples. See [`Film::read_rows_with_variances`] for dependent samples.
     pub fn variance_of_mean(&self) -> [f64; 3] {
         if self.count < 2 {
             return [0.0; 3];
@@ -109,7 +109,7 @@ impl PixelSums {
         })
     }
 
-    /// Subtracts `off` from the mean. The spread of its samples remains.
+    /// Subtracts `off` from the mean. The spread of the samples remains.
     fn subtract(&mut self, off: [f32; 3]) {
         let count = self.count.max(1) as f64;
         for ((sum, squares), off) in self.radiance.iter_mut().zip(&mut self.radiance_squared).zip(off) {
@@ -156,7 +156,7 @@ impl PixelBounds {
         (0..self.area()).map(move |i| [x0 + i as u32 % width, y0 + i as u32 / width])
     }
 
-    /// Rectangles of at most `size` × `size` that cover this one, row by row.
+    /// Tiles of at most `size` × `size` pixels that cover the rectangle, row by row.
     pub fn tiles(&self, size: u32) -> Vec<PixelBounds> {
         let size = size.max(1);
         let mut tiles = Vec::new();
@@ -168,7 +168,8 @@ impl PixelBounds {
         tiles
     }
 
-    /// Indices of the pixels that this has in common with another one, here and there, a row at a time. Both count row by row.
+    /// Ranges of indices of the common pixels of two rectangles, in each of them, a row at a time. Indices count row by
+    /// row.
     pub fn common_rows(&self, other: &PixelBounds) -> impl Iterator<Item = (Range<usize>, Range<usize>)> + use<> {
         let (a, b) = (*self, *other);
         let (x0, x1) = (a.x0.max(b.x0), a.x1.min(b.x1));
@@ -184,62 +185,61 @@ impl PixelBounds {
 /// A tile of a film: its pixels, row by row.
 #[derive(Clone, Debug)]
 pub struct FilmTile {
-    /// Which pixels.
+    /// The pixels.
     pub bounds: PixelBounds,
     /// Their sums.
     pub sums: Arc<PackedSums>,
 }
 
-/// The sums of all pixels inside the crop window. They remain packed, and are read some rows at a time; pixels that no
-/// tile has are without samples.
+/// The sums of all pixels inside the crop window. They remain packed, and are read some rows at a time. Pixels outside
+/// all tiles have no samples.
 #[derive(Clone, Debug)]
 pub struct Film {
     /// Size of the full image (width, height).
     pub resolution: [u32; 2],
-    /// The part that is rendered.
+    /// The rendered part.
     pub bounds: PixelBounds,
-    /// By rows and columns. Tiles of the same rows begin and end with them.
+    /// Sorted by rows and columns. Tiles with common rows have the same first and last row.
     tiles: Vec<FilmTile>,
-    /// Second estimates of some pixels, by their index, which are not part of the image; none if samples are
-    /// independent.
+    /// Second estimates of some pixels, sorted by pixel index; not part of the image. Empty if samples are independent.
     replicas: Vec<Replica>,
-    /// What is subtracted from the mean of each pixel; empty if nothing is.
+    /// Subtracted from the mean of each pixel; empty if there are no corrections.
     corrections: Vec<[f32; 3]>,
-    /// The light of each group of lights, if these have layers.
+    /// Light-group layers.
     light_layers: Vec<(String, Film)>,
     variance_scale: OnceLock<VarianceScale>,
     summary: OnceLock<Summary>,
 }
 
-/// What a film is like on the whole.
+/// Statistics of a film.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Summary {
-    /// Least and greatest number of samples of a pixel.
+    /// Minimum and maximum number of samples of a pixel.
     pub samples: [u64; 2],
-    /// Samples of all pixels together.
+    /// Total number of samples.
     pub all_samples: u64,
-    /// Number of pixels, and of those that have samples.
+    /// Number of pixels, and number of pixels with samples.
     pub pixels: [u64; 2],
-    /// Least number of samples of a pixel that has any.
+    /// Minimum number of samples of a pixel with samples.
     pub least_samples: Option<u64>,
     /// Samples that count as black; see [`PixelSums::invalid`].
     pub invalid: u64,
-    /// By the variances of the pixels' means.
+    /// Noise, from the variances of pixel means.
     pub noise: Noise,
-    /// Its blocks, by the same.
+    /// Blocks of the noise.
     pub blocks: Vec<Block>,
     /// True if there are records of an irradiance cache.
     pub has_records: bool,
 }
 
 impl Summary {
-    /// Mean number of samples of a pixel, and the least and the greatest one if pixels differ: "12 per pixel", or
-    /// "11.8 per pixel (4 to 65)". Those of `unit` "per pixel".
+    /// Mean number of samples of a pixel, with the minimum and the maximum if they differ: "12 per pixel", or "11.8 per
+    /// pixel (4 to 65)" for the `unit` "per pixel".
     pub fn samples_text(&self, unit: &str) -> String {
         mean_and_range(self.all_samples, self.pixels[0], self.samples, unit)
     }
 
-    /// The same of the pixels that have any samples, which are all that a part of tiles has.
+    /// The same over the pixels with samples: a part of an image by tiles has no others.
     pub fn samples_text_of_sampled(&self, unit: &str) -> String {
         let range = [self.least_samples.unwrap_or(0), self.samples[1]];
         mean_and_range(self.all_samples, self.pixels[1], range, unit)
@@ -255,7 +255,7 @@ fn mean_and_range(sum: u64, count: u64, [least, most]: [u64; 2], unit: &str) -> 
 }
 
 impl Film {
-    /// A film of tiles, each pixel in one of them at most, and of replicas.
+    /// A film of disjoint tiles, and replicas.
     pub fn new(
         resolution: [u32; 2],
         bounds: PixelBounds,
@@ -269,13 +269,13 @@ impl Film {
         Film { resolution, bounds, tiles, replicas, corrections, light_layers, variance_scale, summary }
     }
 
-    /// With layers by groups of lights.
+    /// Adds light-group layers.
     #[must_use]
     pub fn with_light_layers(self, light_layers: Vec<(String, Film)>) -> Self {
         Film { light_layers, ..self }
     }
 
-    /// The light of each group of lights, by their names; together they are the image.
+    /// Light-group layers by name. Their sum is the image.
     pub fn light_layers(&self) -> &[(String, Film)] {
         &self.light_layers
     }
@@ -285,14 +285,14 @@ impl Film {
         Film::new(resolution, bounds, vec![FilmTile { bounds, sums: Arc::new(PackedSums::of(pixels)) }], Vec::new())
     }
 
-    /// Subtracts something from the mean of each pixel, and leaves the spread of its samples; the replicas are given as
-    /// they are then.
+    /// Sets corrections, which are subtracted from the mean of each pixel; the spread of the samples remains.
+    /// `replicas` are already corrected.
     pub fn correct(&mut self, corrections: Vec<[f32; 3]>, replicas: Vec<Replica>) {
         (self.corrections, self.replicas) = (corrections, replicas);
         (self.variance_scale, self.summary) = Default::default();
     }
 
-    /// True if the means of pixels are not those of the sums of its tiles.
+    /// True if pixel means are corrected: they differ from the means of the tiles.
     pub fn is_corrected(&self) -> bool {
         !self.corrections.is_empty()
     }
@@ -312,12 +312,12 @@ impl Film {
         self.len() == 0
     }
 
-    /// Its tiles, by rows and columns.
+    /// The tiles, sorted by rows and columns.
     pub fn tiles(&self) -> &[FilmTile] {
         &self.tiles
     }
 
-    /// Second estimates of some pixels, by their index.
+    /// Second estimates of some pixels, sorted by pixel index.
     pub fn replicas(&self) -> &[Replica] {
         &self.replicas
     }
@@ -329,14 +329,14 @@ impl Film {
         tiles + layers + size_of_val(&self.replicas[..]) + size_of_val(&self.corrections[..])
     }
 
-    /// All pixels, row by row: 144 bytes each, which is much for large images.
+    /// All pixels, row by row. Takes 144 bytes per pixel.
     pub fn pixels(&self) -> Vec<PixelSums> {
         let mut all = Vec::new();
         self.read_rows(self.bounds.y0..self.bounds.y1, &mut all);
         all
     }
 
-    /// Some rows of a film, a few at a time: those that are read together.
+    /// Ranges of [`BAND`] rows that are read together.
     pub fn bands(&self) -> impl IndexedParallelIterator<Item = Range<u32>> + use<> {
         let PixelBounds { y0, y1, .. } = self.bounds;
         let count = y1.saturating_sub(y0).div_ceil(BAND);
@@ -344,7 +344,7 @@ impl Film {
         (0..count).into_par_iter().map(band).with_max_len(1)
     }
 
-    /// Reads the pixels of some rows, given by their coordinates.
+    /// Reads the pixels of some rows. The rows are absolute coordinates.
     pub fn read_rows(&self, rows: Range<u32>, out: &mut Vec<PixelSums>) {
         self.read(&PixelBounds { y0: rows.start, y1: rows.end, ..self.bounds }, out);
     }
@@ -353,6 +353,8 @@ impl Film {
     pub fn read(&self, pixels: &PixelBounds, out: &mut Vec<PixelSums>) {
         out.clear();
         out.resize(pixels.area(), PixelSums::default());
+
+        // Copy from the tiles that overlap the rectangle
         let first = self.tiles.partition_point(|t| t.bounds.y1 <= pixels.y0);
         let mut sums = Vec::new();
         for FilmTile { bounds, sums: packed } in self.tiles[first..].iter().take_while(|t| t.bounds.y0 < pixels.y1) {
@@ -370,6 +372,8 @@ impl Film {
                 out[at..at + row.len()].iter_mut().zip(row).for_each(|(pixel, sums)| *pixel = sums.sums());
             }
         }
+
+        // Corrections
         if !self.corrections.is_empty() && !out.is_empty() {
             for (y, row) in (pixels.y0..).zip(out.chunks_exact_mut(pixels.width() as usize)) {
                 let corrections = &self.corrections[self.index(pixels.x0, y)..];
@@ -378,10 +382,10 @@ impl Film {
         }
     }
 
-    /// What it is like on the whole.
+    /// Statistics of the film.
     pub fn summary(&self) -> &Summary {
         self.summary.get_or_init(|| {
-            // Once, and not by all threads at the same time
+            // Computed once here, not by all threads at the same time
             self.variance_scale();
             let bands = self.bands().map_init(Default::default, |(pixels, variances), rows| {
                 self.read_rows_with_variances(rows.clone(), pixels, variances);
@@ -394,10 +398,10 @@ impl Film {
     }
 }
 
-/// Rows that are read together where a film is read from top to bottom: those of a row of blocks.
+/// Number of rows that are read together: the height of a noise block.
 pub const BAND: u32 = noise::BLOCK;
 
-/// What the rows of a band are like.
+/// Statistics of a band of rows.
 struct BandSummary {
     samples: [u64; 2],
     least_samples: Option<u64>,

@@ -1,7 +1,7 @@
-//! The noise of an image, by blocks of pixels: `--noise` asks for it, and it is what is printed of a finished image.
+//! The noise of an image, by blocks of pixels. It is the target of `--noise`, and printed for finished images.
 //!
-//! The noise of a block of [`BLOCK`] × [`BLOCK`] pixels is σ/(|m| + 0.01): m is the mean luminance of its pixels, and σ² the mean
-//! variance of theirs.
+//! The noise of a block of [`BLOCK`] × [`BLOCK`] pixels is σ/(|m| + 0.01), where m is the mean luminance of its pixels,
+//! and σ² the mean of their variances.
 
 use super::{PixelBounds, PixelSums};
 use crate::imaging::metrics::difference::DEFAULT_EPSILON;
@@ -10,37 +10,37 @@ use lumiris_numbers::math::luminance;
 /// Edge of a block (pixels).
 pub const BLOCK: u32 = 16;
 
-/// The noise of a block by the mean luminance of its pixels and the mean variance of theirs.
+/// The noise of a block with the mean luminance `mean` and the mean variance `variance` of its pixels.
 pub fn of_block(mean: f64, variance: f64) -> f64 {
     variance.sqrt() / (mean.abs() + DEFAULT_EPSILON)
 }
 
-/// How much more noise than asked for a block may have by the samples of the image to count as one that has it: the estimate of a
-/// block's noise is noisy itself, and so is the pilot's, which its number of samples follows from.
+/// Maximum noise of a block relative to the target, to count as reached. Both the estimated noise of a block and the
+/// pilot estimate behind its sample count are noisy.
 pub const TOLERANCE: f64 = 1.25;
 
-/// A block that has light, and pixels with two samples.
+/// A block that is not black, with pixels of at least two samples.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Block {
     /// Its noise.
     pub noise: f64,
-    /// Greatest number of samples of a pixel.
+    /// Maximum number of samples of a pixel.
     pub samples: u64,
 }
 
-/// Shares of the blocks by a noise that was asked for.
+/// Shares of the blocks, by a noise target.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Reached {
-    /// Those that have it, within [`TOLERANCE`].
+    /// Blocks that reach the target, within [`TOLERANCE`].
     pub reached: f64,
-    /// Those that have more, with pixels of as many samples as there may be.
+    /// Blocks above the target whose pixels have the maximum number of samples.
     pub limited: f64,
-    /// All others.
+    /// All other blocks.
     pub others: f64,
 }
 
 impl Reached {
-    /// Where there are at most `limit` samples per pixel; `None` if the noise of no block is known.
+    /// Shares for at most `limit` samples per pixel; `None` if there are no blocks.
     pub fn of(blocks: &[Block], target: f64, limit: u32) -> Option<Self> {
         let share = |is_one: &dyn Fn(&Block) -> bool| {
             blocks.iter().filter(|block| is_one(block)).count() as f64 / blocks.len() as f64
@@ -55,14 +55,14 @@ impl Reached {
 /// The noise of an image.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Noise {
-    /// Median of the noise of its blocks; infinite where none is known. Blocks without light do not count.
+    /// Median noise of the blocks, excluding black blocks; infinite if there are none.
     pub median: f64,
-    /// Share of the blocks that have more than twice the median.
+    /// Share of the blocks with more than twice the median.
     pub above_twice: f64,
 }
 
 impl Noise {
-    /// From the noise of all blocks.
+    /// The noise of an image with these blocks.
     pub(super) fn of_image(blocks: &[Block]) -> Self {
         let mut blocks: Vec<f64> = blocks.iter().map(|block| block.noise).collect();
         blocks.sort_unstable_by(f64::total_cmp);
@@ -74,8 +74,8 @@ impl Noise {
     }
 }
 
-/// The noise of the blocks of some rows, [`BLOCK`] at most, by the variances of their pixels' means; of those that have light, and
-/// pixels with two samples. Channels are taken to vary together, as they do with the light that a path finds.
+/// The blocks of at most [`BLOCK`] rows, from the variances of pixel means. Black blocks, and blocks without pixels of
+/// at least two samples, are omitted. Channels are assumed to be fully correlated.
 pub(super) fn of_blocks(rows: &PixelBounds, pixels: &[PixelSums], variances: &[[f64; 3]]) -> Vec<Block> {
     let width = rows.width() as usize;
     let of_columns = |first: usize| {
@@ -97,7 +97,7 @@ pub(super) fn of_blocks(rows: &PixelBounds, pixels: &[PixelSums], variances: &[[
 mod tests {
     use super::*;
 
-    /// A row of two blocks and a half with a mean of 1, where the first is black.
+    /// A row of two and a half blocks; the first is black, the others have a mean of 1.
     fn blocks(variance_of: impl Fn(usize) -> f64) -> Vec<Block> {
         let rows = PixelBounds { x0: 5, x1: 45, y0: 3, y1: 4 };
         let pixel = |x: usize| {
@@ -111,7 +111,7 @@ mod tests {
 
     #[test]
     fn the_noise_of_a_block_is_its_standard_error_by_its_mean() {
-        // One pixel of 16, and half of 8
+        // One of 16 pixels, and half of 8 pixels
         let found = blocks(|x| if x == 20 { 0.16 } else { f64::from(u8::from(x > 35)) });
         let expected = [0.1 / 1.01, (0.5_f64).sqrt() / 1.01];
         assert_eq!(found.len(), 2, "a black block is none");

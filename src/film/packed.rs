@@ -1,9 +1,9 @@
-//! The exact sums of the pixels of a tile, in the bytes that they need.
+//! Lossless compression of the exact sums of the pixels of a tile.
 //!
-//! Pixels that lie side by side have sums of similar magnitude: about as many leading zeros, and trailing zeros as well
-//! where samples are f32 numbers of similar exponents. So each sum of [`PixelAccumulator`] is a column: the least value of
-//! the column, the number of binary zeros that all values end in, and what is left of each value, in as many bytes as the
-//! largest needs. A column of equal numbers has none. Every bit is kept, whatever the values are.
+//! Neighbouring pixels have sums of similar magnitude, with similar numbers of leading zeros. If their samples are f32
+//! numbers of similar exponents, they have similar numbers of trailing zeros as well. So each sum of
+//! [`PixelAccumulator`] is a column: its minimum, the number of common trailing zero bits, and the remainder of each
+//! value, in the bytes of the largest remainder. A column of equal numbers has no remainders.
 //!
 //! A tile is unpacked while samples are added to it, and packed again afterwards.
 
@@ -11,16 +11,16 @@ use super::accumulator::PixelAccumulator;
 use super::exact::{FixedSum, SquareSum, UnitSum};
 use std::ops::Range;
 
-/// Bytes after the last column, so that values can be read eight or sixteen bytes at a time.
+/// Padding after the last column (bytes), since values are read eight or sixteen bytes at a time.
 const PADDING: usize = 16;
-/// What memory is asked for in multiples of, so that it can grow a little in place.
+/// Granularity of allocations (bytes), so that data can grow a little in place.
 const GRANULE: usize = 256;
-/// Binary digits of a square that are left without its zeros; squares with more stand in full.
+/// Maximum number of binary digits of squares without common zeros. Larger squares are stored in full.
 const SQUARE_DIGITS: u32 = 126;
-/// Stands for the number of zeros of squares in full.
+/// Number of zeros that marks squares stored in full.
 const IN_FULL: u8 = u8::MAX;
 
-/// See the module. The sums of pixels without samples take no memory.
+/// Packed sums of a tile; see the module. Pixels without samples take no memory.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct PackedSums {
     len: usize,
@@ -33,7 +33,7 @@ impl PackedSums {
         PackedSums { len, bytes: Vec::new() }
     }
 
-    /// These pixels.
+    /// Packs pixels.
     pub fn of(sums: &[PixelAccumulator]) -> Self {
         let mut packed = PackedSums::new(sums.len());
         packed.set(sums, &mut Vec::new());
@@ -55,7 +55,7 @@ impl PackedSums {
         self.bytes.capacity()
     }
 
-    /// Replaces all pixels; `scratch` is memory that calls share.
+    /// Replaces all pixels; `scratch` is a shared buffer.
     pub fn set(&mut self, sums: &[PixelAccumulator], scratch: &mut Vec<u8>) {
         scratch.clear();
         pack(sums, scratch);
@@ -63,7 +63,7 @@ impl PackedSums {
         replace(&mut self.bytes, scratch);
     }
 
-    /// Reads some pixels. `out` has as many.
+    /// Reads some pixels. `out` must have the length of `pixels`.
     pub fn read(&self, pixels: Range<usize>, out: &mut [PixelAccumulator]) {
         if self.bytes.is_empty() {
             out.fill(PixelAccumulator::default());
@@ -80,10 +80,10 @@ impl PackedSums {
     }
 }
 
-/// Replaces bytes that are kept, in memory that is not much more than they need.
+/// Replaces stored bytes, without much excess capacity.
 fn replace(bytes: &mut Vec<u8>, new: &[u8]) {
     if bytes.capacity() < new.len() || bytes.capacity() > new.len() + 2 * GRANULE {
-        // Without the old ones, their memory can be that of the new ones
+        // Free the old memory first, so that it can be reused
         *bytes = Vec::new();
         bytes.reserve_exact(new.len().next_multiple_of(GRANULE.min(new.len())));
     }
@@ -91,7 +91,7 @@ fn replace(bytes: &mut Vec<u8>, new: &[u8]) {
     bytes.extend_from_slice(new);
 }
 
-/// Rows of sums in the bytes that they need, which are none if all are 0.
+/// Packed rows of sums. Initial zeros take no memory.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct PackedRows {
     rows: usize,
@@ -100,7 +100,7 @@ pub struct PackedRows {
 }
 
 impl PackedRows {
-    /// Sums that are 0.
+    /// Rows of zeros.
     pub fn new(rows: usize, columns: usize) -> Self {
         PackedRows { rows, columns, bytes: Vec::new() }
     }
@@ -115,7 +115,7 @@ impl PackedRows {
         self.len() == 0
     }
 
-    /// Replaces all sums, row by row, by as many; `scratch` is memory that calls share.
+    /// Replaces all sums, row by row; `scratch` is a shared buffer.
     pub fn set(&mut self, sums: &[FixedSum], scratch: &mut Vec<u8>) {
         scratch.clear();
         let rows: Vec<&[FixedSum]> = sums.chunks_exact(self.columns.max(1)).collect();
@@ -137,7 +137,7 @@ impl PackedRows {
     }
 }
 
-/// The columns of whole numbers, in the order of the bytes.
+/// The columns of integers, in storage order.
 macro_rules! whole_numbers {
     ($each:ident) => {
         $each!(radiance.count);
@@ -179,8 +179,8 @@ fn unpack(reader: &mut Reader<'_>, out: &mut [PixelAccumulator]) {
     reader.column(|i, v| out[i].depth = FixedSum::from_bits(v));
 }
 
-/// Declares a function that appends a column of numbers of a type: the zeros at the end of its values, the bytes of each,
-/// the bytes of the least value, that value, and what is to be added to it.
+/// Declares a function that appends a column of integers of a type: number of common trailing zeros, bytes per value,
+/// bytes of the minimum, minimum, and remainders.
 macro_rules! packer {
     ($name:ident, $number:ty, $unsigned:ty) => {
         #[inline(always)]
@@ -189,10 +189,12 @@ macro_rules! packer {
             for v in sums.iter().map(&value) {
                 (least, greatest, digits) = (least.min(v), greatest.max(v), digits | v);
             }
+
+            // Header
             let range = greatest.wrapping_sub(least) as $unsigned;
             let zeros = if range == 0 { 0 } else { digits.trailing_zeros() };
             let width = bytes_of((range >> zeros).into());
-            // A negative number has all its bytes
+            // A negative minimum takes all 16 bytes
             let least_wide = i128::from(least);
             let head = bytes_of(least_wide as u128);
             out.extend([zeros as u8, width as u8, head as u8]);
@@ -221,7 +223,7 @@ macro_rules! packer {
 packer!(pack_narrow, i64, u64);
 packer!(pack_column, i128, u128);
 
-/// Appends a column of squares: the zeros at the end of them all, and a column of what is left.
+/// Appends a column of squares: the number of common trailing zeros, and a column of the remaining digits.
 #[inline(always)]
 fn pack_squares(sums: &[PixelAccumulator], value: impl Fn(&PixelAccumulator) -> [u64; 3], out: &mut Vec<u8>) {
     let mut digits = [0; 3];
@@ -241,7 +243,7 @@ fn pack_squares(sums: &[PixelAccumulator], value: impl Fn(&PixelAccumulator) -> 
     }
 }
 
-/// The lower 128 digits of a number without its last ones, of which there are less than 192.
+/// The lower 128 bits of a number shifted right by `zeros` < 192.
 #[inline(always)]
 fn without_zeros([low, middle, high]: [u64; 3], zeros: u32) -> u128 {
     let below = u128::from(low) | u128::from(middle) << 64;
@@ -252,7 +254,7 @@ fn without_zeros([low, middle, high]: [u64; 3], zeros: u32) -> u128 {
     }
 }
 
-/// The number again.
+/// The inverse of [`without_zeros`].
 #[inline(always)]
 fn with_zeros(rest: u128, zeros: u32) -> [u64; 3] {
     match zeros {
@@ -269,17 +271,17 @@ fn with_zeros(rest: u128, zeros: u32) -> [u64; 3] {
     }
 }
 
-/// Bytes that a number needs.
+/// Number of bytes of a number.
 fn bytes_of(v: u128) -> usize {
     (128 - v.leading_zeros()).div_ceil(8) as usize
 }
 
-/// Reads columns one after the other.
+/// Reads consecutive columns.
 struct Reader<'a> {
     bytes: &'a [u8],
     /// Number of values of a column.
     len: usize,
-    /// Those that are read.
+    /// Range of values to read.
     pixels: Range<usize>,
     at: usize,
 }
@@ -290,7 +292,7 @@ impl Reader<'_> {
         self.bytes[self.at - 1].into()
     }
 
-    /// The zeros at the end of the values of a column, the bytes of each, the least value, and where the values begin.
+    /// Header of a column: number of common trailing zeros, bytes per value, minimum, and position of the first value.
     fn head(&mut self) -> (usize, usize, i128, usize) {
         let (zeros, width, head) = (self.byte(), self.byte(), self.byte());
         let mut least = [0; 16];
@@ -300,7 +302,7 @@ impl Reader<'_> {
         (zeros, width, i128::from_le_bytes(least), start)
     }
 
-    /// Hands on the values of a column of numbers of 64 bits.
+    /// Passes the values of a column of 64-bit numbers to `set`.
     #[inline(always)]
     fn narrow(&mut self, mut set: impl FnMut(usize, i64)) {
         let (zeros, width, least, start) = self.head();
@@ -314,12 +316,14 @@ impl Reader<'_> {
         }
     }
 
-    /// Hands on the values of a column of numbers of 128 bits.
+    /// Passes the values of a column of 128-bit numbers to `set`.
     #[inline(always)]
     fn column(&mut self, mut set: impl FnMut(usize, i128)) {
         let (zeros, width, least, start) = self.head();
         let count = self.pixels.len();
         let value = |rest: u128| least.wrapping_add((rest << zeros) as i128);
+
+        // Minimum plus remainder, by the bytes per value
         match width {
             0 => (0..count).for_each(|i| set(i, least)),
             1..=8 => {
@@ -337,13 +341,13 @@ impl Reader<'_> {
         }
     }
 
-    /// Eight bytes.
+    /// Eight bytes at a position.
     #[inline(always)]
     fn word(&self, at: usize) -> u64 {
         self.bytes[at..].first_chunk().map_or(0, |bytes| u64::from_le_bytes(*bytes))
     }
 
-    /// Hands on the values of a column of squares.
+    /// Passes the values of a column of squares to `set`.
     #[inline(always)]
     fn squares(&mut self, mut set: impl FnMut(usize, [u64; 3])) {
         let zeros = self.byte();
@@ -367,6 +371,7 @@ mod tests {
 
     /// Pixels with samples of many magnitudes, or of similar ones.
     fn pixels(seed: u32, count: usize, range: f32) -> Vec<PixelAccumulator> {
+        // Up to 8 samples per pixel, some without features
         let mut s = pcg32([seed, 4, 2]);
         let pixel = |_| {
             let mut sums = PixelAccumulator::default();

@@ -1,11 +1,12 @@
-//! Pixels that are estimated a second time, with as many samples and an independent scrambling: the *replicas*, by which
-//! [`super::variance`] is known.
+//! Replicas: second estimates of some pixels, with the same number of samples and independent scrambling, for
+//! [`super::variance`].
 //!
-//! One pixel is drawn by the seed of the image in each square of k × k pixels, where k is 8 in large images and less in small
-//! ones: so replicas are spread evenly, and images of other seeds have others.
+//! In each square of k × k pixels, the seed of the image determines one pixel. k is 8 in large images, and less in
+//! small ones. So replicas are spread evenly, and differ between seeds.
 //!
-//! Light paths are traced for the whole image, so a replica shares those of its pixel. What they bring has a sign in its mean
-//! that makes their difference ([`PixelSample::offset`]), and none in the spread of its samples.
+//! Light paths are traced for the whole image, so a replica shares the light paths of its pixel. Their contribution has
+//! a random sign in the mean of the replica, which stands for the difference ([`PixelSample::offset`]), and no sign in
+//! the spread of its samples.
 
 use super::PixelSample;
 use super::accumulator::RadianceAccumulator;
@@ -13,26 +14,26 @@ use super::exact::{LIMIT, SquareSum};
 use super::{PixelBounds, PixelSums};
 use lumiris_numbers::math::hash::pcg4d;
 
-/// Number of replicas below which there is one in fewer than 8 × 8 pixels: one in each, in images of fewer than four times
-/// as many pixels. Where few pixels have most of the variance, such as the edges of lamps, enough of these are among them.
+/// With fewer replicas, the squares are smaller than 8 × 8 pixels. Images with fewer than four times this number of
+/// pixels have a replica of each pixel. So there are enough replicas where few pixels have most of the variance, such
+/// as at the edges of lights.
 const WANTED: f64 = 4096.0;
 /// Maximum edge of the squares.
 const MAX_SQUARE: u32 = 8;
-/// Distinguishes the choice of replicas from other hashes of pixels.
+/// Seed of the choice of replicas.
 const CHOICE: u32 = 0x72_65_70_6c;
 
-/// Which pixels of an image are estimated twice.
+/// The choice of pixels that are estimated twice.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ReplicaChoice {
-    /// Pixels are chosen in blocks of `edge` × `edge`, at least 1.
+    /// Pixels are chosen in blocks of `edge` × `edge`; at least 1.
     pub edge: u32,
     /// The seed of the image.
     pub seed: u32,
 }
 
 impl ReplicaChoice {
-    /// Replicas, without samples, for the pixels of a tile, in an image with the given bounds. Their indices are those of the
-    /// tile.
+    /// Empty replicas for the pixels of a tile, in an image with the given bounds. Their indices refer to the tile.
     pub fn of_tile(&self, image: &PixelBounds, tile: &PixelBounds) -> Vec<ReplicaAccumulator> {
         let square = ((image.area() as f64 / WANTED).sqrt() as u32).clamp(1, MAX_SQUARE);
         let is_chosen = |i: &u32| {
@@ -51,7 +52,7 @@ impl ReplicaChoice {
 pub struct ReplicaAccumulator {
     /// Index of the pixel in the tile.
     pub pixel: u32,
-    /// Samples and Σ radiance.
+    /// Number of samples and Σ radiance.
     pub sums: RadianceAccumulator,
     /// Σ radiance², per channel.
     pub squares: [SquareSum; 3],
@@ -72,7 +73,7 @@ impl ReplicaAccumulator {
         self.squares.iter_mut().zip(&other.squares).for_each(|(a, b)| a.merge(b));
     }
 
-    /// The sums as numbers, of a pixel with the given index in the film.
+    /// The sums as floating-point numbers, for a pixel with the given index in the film.
     pub fn replica(&self, pixel: u32) -> Replica {
         let sums = PixelSums {
             count: self.sums.count.into(),
@@ -135,7 +136,7 @@ mod tests {
 
     #[test]
     fn other_seeds_choose_other_pixels() {
-        // 7500 pixels of either seed, each with a probability of 1/64: 117 ± 11 of both
+        // 7500 pixels per seed, each with a probability of 1/64: 117 ± 11 common ones
         let [a, b] = [0, 1].map(|seed| positions(&IMAGE, &IMAGE, ReplicaChoice { edge: 1, seed }));
         let both = a.iter().filter(|pixel| b.contains(pixel)).count();
         assert!((both as f64 - 117.0).abs() < 4.0 * 11.0, "{both}");

@@ -1,33 +1,33 @@
-//! The variance of pixel means, in every mode, from pixels that are estimated twice.
+//! The variance of pixel means, for all estimators and samplers, from pixels that are estimated twice.
 //!
-//! The mean of N independent samples has the variance s²/N, where s² is the variance of the samples. Points of a net
-//! are distributed more evenly, and their mean varies less; control variates leave less of it; and samples that share light
-//! paths vary together. How much that is cannot be determined from one set of samples. [`super::replicas`] are a second one. Of
-//! two such means A and B, (A − B)²/2 is an unbiased estimate of their variance, and pixels are assigned the variances
+//! The mean of N independent samples has the variance s²/N, where s² is the variance of the samples. Stratified samples
+//! and control variates reduce the variance of the mean; shared light paths increase it. One set of samples does not
+//! determine this effect. [`super::replicas`] are a second, independent set. For two such means A and B, (A − B)²/2 is
+//! an unbiased estimate of their variance. The variance of a pixel mean is estimated as
 //!
-//! V = f s²/N, with f = Σ (A − B)²/2 / Σ (s_A²/N + s_B²/N)/2 over the replicas that are like them.
+//! V = f s²/N, with f = Σ (A − B)²/2 / Σ (s_A²/N + s_B²/N)/2 over similar replicas.
 //!
-//! A sample far brighter than the others is in both sums of f alike, whichever of both sets has it: it draws f of a few replicas
-//! towards 1, and nothing else to itself.
+//! An outlier has the same effect on both sums of f, whichever of the two means contains it: it moves f of a few
+//! replicas towards 1, and nothing else.
 //!
-//! f depends on what is seen: stratification gains much at edges and in smooth light, and little for light of many bounces. So
-//! replicas are divided by where they are in the image and by the level of s²/N, which is its logarithm, averaged over 3 × 3
-//! pixels to be less noisy: time and again in the middle of the dimension in which they extend furthest, while enough of them
-//! are on both sides.
+//! f depends on the content of the image: stratification gains much at edges and in smooth light, and little in light
+//! of many bounces. So replicas are partitioned by position in the image and by level, the logarithm of s²/N averaged
+//! over 3 × 3 pixels to reduce noise. A set is split at the middle of its longest dimension as long as both parts have
+//! enough replicas.
 
 use super::{Film, PixelSums};
 use rayon::prelude::*;
 use std::ops::Range;
 
-/// Number of replicas that are divided no further is less than twice that; f then has a relative standard error of about
-/// √(2/16) = 35 % if means are normal.
+/// Sets with less than twice this number of replicas are not split. The relative standard error of f is then about
+/// √(2/16) = 35 %, if means are normally distributed.
 const MIN_MEMBERS: usize = 16;
-/// Powers of two of s²/N that count as much as the width of the image.
+/// Factor of s²/N, as a power of two, that is weighted like the extent of the image.
 const LEVELS: f64 = 3.0;
-/// Part of the replicas beyond either end of their extent: a few that lie apart do not stretch it.
+/// The extent of a set excludes 1/[`BEYOND`] of the replicas at either end, to be robust against outliers.
 const BEYOND: usize = 10;
 
-/// Where a pixel is, and its level.
+/// Level and scaled position of a pixel.
 type Place = [f64; 3];
 
 /// The variances estimated at a replica.
@@ -40,11 +40,11 @@ struct ReplicaVariance {
     measured: f64,
 }
 
-/// What the variances of independent samples are multiplied by: f of a set of replicas, or of its two parts.
+/// The factor f of the variance of independent samples: of a set of replicas, or of its two parts.
 #[derive(Clone, Debug)]
 pub(super) enum VarianceScale {
     One(f64),
-    /// Places with less than `at` in a dimension belong to the first.
+    /// Coordinates below `at` in the dimension belong to the first part.
     Two {
         dimension: usize,
         at: f64,
@@ -74,14 +74,13 @@ impl VarianceScale {
     }
 }
 
-/// The logarithm to the base of 2 but for 0.09 and a constant, which is the same on every machine. What is too little to tell it from
-/// nothing is alike.
+/// log₂ with an error of at most 0.09 and an additive constant, identical on every machine. Tiny variances are clamped.
 fn level(variance: f64) -> f64 {
-    // Exponent and mantissa, one after the other
+    // Exponent and mantissa as a fixed-point number
     variance.max(1e-30).to_bits() as f64 / (1_u64 << 52) as f64
 }
 
-/// The dimension in which replicas extend furthest, and the middle of that; `None` if they are not to be divided.
+/// The longest dimension of a set of replicas, and its middle; `None` if the set is not to be split.
 fn middle(replicas: &[ReplicaVariance]) -> Option<(usize, f64)> {
     if replicas.len() < 2 * MIN_MEMBERS {
         return None;
@@ -98,8 +97,8 @@ fn middle(replicas: &[ReplicaVariance]) -> Option<(usize, f64)> {
 }
 
 impl Film {
-    /// Reads some rows as [`Film::read_rows`], and the estimated variance of each pixel's mean per channel. Without
-    /// replicas it is that of independent samples.
+    /// Reads some rows like [`Film::read_rows`], with the estimated variance of each pixel mean per channel. Without
+    /// replicas, samples are assumed to be independent.
     pub fn read_rows_with_variances(
         &self,
         rows: Range<u32>,
@@ -113,16 +112,20 @@ impl Film {
             variances.extend(pixels.iter().map(|pixel| pixel.variance_of_mean().map(|v| v * factor)));
             return;
         }
+
+        // The level of a pixel depends on its neighbours
         let surroundings = self.read_surroundings(&rows, pixels);
         pixels.drain(..surroundings.before);
         pixels.truncate(rows.len() * surroundings.width);
+
+        // Variances
         for (i, pixel) in pixels.iter().enumerate() {
             let factor = scale.factor(&surroundings.place(surroundings.before + i));
             variances.push(pixel.variance_of_mean().map(|v| v * factor));
         }
     }
 
-    /// Estimated variance of each pixel's mean per channel: 24 bytes each, which is much for large images.
+    /// Estimated variance of each pixel mean per channel. Takes 24 bytes per pixel.
     pub fn variances(&self) -> Vec<[f64; 3]> {
         let mut variances = Vec::new();
         self.read_rows_with_variances(self.bounds.y0..self.bounds.y1, &mut Vec::new(), &mut variances);
@@ -133,7 +136,8 @@ impl Film {
         if let Some(scale) = self.variance_scale.get() {
             return scale;
         }
-        // Not while others wait for it: a thread that works on this may take up work that asks for it as well
+        // Not inside `get_or_init`: a thread that computes this may steal work that needs it as well, and would wait
+        // for itself
         let bands = self.bands().map_init(Vec::new, |pixels, rows| self.measured_twice(rows, pixels));
         let tell = self.replicas.iter().any(|replica| replica.count > 1);
         let replicas = if tell { bands.collect::<Vec<_>>().concat() } else { Vec::new() };
@@ -158,7 +162,7 @@ impl Film {
         measured.collect()
     }
 
-    /// Reads some rows and those above and below, as far as the image has any.
+    /// Reads some rows, with one row above and below if the image has them.
     fn read_surroundings(&self, rows: &Range<u32>, pixels: &mut Vec<PixelSums>) -> Surroundings {
         let around = rows.start.saturating_sub(1).max(self.bounds.y0)..(rows.end + 1).min(self.bounds.y1);
         let width = self.bounds.width() as usize;
@@ -170,14 +174,14 @@ impl Film {
     }
 }
 
-/// s²/N of the pixels of some rows, and of one row above and below, as far as the image has them.
+/// s²/N of the pixels of some rows, with one row above and below if the image has them.
 struct Surroundings {
     width: usize,
-    /// Number of pixels of the row above.
+    /// Number of pixels in the row above.
     before: usize,
     /// The first row, from the top of the image.
     top: f64,
-    /// Levels that a pixel counts as.
+    /// Difference of levels that is weighted like one pixel.
     unit: f64,
     values: Vec<f64>,
 }
@@ -188,7 +192,7 @@ impl Surroundings {
         [level(self.mean(i)), x * self.unit, y * self.unit]
     }
 
-    /// Mean over the 3 × 3 pixels around a pixel, clipped to the image.
+    /// Mean of s²/N over 3 × 3 pixels, clipped to the image.
     fn mean(&self, i: usize) -> f64 {
         let around = |i: usize, len: usize| i.saturating_sub(1)..(i + 2).min(len);
         let (columns, rows) =
@@ -210,8 +214,8 @@ mod tests {
     use lumiris_numbers::math::hash::pcg4d;
     use std::sync::Arc;
 
-    /// A film of 64 × 64 pixels and as many replicas, means of two samples each. Means are 1 ± σ, and s²/N is
-    /// `independent`; both are given for the column of a pixel.
+    /// A film of 64 × 64 pixels with a replica each; means of two samples. Means are 1 ± σ, and s²/N is `independent`.
+    /// Both functions depend on the column of the pixel.
     fn film(sigma: impl Fn(u32) -> f64, independent: impl Fn(u32) -> f64) -> Film {
         let bounds = PixelBounds { x0: 0, x1: 64, y0: 0, y1: 64 };
         let mut replicas = Vec::new();
@@ -277,7 +281,7 @@ mod tests {
         let quiet = film(|_| 0.1, |_| 0.01);
         let sum = |film: &Film| film.variances().iter().map(|v| v[1]).sum::<f64>();
         let expected = sum(&quiet);
-        // A sample of 2000 beside one of 1: the mean is 1000 more, and so is √(s²/N)
+        // One of two samples is brighter by 2000: the mean is brighter by 1000, and √(s²/N) as well
         let mut replicas = quiet.replicas.clone();
         replicas[1234].radiance = [2.0 * 1000.0; 3];
         replicas[1234].independent = 3.0 * 1e6;

@@ -53,9 +53,9 @@ impl BilinearMesh {
         self.indices[i].map(|v| self.positions[v as usize])
     }
 
-    /// The first hit of patch `i` in (0, t_max) that `accepts` takes, which gets the hit and the number of its crossing,
-    /// 0 or 1, in ascending order of u; uv are its parameters (u, v). A ray that leaves from
-    /// [`lumiris_numbers::math::ray::offset_origin`] does not meet the same planar patch again.
+    /// The first hit of patch `i` in (0, t_max) that `accepts` accepts. `accepts` receives the hit and the index of its
+    /// crossing, 0 or 1, in ascending order of u; uv are its parameters (u, v). A ray that leaves from
+    /// [`lumiris_numbers::math::ray::offset_origin`] does not hit the same planar patch again.
     #[inline]
     pub fn intersect_patch_where(
         &self,
@@ -205,6 +205,7 @@ mod tests {
         for (i, j) in (0..N * N).map(|k| (k % N, k / N)) {
             let quad = [at(i, j), at(i + 1, j), at(i, j + 1), at(i + 1, j + 1)];
             for [a, b, c] in [[quad[0], quad[1], quad[2]], [quad[3], quad[2], quad[1]]] {
+                // Möller–Trumbore
                 let (e1, e2, s) = (b - a, c - a, o - a);
                 let det = e1.dot(d.cross(e2));
                 let (b1, b2) = (s.dot(d.cross(e2)) / det, d.dot(s.cross(e1)) / det);

@@ -234,15 +234,21 @@ impl CurveSet {
         let at = curve.at(f64::from(u), DVec3::ZERO);
         let tangent = curve.tangent(&at);
         let width = curve.width_at(u);
+
+        // Frame across the curve
         let side = self.across(id, f64::from(u), tangent, d.as_dvec3());
         let h = f64::from(2.0 * v - 1.0);
         let front = side.cross(tangent);
+
+        // Normal
         let n = match self.kind {
             CurveKind::Flat | CurveKind::Ribbon => tangent.cross(side),
             CurveKind::Cylinder => side * h - front * (1.0 - h * h).max(0.0).sqrt(),
         };
         let n = round(n.normalize_or(-front));
         let p = round(at.c + side * (0.5 * h * f64::from(width)));
+
+        // Derivatives and error bound
         let dpdu = round(if at.d1.length_squared() > 0.0 { at.d1 } else { tangent });
         let dpdv = n.cross(dpdu).normalize_or(round(side)) * width;
         let p_error = Vec3::splat(2.0 * width) + p.abs() * gamma(4);

@@ -37,6 +37,8 @@ impl DisplacedMesh {
         if let Some((i, t)) = indices.iter().enumerate().find(|(_, t)| t.iter().any(|&v| v as usize >= count)) {
             return Err(format!("triangle {i} refers to vertices {t:?}, but there are {count} vertices"));
         }
+
+        // Unit normals, given or smooth
         let mut mesh = DisplacedMesh { positions, normals, uvs, indices };
         if mesh.normals.len() == count {
             mesh.normals.iter_mut().for_each(|n| *n = n.normalize_or_zero());

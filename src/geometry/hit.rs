@@ -85,6 +85,8 @@ impl SurfaceHit {
     #[must_use]
     pub fn transformed(&self, world_from_group: &Affine3A) -> SurfaceHit {
         let p = round(world_from_group.as_daffine3().transform_point3(self.p.as_dvec3()));
+
+        // Error bound
         let group_from_world = world_from_group.inverse();
         let inbound = abs_linear(&group_from_world, p.abs()) + Vec3::from(group_from_world.translation).abs();
         let p_error =

@@ -92,6 +92,8 @@ impl Links {
                 return Err(format!("triangle {i} has the vertices {f:?}: two are the same"));
             }
         }
+
+        // Every directed edge has at most one triangle
         let mut links: Vec<[u32; 3]> = faces.iter().flat_map(|&[a, b, c]| [[a, b, c], [b, c, a], [c, a, b]]).collect();
         links.sort_unstable();
         if let Some(pair) = links.windows(2).find(|w| w[0][..2] == w[1][..2]) {
@@ -100,6 +102,8 @@ impl Links {
                 "the edge from vertex {v} to vertex {a} has two triangles on one side: not manifold, or not oriented alike"
             ));
         }
+
+        // Index of the links by vertex
         let mut starts = vec![0; vertex_count + 1];
         for link in &links {
             starts[link[0] as usize + 1] += 1;

@@ -368,6 +368,8 @@ mod tests {
             QuadricKind::Cylinder { radius, .. } => p.truncate().length_squared() - f64::from(radius).powi(2),
             QuadricKind::Disk { height, .. } => p.z - f64::from(height),
         };
+
+        // Clipping by z, radius and azimuth
         let inside = |p: DVec3| {
             let phi = p.y.atan2(p.x).rem_euclid(TAU);
             match quadric.kind {
@@ -381,6 +383,8 @@ mod tests {
                 }
             }
         };
+
+        // March to a change of sign, and bisect
         let step = 2e-3 / d.length();
         for k in 0..6000 {
             let (mut lo, mut hi) = (k as f64 * step, (k + 1) as f64 * step);

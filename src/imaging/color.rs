@@ -16,7 +16,7 @@ pub fn linear_to_srgb(v: f32) -> f32 {
     encoded.copysign(v)
 }
 
-/// How the stored values of an image stand for linear ones.
+/// Encoding of the stored values of an image.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum ColorEncoding {
     /// Stored values are linear.
@@ -39,7 +39,7 @@ impl ColorEncoding {
         }
     }
 
-    /// Linear values of the 256 bytes.
+    /// Linear values of the 256 possible bytes.
     pub fn byte_table(self) -> [f32; 256] {
         std::array::from_fn(|i| self.to_linear(i as f32 / 255.0))
     }

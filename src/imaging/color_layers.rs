@@ -1,32 +1,32 @@
-//! Which channels of a file are the image: of textures, environment maps, comparisons and files to be denoised alike.
+//! Selects the colour channels of a file, for textures, environment maps, comparisons and denoising alike.
 //!
-//! Programs name them in many ways: `R G B` (pbrt, Mitsuba, Lumiris), `rgb.R` (Mitsuba with several films),
-//! `Combined.R` or `ViewLayer.Combined.R` (Cycles), parts of one file that all have `R G B` (then the name of the part
-//! counts). A **layer** is a set of red, green and blue under one name. The image is the layer without a name, or else the
-//! only one whose name says so, or else the only one; where none of that holds, it is for the user to say.
+//! Programs name them differently: `R G B` (pbrt, Mitsuba, Lumiris), `rgb.R` (Mitsuba with several films), `Combined.R`
+//! or `ViewLayer.Combined.R` (Cycles), or several parts that all have `R G B` (then the name of the part counts). A
+//! **layer** is a set of red, green and blue with a common name. The image is the layer without a name; else the only
+//! layer with a name of the whole image; else the only layer. In all other cases the user has to choose.
 
 use super::ColorChannels;
 use super::file::PartHeader;
 
-/// Channels that make a colour.
+/// A set of colour channels.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ColorLayer {
     /// Part of the file, from 0.
     pub part: usize,
-    /// What stands before the channels' last dot, or the name of the part; empty for plain `R G B`.
+    /// The channel names before their last dot, or the name of the part; empty for plain `R G B`.
     pub name: String,
-    /// Positions in the part.
+    /// Positions of the channels in the part.
     pub channels: ColorChannels,
-    /// Position of its opacity, if it has one.
+    /// Position of the opacity channel, if there is one.
     pub alpha: Option<usize>,
 }
 
-/// Names that stand for the image itself, not for a part of its light or a feature.
+/// Names of the whole image, in contrast to a light component or a feature.
 const IMAGE_NAMES: [&str; 10] =
     ["combined", "beauty", "rgb", "rgba", "color", "colour", "image", "main", "final", "default"];
 
 impl ColorLayer {
-    /// 0 for the name that most surely means the image.
+    /// Order of preference as the image; 0 is the best.
     fn rank(&self) -> u8 {
         let last = self.name.rsplit('.').next().unwrap_or_default().to_ascii_lowercase();
         match () {
@@ -36,19 +36,19 @@ impl ColorLayer {
         }
     }
 
-    /// The name as in messages.
+    /// The name in messages.
     pub fn title(&self) -> &str {
         if self.name.is_empty() { "R G B" } else { &self.name }
     }
 
-    /// What `--layer` calls it: the whole name or what stands after its last dot.
+    /// True if `--layer` with this name selects the layer: its whole name, or the part after the last dot.
     fn is_called(&self, wanted: &str) -> bool {
         let last = self.name.rsplit('.').next().unwrap_or_default();
         self.name.eq_ignore_ascii_case(wanted) || last.eq_ignore_ascii_case(wanted)
     }
 }
 
-/// Name before the last dot, and what follows it.
+/// The part of a channel name before the last dot, and the part after it.
 fn split(channel: &str) -> (&str, &str) {
     channel.rsplit_once('.').unwrap_or(("", channel))
 }
@@ -63,18 +63,19 @@ fn component(name: &str) -> Option<usize> {
     }
 }
 
-/// True for what opacity is called in a layer.
+/// True for the channel name of opacity.
 fn is_alpha(name: &str) -> bool {
     matches!(name.to_ascii_lowercase().as_str(), "a" | "alpha")
 }
 
-/// Position of the opacity of a layer in a part.
+/// Position of the opacity channel of a layer in a part.
 fn alpha_of(header: &PartHeader, layer: &str) -> Option<usize> {
     header.channels.iter().map(|channel| split(channel)).position(|(name, last)| name == layer && is_alpha(last))
 }
 
-/// All colour layers of a file, in its order.
+/// All colour layers of a file, in file order.
 pub fn color_layers(parts: &[PartHeader]) -> Vec<ColorLayer> {
+    // The names before the last dot, in file order
     let mut layers = Vec::new();
     for (part, header) in parts.iter().enumerate() {
         let mut names: Vec<&str> = Vec::new();
@@ -84,6 +85,8 @@ pub fn color_layers(parts: &[PartHeader]) -> Vec<ColorLayer> {
                 names.push(name);
             }
         }
+
+        // Names with red, green and blue are layers
         for name in names {
             let mut rgb = [None; 3];
             for (position, channel) in header.channels.iter().enumerate() {
@@ -105,8 +108,8 @@ pub fn color_layers(parts: &[PartHeader]) -> Vec<ColorLayer> {
     layers
 }
 
-/// The layer that is the image, or the one called `wanted` (a single channel as well). `Err` says what there is. Of a file
-/// without colours, the image is the channel Y, or the first that is not opacity.
+/// The layer that is the image, or the layer or single channel called `wanted`. In a file without colour layers, the
+/// image is the channel Y, or the first channel that is not opacity. `Err` lists the alternatives.
 pub fn choose(parts: &[PartHeader], wanted: Option<&str>) -> Result<ColorLayer, String> {
     let layers = color_layers(parts);
     let channels =
@@ -138,7 +141,7 @@ pub fn choose(parts: &[PartHeader], wanted: Option<&str>) -> Result<ColorLayer, 
     luminance.or_else(first).map(grey).ok_or_else(|| "has no channels".to_owned())
 }
 
-/// What a person should know of the choice; `None` if there was none to make.
+/// A remark for the user on the choice; `None` if there was no choice.
 pub fn remark(parts: &[PartHeader], chosen: &ColorLayer) -> Option<String> {
     let layers = color_layers(parts);
     let others: Vec<&str> = layers.iter().filter(|l| *l != chosen).map(ColorLayer::title).collect();
@@ -160,6 +163,7 @@ mod tests {
 
     #[test]
     fn the_image_is_found_whatever_its_name() {
+        // Channels, name of the image, positions of its channels
         let cases: [(&[&str], &str, &[usize]); 8] = [
             (&["R", "G", "B", "albedo.R", "albedo.G", "albedo.B"], "", &[0, 1, 2]),
             (&["albedo.B", "albedo.G", "albedo.R", "B", "G", "R"], "", &[5, 4, 3]),

@@ -1,24 +1,24 @@
-//! Textures of the faces of a mesh, as Ptex files hold them.
+//! Textures of the faces of a mesh, as in Ptex files.
 //!
-//! Each face has a pyramid of its own: level ℓ has 2^(u−ℓ) × 2^(v−ℓ) texels, at least one, by the mean of two or four of
-//! the level below. A lookup is a cubic B-spline over the texels of one level, which goes on over the edges of the face
-//! into its neighbours; beyond an edge without a neighbour, texels are those at the edge.
+//! Each face has its own pyramid. Level ℓ has 2^(u−ℓ) × 2^(v−ℓ) texels, at least one. Its texels are means of two or
+//! four texels of level ℓ − 1. A lookup is a cubic B-spline over the texels of one level. It continues across the edges
+//! of the face into its neighbours; if an edge has no neighbour, the texels at the edge are repeated.
 
 use super::ColorEncoding;
 use super::level::NearestByte;
 use lumiris_formats::ptex::{Neighbor, PtexFace, PtexFile, PtexTexels};
 use lumiris_numbers::math::{Rgb, Vec2};
 
-/// A wider axis of a filter is at most so many times as wide as the other one in texels of the level; beyond that the
-/// level is coarser than the narrower axis would have it.
+/// Maximum ratio of the filter widths along both axes, in texels of the level. For a larger ratio a coarser level is
+/// used.
 const MOST_ANISOTROPY: f32 = 4.0;
-/// Edges that the way to a texel crosses at most: two at a corner, and some more where faces are narrow.
+/// Maximum number of edges crossed on the way to a texel: two at a corner, and some more where faces are narrow.
 const MOST_CROSSINGS: usize = 4;
 
 /// The textures of all faces.
 #[derive(Clone, Debug)]
 pub struct FaceMap {
-    /// Where `first` is the first texel of level 0; the other levels follow.
+    /// `first` is the index of the first texel of level 0; the other levels follow.
     faces: Vec<PtexFace>,
     /// One or three.
     channels: usize,
@@ -33,7 +33,7 @@ fn size_of(log2: [u8; 2], level: usize) -> [usize; 2] {
 }
 
 impl FaceMap {
-    /// The pyramids of a file whose numbers `encoding` makes linear.
+    /// The pyramids of a file with the given encoding.
     pub fn new(file: PtexFile, encoding: ColorEncoding) -> Self {
         let PtexFile { mut faces, channels, texels } = file;
         let table = Box::new(encoding.byte_table());
@@ -60,11 +60,11 @@ impl FaceMap {
         texels + size_of_val(self.faces.as_slice())
     }
 
-    /// The linear colour at `uv` of a face, for a filter of `width` in u and v, which counts as at most the face; grey if
+    /// The linear colour at `uv` of a face, for a filter of `width` in u and v, which is limited to the face. Grey if
     /// there is one channel, black if there is no such face.
     pub fn value(&self, face: u32, uv: Vec2, width: Vec2) -> Rgb {
         let Some(PtexFace { log2, .. }) = self.faces.get(face as usize) else { return Rgb::BLACK };
-        // What is no number counts as 0
+        // NaN counts as 0
         let width = [width.x, width.y].map(|w| if w > 0.0 { w.min(1.0) } else { 0.0 });
         let texels: [f32; 2] = std::array::from_fn(|a| (width[a] * (1_u32 << log2[a]) as f32).max(1.0));
         let finest = texels[0].min(texels[1]).max(texels[0].max(texels[1]) / MOST_ANISOTROPY);
@@ -81,7 +81,7 @@ impl FaceMap {
         sum * (1.0 / (columns.sum * rows.sum))
     }
 
-    /// The texel that stands at column and row `at` of a level of a face, or beyond its edges.
+    /// The texel at column and row `at` of a level of a face. `at` may be outside the face.
     fn texel(&self, face: u32, at: [i32; 2], (size, level): ([usize; 2], usize)) -> Rgb {
         let is_inside = (0..2).all(|a| (0..size[a] as i32).contains(&at[a]));
         if is_inside {
@@ -90,18 +90,18 @@ impl FaceMap {
         let centre = std::array::from_fn(|a| (at[a] as f32 + 0.5) / size[a] as f32);
         let (face, uv) = self.across(face, centre);
         let face = &self.faces[face as usize];
-        // The level whose texels are about as large
+        // The level with texels of a similar size
         let finest = |size: [usize; 2]| size[0].max(size[1]).ilog2() as usize;
         let level = usize::from(face.log2[0].max(face.log2[1])).saturating_sub(finest(size));
         let size = size_of(face.log2, level);
         self.color(face, level, std::array::from_fn(|a| ((uv[a] * size[a] as f32) as usize).min(size[a] - 1)))
     }
 
-    /// The face and the point in it that lies at `uv`, beyond the edges of a face.
+    /// The face that contains the point `uv`, which may be outside the given face, and its coordinates there.
     fn across(&self, mut face: u32, mut uv: [f32; 2]) -> (u32, [f32; 2]) {
         for _ in 0..MOST_CROSSINGS {
             let [u, v] = uv;
-            // Along the edge, counter-clockwise, and how far beyond
+            // Position along the edge, counter-clockwise, and distance from it
             let (edge, along, beyond) = match uv {
                 _ if u < 0.0 => (3, 1.0 - v, -u),
                 _ if u > 1.0 => (1, v, u - 1.0),
@@ -136,7 +136,7 @@ impl FaceMap {
     }
 }
 
-/// The point of a neighbour `inside` of its edge, at `along` of it, counter-clockwise.
+/// The point of a neighbour at the distance `inside` from its edge and the position `along` on it, counter-clockwise.
 fn entered(neighbor: Neighbor, along: f32, inside: f32) -> [f32; 2] {
     match neighbor.edge {
         0 => [along, inside],
@@ -146,7 +146,7 @@ fn entered(neighbor: Neighbor, along: f32, inside: f32) -> [f32; 2] {
     }
 }
 
-/// All levels of all faces, whose `first` becomes that among them.
+/// All levels of all faces. Sets `first` of every face to its first texel in the result.
 fn with_levels<T: Copy>(
     faces: &mut [PtexFace],
     channels: usize,
@@ -170,7 +170,7 @@ fn with_levels<T: Copy>(
             let start = out.len();
             for (y, x) in (0..rows).flat_map(|y| (0..columns).map(move |x| (y, x))) {
                 for c in 0..channels {
-                    // Where there is one row or column already, it counts twice
+                    // A single row or column counts twice
                     let at = |dx: usize, dy: usize| {
                         let (x, y) = ((2 * x + dx).min(fine_columns - 1), (2 * y + dy).min(fine_rows - 1));
                         read(out[finer + (y * fine_columns + x) * channels + c])
@@ -185,7 +185,7 @@ fn with_levels<T: Copy>(
     out
 }
 
-/// Texels along an axis, with the weights of a cubic B-spline.
+/// Texels along an axis with the weights of a cubic B-spline.
 struct Taps {
     first: i32,
     weights: [f32; Taps::MOST],
@@ -194,10 +194,10 @@ struct Taps {
 }
 
 impl Taps {
-    /// 4 per texel of the width, which is below 2·[`MOST_ANISOTROPY`].
+    /// Maximum number of texels: 4 per texel of the width, which is below 2·[`MOST_ANISOTROPY`].
     const MOST: usize = 8 * MOST_ANISOTROPY as usize + 1;
 
-    /// About `x`, in texels, for a filter `width` texels wide, or one.
+    /// Centred at `x`, for a filter of `width`, at least one (texels).
     fn new(x: f32, width: f32) -> Self {
         let scale = width.max(1.0);
         let (center, reach) = (x - 0.5, 2.0 * scale);
@@ -227,17 +227,17 @@ fn spline(x: f32) -> f32 {
 mod tests {
     use super::*;
 
-    /// A smooth function of the plane, which is not a polynomial.
+    /// A smooth function of the plane that is not a polynomial.
     fn landscape([x, y]: [f32; 2]) -> f32 {
         0.5 + 0.25 * (3.0 * x + 1.0).sin() * (2.0 * y).cos() + 0.1 * x * y
     }
 
-    /// A point of a unit square whose (u, v) axes are turned by quarter turns.
+    /// Rotates a point of the unit square by quarter turns of its (u, v) axes.
     fn turned([u, v]: [f32; 2], quarters: usize) -> [f32; 2] {
         (0..quarters).fold([u, v], |[u, v], _| [1.0 - v, u])
     }
 
-    /// A grid of 4 × 4 faces of 2^`log2` texels over [0, 4]², each turned by `turn(column, row)` quarters.
+    /// A grid of 4 × 4 faces of 2^`log2` texels over [0, 4]², each rotated by `turn(column, row)` quarter turns.
     fn grid(log2: u8, turn: impl Fn(i32, i32) -> usize) -> FaceMap {
         let turn = |i: i32, j: i32| turn(i, j) % 4;
         let mut texels = Vec::new();
@@ -249,7 +249,7 @@ mod tests {
                 let [u, v] = turned([(x as f32 + 0.5) / n as f32, (y as f32 + 0.5) / n as f32], turn(i, j));
                 texels.push(landscape([i as f32 + u, j as f32 + v]));
             }
-            // Edge e of a face turned by q is side (e + q) mod 4 of its square
+            // Edge e of a face rotated by q is side (e + q) mod 4 of its square
             let neighbors = std::array::from_fn(|edge| {
                 let side = (edge + turn(i, j)) % 4;
                 let (i, j) = [(i, j - 1), (i + 1, j), (i, j + 1), (i - 1, j)][side];
@@ -282,7 +282,7 @@ mod tests {
                 }
             }
         }
-        // Half the variance of the spline, 1/3 texel², by the second derivatives, which are 3.5 together at most
+        // Half the variance of the spline, 1/3 texel², times the sum of the second derivatives, which is at most 3.5
         assert!(largest < 0.5 / 3.0 / 64.0 * 3.5, "{largest}");
     }
 
@@ -290,7 +290,7 @@ mod tests {
     fn a_lookup_over_the_edge_of_a_seam_has_no_step() {
         let map = grid(2, |i, j| (i + 2 * j) as usize);
         let turn = |i: i32, j: i32| (i + 2 * j) as usize % 4;
-        // The point of a face where its square is at (u, v): turned back
+        // The point of a face at (u, v) of its square: rotated back
         let at = |i: i32, j: i32, uv: [f32; 2]| {
             let uv = turned(uv, 4 - turn(i, j));
             map.value((4 * j + i) as u32, Vec2::from(uv), Vec2::ZERO).r
@@ -303,7 +303,7 @@ mod tests {
 
     #[test]
     fn faces_of_one_colour_meet_their_neighbors_at_the_edge_alone() {
-        // Two faces of 8 × 8 texels side by side, the right one of one colour, by one texel or by as many
+        // Two faces of 8 × 8 texels side by side. The right one has a constant colour, stored as one texel or as 64
         let map = |is_constant: bool| {
             let beyond = |edge: usize, face: u32, of: u8| {
                 std::array::from_fn(|e| (e == edge).then_some(Neighbor { face, edge: of }))
@@ -334,7 +334,7 @@ mod tests {
         let map = FaceMap::new(file, ColorEncoding::Linear);
         let wide = map.value(0, Vec2::new(0.3, 0.6), Vec2::splat(1e3)).r;
         assert!((wide - 110.0 / 255.0).abs() < 1e-6, "{wide}");
-        // Means are of light, and are stored by the same curve
+        // Means are taken of linear values and stored with the same encoding
         let file = PtexFile { faces: vec![face], channels: 1, texels: PtexTexels::Bytes([0, 255].repeat(16)) };
         let map = FaceMap::new(file, ColorEncoding::Srgb);
         let wide = map.value(0, Vec2::splat(0.5), Vec2::splat(1.0)).r;
@@ -345,7 +345,7 @@ mod tests {
 
     #[test]
     fn narrow_footprints_keep_what_varies_along_the_narrow_axis() {
-        // Columns that alternate: a filter that is wide along v alone leaves them
+        // Alternating columns: a filter that is wide only along v preserves them
         let texels: Vec<f32> = (0..64 * 64).map(|i| f32::from(u8::from(i % 64 / 4 % 2 == 0))).collect();
         let face = PtexFace { first: 0, log2: [6, 6], is_constant: false, neighbors: [None; 4] };
         let file = PtexFile { faces: vec![face], channels: 1, texels: PtexTexels::Floats(texels) };

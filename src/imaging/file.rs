@@ -1,31 +1,31 @@
-//! Metadata of image files: everything beside the pixels.
+//! Errors, limits and headers of image files.
 
 use std::path::PathBuf;
 
-/// Why an image cannot be read or written.
+/// Reason why an image cannot be read or written.
 #[derive(Debug, thiserror::Error)]
 pub enum ImageError {
-    /// OpenImageIO itself cannot be used.
+    /// OpenImageIO cannot be loaded.
     #[error("OpenImageIO cannot be loaded: {0}")]
     Library(String),
-    /// A colour transform that OpenColorIO does not have.
+    /// OpenColorIO does not have the colour transform.
     #[error("OpenColorIO: {0}")]
     Color(String),
-    /// There is no such file.
+    /// The file does not exist.
     #[error("{}: no such file", path.display())]
     NotFound {
         /// The file.
         path: PathBuf,
     },
-    /// It is no image, a damaged one, or of a kind that is not supported.
+    /// The file is not an image, is damaged, or has an unsupported format.
     #[error("{}: {reason}", path.display())]
     Unreadable {
         /// The file.
         path: PathBuf,
-        /// What is wrong with it.
+        /// The cause.
         reason: String,
     },
-    /// It needs more memory than allowed.
+    /// The image needs more memory than allowed.
     #[error("{}: {reason}", path.display())]
     TooLarge {
         /// The file.
@@ -33,24 +33,24 @@ pub enum ImageError {
         /// The sizes.
         reason: String,
     },
-    /// It cannot be written.
+    /// The file cannot be written.
     #[error("cannot write {}: {reason}", path.display())]
     Write {
         /// The file.
         path: PathBuf,
-        /// Why.
+        /// The cause.
         reason: String,
     },
 }
 
-/// What reading may cost.
+/// Limits for reading an image.
 #[derive(Clone, Copy, Debug)]
 pub struct ReadLimits {
     /// Largest decoded image (bytes of f32).
     pub max_bytes: u64,
-    /// Largest ratio of the decoded image to the file: a header of a few bytes can claim any size.
+    /// Maximum ratio of the decoded image to the file: a header of a few bytes can claim any size.
     pub max_expansion: u64,
-    /// Images up to this size (bytes of f32) may expand as they like.
+    /// Images up to this size (bytes of f32) are exempt from `max_expansion`.
     pub free_bytes: u64,
 }
 
@@ -61,13 +61,13 @@ impl Default for ReadLimits {
 }
 
 impl ReadLimits {
-    /// The largest decoded image of a file of `file_bytes`.
+    /// Maximum size of the decoded image for a file of `file_bytes`.
     pub(super) fn bytes_for(&self, file_bytes: u64) -> u64 {
         file_bytes.saturating_mul(self.max_expansion).max(self.free_bytes).min(self.max_bytes)
     }
 }
 
-/// Where the pixels of a part lie in the full image.
+/// Position of the pixels of a part in the full image.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Window {
     /// Column and row of the first pixel of the data.
@@ -78,10 +78,10 @@ pub struct Window {
     pub full_size: [usize; 2],
 }
 
-/// What the header says of a part.
+/// Header of a part.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct PartHeader {
-    /// The part's name; empty if it has none.
+    /// The name of the part; empty if it has none.
     pub name: String,
     /// Names of its channels.
     pub channels: Vec<String>,

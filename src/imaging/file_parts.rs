@@ -1,29 +1,29 @@
-//! All parts of an image file, as they can be written again: what is added to a file leaves the rest as it is.
+//! All parts of an image file, in a form that can be written again: additions to a file preserve the rest.
 
 use super::Image;
 use super::file::ImageError;
 use super::oiio::{Input, MetaValue, Part, ReadLimits, Storage, read_failure, read_headers, read_part};
 use std::path::Path;
 
-/// Compressions that keep every bit of a float.
+/// Lossless compressions.
 const LOSSLESS: [&str; 5] = ["none", "rle", "zips", "zip", "piz"];
-/// Metadata that say how a file is stored; OpenImageIO makes them anew.
+/// Metadata about the storage of a file, which OpenImageIO writes anew.
 const OF_STORAGE: [&str; 4] = ["compression", "name", "type", "textureformat"];
-/// The same, by what precedes the colon.
+/// Prefixes of further metadata about storage.
 const OF_STORAGE_PREFIXES: [&str; 2] = ["oiio:", "openexr:"];
 
 /// A part of a file.
 #[derive(Clone, Debug)]
 pub struct FilePart {
-    /// The part's name; empty if it has none.
+    /// The name of the part; empty if it has none.
     pub name: String,
     /// Its pixels.
     pub image: Image,
-    /// How its channels are stored. Integers of more than 8 bits become floats.
+    /// Storage type of each channel. Integers of more than 8 bits become floats.
     pub storage: Vec<Storage>,
-    /// Its metadata: texts, numbers and matrices.
+    /// Metadata: texts, numbers and matrices.
     pub metadata: Vec<(String, MetaValue)>,
-    /// Column and row of the first pixel inside the full image.
+    /// Column and row of the first pixel in the full image.
     pub origin: [usize; 2],
     /// Size of the full image.
     pub full: [usize; 2],
@@ -31,7 +31,7 @@ pub struct FilePart {
 }
 
 impl FilePart {
-    /// A part of the same window and compression.
+    /// A new part with the same window and compression.
     pub fn beside(&self, name: &str, channels: &[&str], data: Vec<f32>, storage: Storage) -> Self {
         let channels: Vec<String> = channels.iter().map(|&c| c.to_owned()).collect();
         FilePart {
@@ -54,7 +54,7 @@ impl FilePart {
         }
     }
 
-    /// Only the channels that `keep` chooses by their names.
+    /// Removes the channels for which `keep` is false.
     pub fn retain_channels(&mut self, keep: impl Fn(&str) -> bool) {
         let kept: Vec<bool> = self.image.channels.iter().map(|name| keep(name)).collect();
         if kept.iter().all(|k| *k) {
@@ -84,7 +84,8 @@ impl FilePart {
         self.storage.extend(other.storage);
     }
 
-    /// To write it. The compression is that of the file, or `zip` where that would lose bits once more.
+    /// Converts to a part that can be written. A lossy compression of the file is replaced by `zip`, to lose no more
+    /// bits.
     pub fn into_part(self) -> Part {
         let compression = if LOSSLESS.contains(&self.compression.as_str()) { &self.compression } else { "zip" };
         let Image { width, height, channels, data } = self.image;
@@ -128,7 +129,7 @@ pub fn read_file_parts(path: &Path, limits: &ReadLimits) -> Result<Vec<FilePart>
         };
         let whole = [read.image.width, read.image.height];
         Ok(FilePart {
-            // A file of one part needs no name
+            // The only part of a file needs no name
             name: if count > 1 { header.name } else { String::new() },
             storage: input.storage().map_err(failed)?,
             metadata,
@@ -150,7 +151,7 @@ mod tests {
         names.iter().map(|&n| n.to_owned()).collect()
     }
 
-    /// Two parts, with metadata of all types, stored in several ways.
+    /// Two parts with metadata of all types and several storage types.
     fn written(path: &Path) -> [Part; 2] {
         let data: Vec<f32> = (0..24).map(|i| i as f32 * 0.37 - 2.0).collect();
         let first = Part::linear(3, 2, names(&["R", "G", "B", "depth.Z"]), data.clone());
@@ -178,6 +179,7 @@ mod tests {
 
     #[test]
     fn channels_can_be_left_out_and_added() {
+        // Write a file, remove all channels but one and add another
         let folder = tempfile::tempdir().unwrap();
         let [a, b] = ["a.exr", "b.exr"].map(|name| folder.path().join(name));
         written(&a);
@@ -189,6 +191,8 @@ mod tests {
         let expected: Vec<f32> = (0..6).map(|i| part.image.get(i % 3, i / 3, depth)).collect();
         part.retain_channels(|name| name == "depth.Z");
         part.append(part.beside("", &["more.X"], vec![0.5; 6], Storage::Float));
+
+        // Compare
         write_image(&b, &[part.into_part()]).unwrap();
         let read = read_image(&b, &ReadLimits::default()).unwrap();
         assert_eq!(read.window.origin, [1, 2]);

@@ -1,4 +1,4 @@
-//! Texels of a file that holds a pyramid: whole levels, and tiles that are read when they are wanted.
+//! Texels of a file with a pyramid: whole levels, and tiles that are read on demand.
 
 use super::ColorEncoding;
 use super::file::ImageError;
@@ -7,7 +7,7 @@ use super::oiio::FilePyramid;
 use super::tiles::{TILE, TileStore};
 use std::sync::Arc;
 
-/// Some channels of a pyramid, as textures keep them.
+/// Some channels of a pyramid, with their encoding.
 #[derive(Clone, Debug)]
 pub(super) struct FileTexels {
     pub(super) file: Arc<FilePyramid>,
@@ -17,7 +17,7 @@ pub(super) struct FileTexels {
 }
 
 impl FileTexels {
-    /// Bytes of a channel: 1 if a table makes them linear, or 4.
+    /// Bytes per channel: 1 if values are bytes, converted by a table; else 4.
     fn channel_bytes(&self) -> usize {
         if self.file.is_bytes() { 1 } else { 4 }
     }
@@ -32,7 +32,7 @@ impl FileTexels {
         Ok(Level::new(self.file.sizes()[level], texels))
     }
 
-    /// The same with tiles in `store` that are read when they are wanted, unless it is a tile itself.
+    /// A level whose tiles are read on demand through `store`. A level of at most one tile is read at once.
     pub(super) fn tiled_level(&self, level: usize, store: &Arc<TileStore>) -> Result<Level, ImageError> {
         let [width, height] = self.file.sizes()[level];
         if width * height <= TILE * TILE {
@@ -50,7 +50,7 @@ impl FileTexels {
         TILE * TILE * self.channels.len() * self.channel_bytes()
     }
 
-    /// A tile of a level, row by row; zeros beyond the level.
+    /// A tile of a level, row by row; zeros outside the level.
     fn tile(&self, level: usize, index: usize) -> Result<Vec<u8>, ImageError> {
         let [width, height] = self.file.sizes()[level];
         let columns = width.div_ceil(TILE);

@@ -1,14 +1,14 @@
-//! Values as colours, and numbers as text.
+//! Colour scales for values, and formatting of numbers.
 
-/// Colours at equal distances of a scale.
+/// Colours at equal intervals of a scale.
 pub type Stops = &'static [[u8; 3]];
 
-/// From nothing to much: black, violet, red, orange, yellow, white.
+/// From low to high: black, violet, red, orange, yellow, white.
 pub const HEAT: Stops = &[[0, 0, 4], [66, 10, 104], [147, 38, 103], [221, 81, 58], [252, 165, 10], [252, 255, 164]];
-/// From one extreme to the other: red, grey, green.
+/// Diverging: red, grey, green.
 pub const RED_GREEN: Stops = &[[165, 0, 38], [215, 80, 60], [225, 220, 215], [70, 160, 90], [0, 95, 45]];
 
-/// From far below to far above: light blue, blue, nearly black, red, orange.
+/// Diverging: light blue, blue, nearly black, red, orange.
 pub const BLUE_RED: Stops = &[[130, 210, 255], [38, 96, 190], [20, 20, 24], [190, 58, 38], [255, 190, 110]];
 
 /// A logarithmic scale of colours.
@@ -20,15 +20,14 @@ pub struct Scale {
 }
 
 impl Scale {
-    /// From `low` to `high`, both positive; made wider if they are not apart.
+    /// From `low` to `high`, both positive. Widened if `high` is not above `low`.
     pub fn new(stops: Stops, low: f64, high: f64) -> Self {
         let low = if low > 0.0 && low.is_finite() { low } else { 1e-12 };
         let high = if high > low * 1.0001 && high.is_finite() { high } else { low * 10.0 };
         Scale { stops, low, high }
     }
 
-    /// A scale for values of many orders: its top is the value that one in a thousand exceeds, and it spans four
-    /// decades.
+    /// A scale for values over many orders of magnitude: from 10⁻⁴ of the 99.9th percentile to that percentile.
     pub fn of_values<'a>(stops: Stops, values: impl IntoIterator<Item = &'a f64>) -> Self {
         let mut sorted: Vec<f64> = values.into_iter().copied().filter(|v| *v > 0.0 && v.is_finite()).collect();
         sorted.sort_by(f64::total_cmp);
@@ -51,7 +50,7 @@ impl Scale {
         format!("linear-gradient(to right,{})", stops.join(","))
     }
 
-    /// Values at `count` equal distances of the scale.
+    /// Labels of `count` values at equal intervals of the scale.
     pub fn ticks(&self, count: usize) -> Vec<String> {
         let at = |i: usize| self.low * (self.high / self.low).powf(i as f64 / (count - 1) as f64);
         (0..count).map(|i| significant(at(i))).collect()

@@ -1,4 +1,4 @@
-//! One level of an image pyramid: its pixels as bytes or as floats, in memory or in tiles.
+//! A level of an image pyramid: pixels as bytes or floats, in memory or in tiles.
 
 use super::Image;
 use super::tiles::{TILE, TileStore};
@@ -6,26 +6,26 @@ use lumiris_numbers::math::{Rgb, Vec2};
 use std::io;
 use std::sync::Arc;
 
-/// Values of one level, row-major from the top left, channels interleaved.
+/// Values of a level, row-major from the top left, channels interleaved.
 #[derive(Clone, Debug)]
 pub(super) enum Texels {
-    /// As stored; linear values by the byte table.
+    /// Stored bytes; the byte table gives linear values.
     Bytes(Vec<u8>),
     /// Linear.
     Floats(Vec<f32>),
-    /// Either, in tiles.
+    /// Bytes or floats, in tiles.
     Tiled(Tiled),
 }
 
-/// Tiles of a level, row-major; those at the right and lower edges are as large as all others.
+/// Tiles of a level, row-major. Tiles at the right and lower edges have the full size.
 #[derive(Clone, Debug)]
 pub(super) struct Tiled {
     pub(super) store: Arc<TileStore>,
-    /// Where the first one begins.
+    /// Key of the first tile.
     pub(super) first: u64,
-    /// Tiles in a row.
+    /// Tiles per row.
     pub(super) columns: usize,
-    /// Bytes of a channel: 1 if they are stored by the byte table, or 4.
+    /// Bytes per channel: 1 for the byte table, 4 for floats.
     pub(super) channel_bytes: usize,
 }
 
@@ -49,7 +49,7 @@ impl Tiled {
 pub(super) struct Level {
     pub(super) width: usize,
     pub(super) height: usize,
-    /// Width and height, so that no lookup converts them.
+    /// Width and height as floats, for lookups.
     pub(super) size: Vec2,
     pub(super) texels: Texels,
 }
@@ -59,7 +59,7 @@ impl Level {
         Level { width, height, size: Vec2::new(width as f32, height as f32), texels }
     }
 
-    /// The linear value of a channel of a pixel; `table` has those of bytes.
+    /// The linear value of a channel of a pixel. `table` gives the linear values of bytes.
     #[inline]
     pub(super) fn texel(&self, [x, y]: [usize; 2], c: usize, channels: usize, table: &[f32; 256]) -> f32 {
         let i = (y * self.width + x) * channels + c;
@@ -79,7 +79,7 @@ impl Level {
         table: &[f32; 256],
     ) -> [Rgb; N] {
         let index = |[x, y]: [usize; 2]| y * self.width + x;
-        // The texels are told apart once, not for each pixel or channel
+        // Match the storage once, not for each pixel or channel
         match (&self.texels, channels) {
             (Texels::Bytes(v), 1) => pixels.map(|pixel| Rgb::splat(table[usize::from(v[index(pixel)])])),
             (Texels::Bytes(v), _) => pixels.map(|pixel| {
@@ -105,7 +105,7 @@ impl Level {
         }
     }
 
-    /// Where its tiles are, if it has any.
+    /// The store of its tiles, if it has any.
     pub(super) fn store(&self) -> Option<&Arc<TileStore>> {
         match &self.texels {
             Texels::Tiled(tiled) => Some(&tiled.store),
@@ -113,7 +113,7 @@ impl Level {
         }
     }
 
-    /// Puts the pixels into `store`, if they are more than a tile.
+    /// Moves the pixels into `store` if they are more than a tile.
     pub(super) fn put_into(&mut self, store: &Arc<TileStore>, channels: usize) -> io::Result<()> {
         if self.width * self.height > TILE * TILE {
             self.texels = Texels::Tiled(self.tiles(channels, store)?);
@@ -126,7 +126,7 @@ impl Level {
         let [columns, rows] = [self.width, self.height].map(|n| n.div_ceil(TILE));
         let channel_bytes = if matches!(self.texels, Texels::Bytes(_)) { 1 } else { 4 };
         let row_bytes = TILE * channels * channel_bytes;
-        // In one piece, since images that are read at once append to the same store
+        // Written in one piece, because other images append to the same store concurrently
         let mut all = vec![0; columns * rows * TILE * row_bytes];
         for (tile, bytes) in all.chunks_exact_mut(TILE * row_bytes).enumerate() {
             let (x0, y0) = (tile % columns * TILE, tile / columns * TILE);
@@ -155,7 +155,7 @@ pub(super) fn exact_bytes(image: &Image, positions: &[usize]) -> Option<Vec<u8>>
         for &c in positions {
             let v = pixel[c];
             let byte = (v * 255.0 + 0.5) as u8;
-            // False for NaN as well.
+            // Also false for NaN
             let exact = (0.0..=1.0).contains(&v) && (f32::from(byte) / 255.0 - v).abs() < 1e-6;
             if !exact {
                 return None;
@@ -169,7 +169,7 @@ pub(super) fn exact_bytes(image: &Image, positions: &[usize]) -> Option<Vec<u8>>
 /// The inverse of a table of linear values of bytes.
 pub(super) struct NearestByte {
     table: [f32; 256],
-    /// For each part of 0..1, how many values of the table lie below its beginning.
+    /// For each interval of 0..1, the number of table values below its start.
     below: [u8; NearestByte::PARTS],
 }
 
@@ -184,7 +184,7 @@ impl NearestByte {
 
     /// Byte whose linear value is nearest to `v`.
     pub(super) fn of(&self, v: f32) -> u8 {
-        // The first value that is not below v
+        // The first table value that is not below v
         let part = ((v * Self::PARTS as f32) as usize).min(Self::PARTS - 1);
         let mut above = self.below[part];
         while above < 255 && self.table[usize::from(above)] < v {

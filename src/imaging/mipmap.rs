@@ -1,9 +1,9 @@
 //! Image pyramids for filtered lookups.
 //!
-//! Level 0 is the image; each next level halves both sides, rounding down, by the exact area mean (a box filter over
-//! possibly fractional pixels), down to one pixel; or a file holds them all. Texture coordinates (s, t) run over 0..1 from the **top left**;
-//! callers with t upwards flip it. A filter of width w in (s, t) reads the level ℓ = levels − 1 + log₂ w, as in
-//! pbrt-v4.
+//! Level 0 is the image. Each further level halves both sides, rounding down, to one pixel; its values are exact area
+//! means (a box filter over possibly fractional pixels). Alternatively a file provides all levels. Texture coordinates
+//! (s, t) are 0..1 from the **top left**; callers with t upwards flip it. A filter of width w in (s, t) reads the level
+//! ℓ = levels − 1 + log₂ w, as in pbrt-v4.
 
 use super::file::ImageError;
 use super::file_tiles::FileTexels;
@@ -15,35 +15,35 @@ use lumiris_numbers::math::{DVec2, Rgb, Vec2};
 use std::io;
 use std::sync::Arc;
 
-/// What lies outside the image.
+/// Wrap mode: values outside the image.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Wrap {
-    /// The image again.
+    /// The image repeats.
     #[default]
     Repeat,
     /// Zero.
     Black,
     /// The nearest pixel.
     Clamp,
-    /// The unfolded octahedron: an edge is joined to itself, mirrored about its middle.
+    /// The unfolded octahedron: an edge is joined to itself, mirrored about its midpoint.
     OctahedralSphere,
-    /// As each axis has it.
+    /// A wrap mode for each axis.
     Axes([AxisWrap; 2]),
 }
 
-/// What lies outside the image along one axis.
+/// Wrap mode of one axis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum AxisWrap {
-    /// The image again.
+    /// The image repeats.
     Repeat,
-    /// The image by turns mirrored and as it is.
+    /// The image alternates with its mirror image.
     Mirror,
     /// The nearest pixel.
     Clamp,
 }
 
 impl Wrap {
-    /// The wrap of each axis, if none depends on the other one.
+    /// The wrap mode of each axis, if the axes are independent.
     fn axes(self) -> Option<[AxisWrap; 2]> {
         match self {
             Wrap::Repeat => Some([AxisWrap::Repeat; 2]),
@@ -55,7 +55,7 @@ impl Wrap {
 }
 
 impl AxisWrap {
-    /// The pixel of 0..`count` that stands at `i`. Panics if there is none.
+    /// The pixel in 0..`count` for the index `i`. Panics if `count` is 0.
     #[inline]
     pub fn pixel(self, i: i64, count: i64) -> i64 {
         if (0..count).contains(&i) {
@@ -82,8 +82,8 @@ pub enum Filter {
     Bilinear,
     /// Bilinear in two levels, linear between them.
     Trilinear,
-    /// Read as [`Filter::Trilinear`] with the mean width of the footprint's axes: no anisotropic kernel, since the
-    /// pixel integrates over the footprint.
+    /// Implemented as [`Filter::Trilinear`] with the mean width of the footprint's axes. An anisotropic kernel is not
+    /// needed, since the pixel integrates over the footprint.
     Ewa,
 }
 
@@ -99,8 +99,8 @@ pub struct MipMap {
 }
 
 impl MipMap {
-    /// The pyramid of an image's colour channels (see [`Image::color_channels`]), as [`Self::of_channels`] makes it. An
-    /// image without channels is one black pixel.
+    /// The pyramid of an image's colour channels (see [`Image::color_channels`]), as by [`Self::of_channels`]. An image
+    /// without channels is one black pixel.
     pub fn new(image: &Image, wrap: Wrap, filter: Filter, encoding: ColorEncoding) -> Self {
         match image.color_channels() {
             Some(channels) => Self::of_channels(image, channels.as_slice(), (wrap, filter, encoding)),
@@ -108,18 +108,20 @@ impl MipMap {
         }
     }
 
-    /// The pyramid of the channels at these positions, one or three, whose values `encoding` makes linear. An image whose
-    /// values are all multiples of 1/255 in 0..1, as read from 8 bits, is kept in bytes. An image without pixels is one
-    /// black pixel.
+    /// The pyramid of one or three channels with the given positions and encoding. If all values are multiples of 1/255
+    /// in 0..1, as read from 8 bits, they are stored as bytes. An image without pixels is one black pixel.
     pub fn of_channels(
         image: &Image,
         positions: &[usize],
         (wrap, filter, encoding): (Wrap, Filter, ColorEncoding),
     ) -> Self {
+        // An empty image is black
         let (width, height) = (image.width, image.height);
         if width == 0 || height == 0 {
             return Self::constant(0.0, wrap, filter);
         }
+
+        // Bytes where they are exact, else linear floats
         let stride = image.channels.len();
         let table = Box::new(encoding.byte_table());
         let texels = match exact_bytes(image, positions) {
@@ -132,8 +134,8 @@ impl MipMap {
         Self::with_base(Level::new([width, height], texels), positions.len(), wrap, filter, table)
     }
 
-    /// The pyramid that a file holds, of the channels at these positions, one or three, whose values `encoding` makes linear.
-    /// 8-bit values are kept in bytes. Levels of more than a tile are read when they are wanted, if there is a `store`.
+    /// The pyramid in a file, of one or three channels with the given positions and encoding. 8-bit values are stored
+    /// as bytes. With a `store`, levels of more than a tile are read on demand.
     pub fn of_file(
         file: FilePyramid,
         channels: Vec<usize>,
@@ -165,13 +167,16 @@ impl MipMap {
         map
     }
 
-    /// The level above the topmost; `None` at one pixel. Levels of bytes stay bytes, through the inverse of the table.
+    /// The next coarser level; `None` at one pixel. Byte levels stay bytes, by the inverse of the table.
     fn halve(&self, nearest: &NearestByte) -> Option<Level> {
+        // Size of the level
         let source = self.levels.last()?;
         if source.width == 1 && source.height == 1 {
             return None;
         }
         let (width, height) = ((source.width / 2).max(1), (source.height / 2).max(1));
+
+        // Area means
         let columns: Vec<_> = (0..width).map(|x| overlaps(x, width, source.width)).collect();
         let mut values = Vec::with_capacity(width * height * self.channels);
         for y in 0..height {
@@ -190,6 +195,8 @@ impl MipMap {
                 }
             }
         }
+
+        // Same storage as the finer level
         let texels = match source.texels {
             Texels::Floats(_) | Texels::Tiled(_) => Texels::Floats(values),
             Texels::Bytes(_) => Texels::Bytes(values.iter().map(|&v| nearest.of(v)).collect()),
@@ -212,7 +219,7 @@ impl MipMap {
         self.levels.len()
     }
 
-    /// The same with levels of more than a tile in `store`. `Err` if that cannot be written.
+    /// Moves levels of more than a tile into `store`. `Err` if it cannot be written.
     pub fn tiled(mut self, store: &Arc<TileStore>) -> io::Result<Self> {
         for level in &mut self.levels {
             level.put_into(store, self.channels)?;
@@ -225,12 +232,13 @@ impl MipMap {
         self.levels[0].store()
     }
 
-    /// Memory of the pixels (bytes), but for tiles.
+    /// Memory of the pixels without tiles (bytes).
     pub fn bytes(&self) -> usize {
         self.levels.iter().map(Level::bytes).sum()
     }
 
-    /// Linear colour of a pixel of a level, wrapped; grey if the map has one channel. Panics if there is no such level.
+    /// Linear colour of a pixel of a level, with the wrap mode applied; grey if the map has one channel. Panics if
+    /// there is no such level.
     pub fn texel(&self, level: usize, x: i64, y: i64) -> Rgb {
         let level = &self.levels[level];
         let Some(pixel) = self.wrap_pixel(level, x, y) else { return Rgb::BLACK };
@@ -238,7 +246,7 @@ impl MipMap {
         color
     }
 
-    /// The pixel inside the image that stands at (x, y).
+    /// The pixel inside the image that corresponds to (x, y).
     fn wrap_pixel(&self, level: &Level, x: i64, y: i64) -> Option<[usize; 2]> {
         let (w, h) = (level.width as i64, level.height as i64);
         if let Some([of_x, of_y]) = self.wrap.axes() {
@@ -248,7 +256,7 @@ impl MipMap {
         if is_inside || self.wrap == Wrap::Black {
             return is_inside.then_some([x as usize, y as usize]);
         }
-        // Each step over an edge of the octahedron mirrors the other axis; lookups go at most one image beyond.
+        // Each step over an edge of the octahedron mirrors the other axis. Lookups go at most one image beyond an edge
         let (mut x, mut y) = (x, y);
         if x < 0 || x >= w {
             x = if x < 0 { -1 - x } else { 2 * w - 1 - x };
@@ -281,13 +289,13 @@ impl MipMap {
         self.texel(level, floor(at.x).0, floor(at.y).0)
     }
 
-    /// `st` without whole periods of an image that repeats, where they would leave few bits of an f32 for the rest.
+    /// Removes whole periods from `st` if the image repeats and they would leave few bits of an f32 for the fraction.
     pub fn within_periods(&self, st: DVec2) -> Vec2 {
         let is_far = st.abs().max_element() > 64.0;
         if is_far && self.wrap == Wrap::Repeat { (st - st.floor()).as_vec2() } else { st.as_vec2() }
     }
 
-    /// Linear colour about `st`, filtered over `width` per axis, in units of the image. A width of 0 reads level 0.
+    /// Linear colour at `st`, filtered over `width` per axis, in units of the image. A width of 0 reads level 0.
     pub fn lookup(&self, st: Vec2, width: Vec2) -> Rgb {
         if !st.is_finite() {
             return Rgb::BLACK;
@@ -297,10 +305,10 @@ impl MipMap {
             Filter::Point | Filter::Bilinear | Filter::Trilinear => width.max_element(),
             Filter::Ewa => 0.5 * (width.x + width.y),
         };
-        // pbrt-v4 takes twice the derivative as the width of the filter.
+        // pbrt-v4 takes twice the derivative as the width of the filter
         let extent = (2.0 * extent).max(1e-8);
         let top = self.levels.len() - 1;
-        // ⌊log₂⌋ of a positive float is its exponent, less 127; little below a power of two, log₂ is rounded up to it
+        // ⌊log₂⌋ of a positive float is its exponent less 127. Just below a power of two, log₂ is rounded up to it
         let bits = extent.to_bits();
         let below = match bits & 0x7f_ff00 {
             0x7f_ff00 => (top as f32 + extent.log2()).floor() as isize,
@@ -325,20 +333,20 @@ impl MipMap {
 /// ⌊v⌋ and v − ⌊v⌋.
 #[inline]
 fn floor(v: f32) -> (i64, f32) {
-    /// From here on all floats are integers.
+    /// All floats from here on are integers.
     const WHOLE: f32 = (1 << 23) as f32;
-    // Adding and taking away rounds. Without SSE 4.1, `f32::floor` is a call of a function whose branches are hard to
-    // predict. A cast to an integer and back would wait for the lookup before: x86 keeps the rest of the register.
+    // Adding and subtracting rounds. Without SSE 4.1, `f32::floor` is a function call with branches that are hard to
+    // predict. A cast to an integer and back would depend on the previous lookup: x86 keeps the rest of the register
     let large = WHOLE.copysign(v);
     let near = (v + large) - large;
     let floor = if v.abs() < WHOLE { near - if near > v { 1.0 } else { 0.0 } } else { v };
-    // The cast saturates, so that absurd or non-finite coordinates wrap somewhere instead of overflowing.
+    // The cast saturates, so that absurd or non-finite coordinates wrap somewhere instead of overflowing
     (i64::from(floor as i32), v - floor)
 }
 
-/// Source pixels under pixel `i` of `n` over a source of `m` pixels, with their fractions of its area.
+/// Source pixels that overlap pixel `i` of `n`, over a source of `m` pixels, with their fractions of its area.
 fn overlaps(i: usize, n: usize, m: usize) -> Vec<(usize, f32)> {
-    // In units of 1/n source pixels all edges are integers.
+    // In units of 1/n source pixels all edges are integers
     let (start, end) = (i * m, (i + 1) * m);
     (start / n..end.div_ceil(n))
         .map(|j| {
@@ -458,7 +466,7 @@ mod tests {
         assert_eq!(map.texel(0, 4, 1), map.texel(0, 3, 2));
         assert_eq!(map.texel(0, 1, -1), map.texel(0, 2, 0));
         assert_eq!(map.texel(0, 2, 4), map.texel(0, 1, 3));
-        // Across a corner lies the opposite one.
+        // The pixel across a corner is the opposite corner
         assert_eq!(map.texel(0, -1, -1), map.texel(0, 3, 3));
     }
 
@@ -478,15 +486,19 @@ mod tests {
 
     #[test]
     fn tiles_hold_the_same_numbers() {
+        // Bytes and floats, with more and less than a tile
         for (w, h) in [(200, 130), (64, 65), (64, 64), (1, 5000)] {
             let bytes = image(w, h, |x, y| [0, 1, 2].map(|c| ((x * 7 + y * 13 + c * 5) % 256) as f32 / 255.0));
             let floats = image(w, h, |x, y| [0, 1, 2].map(|c| (x * 31 + y * 17 + c) as f32 * 0.013));
             for image in [bytes, floats] {
+                // The same pyramid in memory and in tiles
                 let map = MipMap::new(&image, Wrap::Repeat, Filter::Trilinear, ColorEncoding::Srgb);
                 let store = Arc::new(TileStore::new(200_000).unwrap());
                 let tiled = map.clone().tiled(&store).unwrap();
                 assert_eq!(tiled.store().is_some(), w * h > TILE * TILE);
                 assert!(tiled.bytes() < map.bytes() || w * h <= TILE * TILE);
+
+                // Compare texels and lookups
                 for i in 0..3000_usize {
                     let (level, x, y) = (i % map.levels(), (i * 37 % (2 * w)) as i64, (i * 101 % (2 * h)) as i64);
                     assert_eq!(tiled.texel(level, x, y), map.texel(level, x, y));

@@ -1,7 +1,9 @@
-//! Images: pixels with named channels, their encodings, pyramids for filtered lookups, and metrics of their difference.
+//! Images: pixels with named channels, encodings, pyramids for filtered lookups, and error metrics.
 //!
-//! Reading order: [`color`], [`view_transform`], [`mod@file`], [`color_layers`], [`oiio`], [`tiles`], `level`, `file_tiles`, [`mipmap`], [`face_map`],
-//! [`file_parts`], [`oidn`], [`metrics`], [`compare`], [`heat`].
+//! * Values: [`color`], [`view_transform`], [`heat`]
+//! * Files: [`mod@file`], [`color_layers`], [`oiio`], [`file_parts`]
+//! * Lookups: [`mipmap`], `level`, [`face_map`]; texels outside memory: [`tiles`], `file_tiles`
+//! * Denoising and comparison: [`oidn`], [`metrics`], [`compare`]
 
 pub mod color;
 pub mod color_layers;
@@ -62,27 +64,27 @@ impl Image {
         self.data[i] = value;
     }
 
-    /// The channels to read as colour, as [`color_layers::choose`] has them. `None` if there are no channels, or several
-    /// images among them.
+    /// The colour channels, as selected by [`color_layers::choose`]. `None` if there are no channels, or several
+    /// candidates.
     pub fn color_channels(&self) -> Option<ColorChannels> {
         let header = file::PartHeader { name: String::new(), channels: self.channels.clone(), size: [0; 2] };
         color_layers::choose(&[header], None).ok().map(|layer| layer.channels)
     }
 }
 
-/// Adjacent channels of one name.
+/// Adjacent channels with a common name.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Layer {
-    /// What precedes the last dot in the names of the channels, the whole name of a single channel, or [`IMAGE_LAYER`].
+    /// The channel names before the last dot, the whole name of a single channel, or [`IMAGE_LAYER`].
     pub name: String,
-    /// Their positions.
+    /// Positions of the channels.
     pub channels: std::ops::Range<usize>,
 }
 
-/// What the layer of the channels `R G B` is called: the image itself.
+/// Name of the layer with the channels `R G B`: the image itself.
 pub const IMAGE_LAYER: &str = "beauty";
 
-/// Channels by layers, in their order.
+/// Groups channels by layer, in file order.
 pub fn layers<S: AsRef<str>>(channels: &[S]) -> Vec<Layer> {
     let mut layers: Vec<Layer> = Vec::new();
     for (index, channel) in channels.iter().enumerate() {

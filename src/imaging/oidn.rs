@@ -1,9 +1,9 @@
-//! Denoising, by Open Image Denoise 2: the safe layer over its C interface.
+//! Denoising by Open Image Denoise 2: safe wrapper of the C interface.
 //!
 //! The library is loaded when a [`Denoiser`] is opened. The guides, albedo and normal of the first surface, are noisy
-//! themselves where there is depth of field, motion or texture; they are denoised first, each by itself, and the image by
-//! the clean guides. Values that are not finite are replaced by the mean of their finite neighbours beforehand, since a
-//! single one would spoil all pixels that the network sees together with it.
+//! themselves with depth of field, motion or texture. Each guide is therefore denoised first, and the image is denoised
+//! with the clean guides. Non-finite values are first replaced by the mean of their finite neighbours: a single one
+//! would corrupt all pixels in the network's receptive field.
 #![allow(unsafe_code)]
 
 use oidn_sys as sys;
@@ -11,17 +11,17 @@ use std::ffi::{CStr, c_char};
 use std::path::Path;
 use std::ptr;
 
-/// How to get the library, for the end of messages.
+/// Installation hint at the end of messages.
 const HELP: &str = "denoising needs the library Open Image Denoise 2 (openimagedenoise.org, or a package of the system): \
                     install it, or name its file";
 
-/// Why an image cannot be denoised.
+/// Reason why an image cannot be denoised.
 #[derive(Debug, thiserror::Error)]
 pub enum DenoiseError {
-    /// The library cannot be used.
+    /// The library cannot be loaded.
     #[error("Open Image Denoise cannot be loaded: {0}\n{HELP}")]
     Library(String),
-    /// It reports an error.
+    /// The library reports an error.
     #[error("Open Image Denoise: {0}")]
     Device(String),
     /// A layer has another size than the image.
@@ -40,11 +40,11 @@ pub struct NoisyImage {
     pub color: Vec<f32>,
     /// Albedo of the first surface, 0..1.
     pub albedo: Option<Vec<f32>>,
-    /// Normal of the first surface, −1..1. Of use together with albedo only.
+    /// Normal of the first surface, −1..1. Used only together with albedo.
     pub normal: Option<Vec<f32>>,
 }
 
-/// Open Image Denoise on the processor.
+/// An Open Image Denoise device on the CPU.
 #[derive(Debug)]
 pub struct Denoiser {
     api: sys::Api,
@@ -52,7 +52,7 @@ pub struct Denoiser {
 }
 
 impl Denoiser {
-    /// Opens the library, that of the system if none is named, with so many threads; `None` is one per core.
+    /// Opens the given library, or the system's, with the given number of threads; `None` is one per core.
     pub fn open(library: Option<&Path>, threads: Option<usize>) -> Result<Self, DenoiseError> {
         let name = library.map_or_else(|| sys::LIBRARY_NAME.as_ref(), Path::as_os_str);
         let api = sys::load(name).map_err(DenoiseError::Library)?;
@@ -66,7 +66,7 @@ impl Denoiser {
         // SAFETY: the device is live until drop, and names end in a zero byte, here and below.
         unsafe {
             (api.set_device_int)(device, c"numThreads".as_ptr(), threads);
-            // Threads of several programs on one machine would share the same cores
+            // Programs on the same machine would otherwise pin their threads to the same cores
             (api.set_device_bool)(device, c"setAffinity".as_ptr(), false);
             (api.commit_device)(device);
         }
@@ -83,7 +83,7 @@ impl Denoiser {
         [c"versionMajor", c"versionMinor", c"versionPatch"].map(number).join(".")
     }
 
-    /// Denoises an image by its guides, which are denoised first. A normal without albedo is not used.
+    /// Denoises an image with its guides, which are denoised first. A normal without albedo is ignored.
     pub fn denoise(&self, mut image: NoisyImage) -> Result<Vec<f32>, DenoiseError> {
         let size = [image.width, image.height];
         let guides = [("albedo", &image.albedo), ("normal", &image.normal)];
@@ -117,7 +117,7 @@ impl Denoiser {
         self.filter(size, &inputs, flags)
     }
 
-    /// Runs a filter; all images have three values per pixel.
+    /// Runs a filter. All images have three values per pixel.
     fn filter(
         &self,
         [width, height]: [usize; 2],
@@ -131,7 +131,8 @@ impl Denoiser {
         let filter = Filter { api: &self.api, handle };
         let set = |name: &CStr, data: *mut f32| {
             let format = sys::OIDN_FORMAT_FLOAT3;
-            // SAFETY: the filter is live; all images hold width × height × 3 floats, and outlive it. It reads inputs only.
+            // SAFETY: the filter is live. All images hold width × height × 3 floats and outlive it. Inputs are only
+            // read.
             unsafe {
                 let set = self.api.set_shared_filter_image;
                 set(filter.handle, name.as_ptr(), data.cast(), format, width, height, 0, 0, 0);
@@ -158,7 +159,7 @@ impl Denoiser {
         Ok(output)
     }
 
-    /// The device's error, if there is one.
+    /// Returns the device's error, if there is one.
     fn check(&self) -> Result<(), DenoiseError> {
         device_error(&self.api, self.device).map_err(DenoiseError::Device)
     }
@@ -171,7 +172,7 @@ impl Drop for Denoiser {
     }
 }
 
-/// A filter, released in the end.
+/// A filter, released on drop.
 struct Filter<'a> {
     api: &'a sys::Api,
     handle: *mut sys::OidnFilter,
@@ -184,7 +185,7 @@ impl Drop for Filter<'_> {
     }
 }
 
-/// The message of the error of a device; a null device stands for those that could not be made.
+/// The error message of a device. A null device stands for devices that could not be created.
 fn device_error(api: &sys::Api, device: *mut sys::OidnDevice) -> Result<(), String> {
     let mut message: *const c_char = ptr::null();
     // SAFETY: the device is live or null, and `message` is only written.
@@ -199,7 +200,7 @@ fn device_error(api: &sys::Api, device: *mut sys::OidnDevice) -> Result<(), Stri
     Err(unsafe { CStr::from_ptr(message) }.to_string_lossy().into_owned())
 }
 
-/// Clamps all values, and replaces pixels that are not finite by the mean of those around them that are, or by 0.
+/// Clamps all values. Non-finite pixels are replaced by the mean of their finite neighbours, or by 0.
 fn repair(data: &mut [f32], width: usize, min: f32, max: f32) {
     let (pixels, _) = data.as_chunks_mut::<3>();
     let is_finite = |pixel: &[f32; 3]| pixel.iter().all(|v| v.is_finite());
@@ -210,7 +211,7 @@ fn repair(data: &mut [f32], width: usize, min: f32, max: f32) {
         let rows = y.saturating_sub(1)..(y + 2).min(height);
         rows.flat_map(move |y| (x.saturating_sub(1)..(x + 2).min(width)).map(move |x| y * width + x))
     };
-    // All from what was finite at first, so that order does not matter
+    // Means use the original values only, so that the order does not matter
     let mean = |i: usize| {
         let neighbours: Vec<[f32; 3]> = around(i).map(|j| pixels[j]).filter(is_finite).collect();
         let count = neighbours.len().max(1) as f32;
@@ -251,7 +252,7 @@ mod tests {
         Denoiser::open(Some(Path::new(&library)), Some(threads)).unwrap()
     }
 
-    /// A grey image whose values are noise of mean 0.5, a guide that has an edge, and normals towards the viewer.
+    /// A grey image of noise with mean 0.5, an albedo guide with an edge, and normals towards the viewer.
     fn noisy(width: usize, height: usize) -> NoisyImage {
         let value = |i: usize| (i as u32).wrapping_mul(2_654_435_761) as f32 / u32::MAX as f32;
         let color = (0..width * height).flat_map(|i| [value(i); 3]).collect();

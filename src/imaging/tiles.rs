@@ -1,8 +1,8 @@
-//! Texels that do not fit into memory: tiles in a temporary file, or in image files that hold pyramids themselves. A bounded
-//! cache holds those that were used last.
+//! Texels that do not fit into memory: tiles in a temporary file or in image files with pyramids, and a bounded cache
+//! of recently used tiles.
 //!
-//! The temporary file has no name and vanishes with the program. Tiles hold what the levels of a pyramid hold in memory, so a
-//! lookup reads the same numbers either way.
+//! The temporary file has no name and vanishes with the program. Tiles have the same content as the levels of a pyramid
+//! in memory, so lookups give the same values.
 
 use std::cell::RefCell;
 use std::collections::HashMap;
@@ -14,23 +14,24 @@ use std::sync::{Arc, Mutex, OnceLock, PoisonError, RwLock};
 
 /// Texels along a side of a tile.
 pub const TILE: usize = 64;
-/// Most parts of the cache, each with a lock of its own, and the fewest bytes of one: four of the largest tiles.
+/// Maximum number of shards of the cache, each with its own lock, and the minimum bytes of a shard: four of the largest
+/// tiles.
 const SHARDS: u64 = 32;
 const SHARD_BYTES: u64 = 4 * (TILE * TILE * 12) as u64;
-/// Tiles that a thread finds again without a lock; they are kept in addition to those of the cache.
+/// Tiles that each thread can access without a lock, in addition to the cache.
 const RECENT: usize = 32;
 
-/// Where a tile begins in the temporary file, or after [`OF_FILES`] those of all other files.
+/// Position of a tile in the temporary file, or, from [`OF_FILES`] on, among the tiles of all other files.
 type Key = u64;
 /// First key of tiles of other files.
 const OF_FILES: Key = 1 << 63;
 
-/// Tiles of one part of the cache.
+/// A shard of the cache.
 #[derive(Debug, Default)]
 struct Shard {
     places: HashMap<Key, usize>,
     tiles: Vec<Slot>,
-    /// The tile that is looked at next when there is no room.
+    /// Clock hand: the next tile to examine when the shard is full.
     hand: usize,
     bytes: u64,
 }
@@ -39,7 +40,7 @@ struct Shard {
 struct Slot {
     key: Key,
     tile: Arc<[u8]>,
-    /// It was used since the hand passed.
+    /// True if the tile was used since the hand passed.
     is_used: bool,
 }
 
@@ -50,13 +51,16 @@ impl Shard {
         Some(Arc::clone(&slot.tile))
     }
 
-    /// Adds a tile, for which others make room that were not used of late [the clock algorithm: Corbató 1968]. One that is
-    /// larger than all there may be is not kept.
+    /// Adds a tile, and evicts tiles that were not used recently [the clock algorithm: Corbató 1968]. A tile larger
+    /// than the capacity is not kept.
     fn put(&mut self, key: Key, tile: &Arc<[u8]>, capacity: u64) {
+        // Tiles that are too large or there already
         let bytes = tile.len() as u64;
         if bytes > capacity || self.places.contains_key(&key) {
             return;
         }
+
+        // Evict others
         while self.bytes + bytes > capacity {
             self.hand %= self.tiles.len();
             if std::mem::take(&mut self.tiles[self.hand].is_used) {
@@ -70,27 +74,29 @@ impl Shard {
             }
             self.bytes -= out.tile.len() as u64;
         }
+
+        // Insert
         self.places.insert(key, self.tiles.len());
         self.tiles.push(Slot { key, tile: Arc::clone(tile), is_used: true });
         self.bytes += bytes;
     }
 }
 
-/// What was read and held.
+/// Statistics of a store.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct TileCounts {
     /// Bytes in the temporary file.
     pub stored: u64,
     /// Tiles read from it and from other files.
     pub read: u64,
-    /// Bytes of the tiles that are held now.
+    /// Bytes of the tiles in the cache.
     pub held: u64,
 }
 
-/// Makes a tile of an image file, by its index.
+/// Reads a tile of an image file by its index.
 pub(super) type ReadTile = dyn Fn(usize) -> Result<Vec<u8>, String> + Send + Sync;
 
-/// The tiles of other files: those of each level, and where the next begin.
+/// The tiles of other files, by level, and the next unused key.
 struct Files {
     levels: Vec<FileLevel>,
     end: Key,
@@ -116,16 +122,16 @@ pub struct TileStore {
     file: File,
     end: Mutex<u64>,
     files: RwLock<Files>,
-    /// Most bytes of the cache.
+    /// Maximum bytes of the cache.
     capacity: u64,
     shards: Vec<Mutex<Shard>>,
     read: AtomicU64,
     failure: OnceLock<String>,
-    /// Tells stores apart.
+    /// Distinguishes stores.
     id: u64,
 }
 
-/// What a thread has used last.
+/// A tile that a thread used recently.
 struct Recent {
     of: (u64, Key),
     tile: Arc<[u8]>,
@@ -136,7 +142,7 @@ thread_local! {
 }
 
 impl TileStore {
-    /// A store whose cache takes `capacity` bytes at most, in the folder for temporary files (`TMPDIR`).
+    /// A store with a cache of at most `capacity` bytes, in the folder for temporary files (`TMPDIR`).
     pub fn new(capacity: u64) -> io::Result<Self> {
         static NEXT: AtomicU64 = AtomicU64::new(0);
         Ok(TileStore {
@@ -151,12 +157,12 @@ impl TileStore {
         })
     }
 
-    /// Most bytes of the cache.
+    /// Maximum bytes of the cache.
     pub fn capacity(&self) -> u64 {
         self.capacity
     }
 
-    /// Appends bytes; where they begin.
+    /// Appends bytes and returns their position.
     pub fn append(&self, bytes: &[u8]) -> io::Result<u64> {
         let mut end = self.end.lock().unwrap_or_else(PoisonError::into_inner);
         let begin = *end;
@@ -165,7 +171,8 @@ impl TileStore {
         Ok(begin)
     }
 
-    /// Adds a level of so many tiles of `tile_bytes` each, which `read` makes when they are wanted; where they begin.
+    /// Adds a level with `tiles` tiles of `tile_bytes` each, which `read` reads on demand. Returns the key of the first
+    /// tile.
     pub(super) fn add_level(&self, tiles: usize, tile_bytes: usize, read: Arc<ReadTile>) -> Key {
         let mut files = self.files.write().unwrap_or_else(PoisonError::into_inner);
         let begin = files.end;
@@ -174,8 +181,8 @@ impl TileStore {
         begin
     }
 
-    /// What `read` makes of the `len` bytes that begin at `key`; of zeros if a file cannot be read, which
-    /// [`failure`](Self::failure) then tells.
+    /// Calls `read` with the `len` bytes of the tile `key`. If a file cannot be read, they are zeros, and
+    /// [`failure`](Self::failure) returns the reason.
     #[inline]
     pub fn with_tile<T>(&self, key: u64, len: usize, read: impl FnOnce(&[u8]) -> T) -> T {
         RECENTLY.with_borrow_mut(|recently| {
@@ -200,7 +207,7 @@ impl TileStore {
         if let Some(tile) = shard().find(key) {
             return tile;
         }
-        // Not under the lock: others need not wait for the disk
+        // Without the lock, so that others need not wait for the disk
         let bytes = self.read(key, len).unwrap_or_else(|reason| {
             self.failure.get_or_init(|| reason);
             vec![0; len]
@@ -229,18 +236,18 @@ impl TileStore {
             .map_err(|reason| format!("texels could not be read: {reason}"))
     }
 
-    /// Cuts the file, as a disk that fails does.
+    /// Truncates the file, to simulate a failing disk.
     #[cfg(test)]
     pub(crate) fn lose(&self, len: u64) {
         self.file.set_len(len).unwrap();
     }
 
-    /// Why lookups have found zeros instead of texels, if they have.
+    /// Reason why lookups returned zeros instead of texels, if they did.
     pub fn failure(&self) -> Option<&str> {
         self.failure.get().map(String::as_str)
     }
 
-    /// What was read and held.
+    /// Statistics.
     pub fn counts(&self) -> TileCounts {
         let held = |shard: &Mutex<Shard>| shard.lock().unwrap_or_else(PoisonError::into_inner).bytes;
         TileCounts {
@@ -267,7 +274,7 @@ mod tests {
 
     #[test]
     fn every_tile_is_found_by_all_threads_and_the_cache_stays_within_its_bounds() {
-        // Several parts, each of which has tiles to drop
+        // Several shards, each with tiles to evict
         let capacity = 3 * SHARD_BYTES;
         let store = store(1000, capacity);
         assert_eq!(store.shards.len(), 3);

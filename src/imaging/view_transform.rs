@@ -1,10 +1,10 @@
-//! View transforms: from light to the colours of an sRGB display.
+//! View transforms: from linear light to the colours of an sRGB display.
 //!
 //! * `srgb`: clipped to 0..1, then the sRGB curve.
 //! * `filmic`: the curve of [Hable 2010] per channel, white at 11.2, then the sRGB curve.
-//! * `agx`: log₂ encoding of −12.47 to 4.03 stops about middle grey in a base of less saturated primaries, so that
-//!   bright colours run to white without changes of hue, and a sigmoid [Sobotka 2022], whose fit by a polynomial is
-//!   [Wrensch 2023]. What comes out is for a display of exponent 2.2.
+//! * `agx`: log₂ encoding from −12.47 to 4.03 stops about middle grey, and a sigmoid [Sobotka 2022], fitted by a
+//!   polynomial [Wrensch 2023]. Its primaries are less saturated, so that bright colours approach white without changes
+//!   of hue. The result is for a display with gamma 2.2.
 
 use super::color::linear_to_srgb;
 use lumiris_numbers::math::luminance;
@@ -24,7 +24,7 @@ pub enum ViewTransform {
 }
 
 impl ViewTransform {
-    /// The colour of linear Rec.709 light, 0..1.
+    /// Converts linear Rec.709 light to display colours, 0..1.
     pub fn apply(self, rgb: [f32; 3]) -> [f32; 3] {
         match self {
             ViewTransform::Srgb => rgb.map(|v| linear_to_srgb(v.clamp(0.0, 1.0))),
@@ -36,15 +36,15 @@ impl ViewTransform {
     }
 }
 
-/// [Hable 2010].
+/// The curve of [Hable 2010].
 fn hable(x: f32) -> f32 {
     let [a, b, c, d, e, f] = [0.15, 0.5, 0.1, 0.2, 0.02, 0.3];
-    // The quotient of infinities; the limit is reached long before
+    // Avoids ∞/∞. The limit is reached long before
     let x = x.min(1e6);
     (x * (a * x + c * b) + d * e) / (x * (a * x + b) + d * f) - e / f
 }
 
-/// Rows of the matrix to the base of AgX, and of its inverse.
+/// Rows of the matrix to the primaries of AgX, and of its inverse.
 const INSET: [[f32; 3]; 3] = [
     [0.842_479_06, 0.078_433_6, 0.079_223_745],
     [0.042_328_24, 0.878_468_64, 0.079_166_13],
@@ -55,7 +55,7 @@ const OUTSET: [[f32; 3]; 3] = [
     [-0.052_896_85, 1.151_903_1, -0.098_961_18],
     [-0.052_971_63, -0.098_043_45, 1.151_073_7],
 ];
-/// Ends of the logarithmic encoding (log₂ of the value).
+/// Range of the logarithmic encoding (log₂ of the value).
 const STOPS: [f32; 2] = [-12.473_93, 4.026_069];
 
 fn agx(rgb: [f32; 3]) -> [f32; 3] {
@@ -76,8 +76,8 @@ fn transform(rows: &[[f32; 3]; 3], [x, y, z]: [f32; 3]) -> [f32; 3] {
     rows.map(|[a, b, c]| a * x + b * y + c * z)
 }
 
-/// The exposure (stops) that makes the geometric mean of luminance middle grey, 18 % [Reinhard et al. 2002]. The
-/// darkest and the brightest twentieth of the pixels do not count, nor do those without light; 0 if none is left.
+/// The exposure (stops) that maps the geometric mean of luminance to middle grey, 18 % [Reinhard et al. 2002]. Pixels
+/// without light and the darkest and brightest 5 % of the rest are ignored; 0 if none is left.
 pub fn auto_exposure(pixels: impl Iterator<Item = [f32; 3]>) -> f32 {
     let mut luminances: Vec<f32> =
         pixels.map(|rgb| luminance(rgb.map(f64::from)) as f32).filter(|&l| l > 0.0 && l.is_finite()).collect();
@@ -117,7 +117,7 @@ mod tests {
         }
     }
 
-    /// Published values: Hable's own figures of his curve, and the middle of AgX's, which is to keep middle grey.
+    /// Published values: Hable's figures of his curve, and AgX's middle, which keeps middle grey.
     #[test]
     fn curves_have_their_published_values() {
         assert!(hable(0.0).abs() < 1e-6);

@@ -161,8 +161,8 @@ fn file_map(file: FilePyramid, request: &ImageRequest, store: Option<&Arc<TileSt
     channels.map_or_else(|| Ok(without_channels(request)), |channels| MipMap::of_file(file, channels, how, store))
 }
 
-/// Positions of the channels that are asked for, if there are any, and how they are encoded, by those of the image and the usual
-/// encoding of the file.
+/// Positions of the requested channels, if the image has them, and their encoding. `usual` is the usual encoding of the
+/// file.
 fn meaning(request: &ImageRequest, layer: &ColorLayer, usual: ColorEncoding) -> (Option<Vec<usize>>, ColorEncoding) {
     let channels = match request.channels {
         // Opacity is stored linear
@@ -259,6 +259,8 @@ mod tests {
             let shift = |c: u32, _| if c & 1 == 1 { 0xedb8_8320 ^ (c >> 1) } else { c >> 1 };
             !bytes.iter().fold(!0_u32, |c, &byte| (0..8).fold(c ^ u32::from(byte), shift))
         };
+
+        // zlib stream with one stored block
         let rows = [&[0], pixels].concat();
         let adler = rows.iter().fold((1_u32, 0_u32), |(a, b), &v| (a + u32::from(v), b + a + u32::from(v)));
         let len = rows.len() as u16;
@@ -266,6 +268,8 @@ mod tests {
         data.extend([len, !len].iter().flat_map(|v| v.to_le_bytes()));
         data.extend(rows);
         data.extend((((adler.1 % 65521) << 16) | (adler.0 % 65521)).to_be_bytes());
+
+        // Chunks
         let header = [&[0, 0, 0, 2, 0, 0, 0, 1, bits][..], &[2, 0, 0, 0]].concat();
         let mut file = b"\x89PNG\r\n\x1a\n".to_vec();
         for (name, content) in [(b"IHDR", &header), (b"IDAT", &data), (b"IEND", &Vec::new())] {

@@ -132,6 +132,8 @@ fn load_parsed(
     let mut sources = SourceMap::new();
     let mut diagnostics = Diagnostics::new();
     let mut builder = Builder::new(folder, options);
+
+    // Parse, and resolve names
     parse(&mut sources, &mut diagnostics, &mut builder);
     builder.resolve(&mut diagnostics);
     if let Some(option) = options.of_gltf() {
@@ -140,12 +142,15 @@ fn load_parsed(
         );
         diagnostics.error_without_place(message);
     }
+
+    // Finish the scene
     let scene_files = SceneFiles::new(&sources, builder.files());
     let finished = builder.finish(files, &mut diagnostics);
     let failed = diagnostics.has_errors();
     let report = diagnostics.finish(&sources);
     match finished {
         Some((scene, settings, placed)) if !failed => {
+            // Settings given in the file, with their positions
             let mut given = Given::default();
             for (row, value, span) in placed {
                 let parameter = row.parameters.first().unwrap_or(&row.flag);

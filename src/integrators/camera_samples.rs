@@ -1,4 +1,4 @@
-//! Camera samples: places on the film with their rays and random numbers.
+//! Camera samples: film positions with their rays and random numbers.
 
 use super::path::CameraSample;
 use super::{light_paths, reuse};
@@ -16,55 +16,56 @@ use lumiris_numbers::math::{Ray, Vec2, Vec3};
 use lumiris_numbers::samplers::{NetPoint, SampleStream, SamplerKind};
 use std::ops::Range;
 
-/// Domains of a camera sample.
+/// Random-number domains of a camera sample.
 mod domain {
     pub(super) const FILM_AND_LENS: u32 = 0;
     pub(super) const TIME: u32 = 1;
     pub(super) const SAMPLE_COUNTS: u32 = 2;
 }
 
-/// Seed of the blocks of progressive estimators.
+/// Seed of the sample blocks of progressive estimators.
 const BLOCK_SEED: u32 = 0x62_6c_6f_63;
 
 /// Makes camera samples.
 pub struct CameraSampler<'a> {
     job: &'a RenderJob,
-    /// The first sample of the rendering.
+    /// Index of the first sample of the image.
     first_sample: u32,
     filter: FilterSampler,
-    /// Samples of pixels that have different numbers of them, and share camera paths or light paths.
+    /// Sample counts per pixel, if they vary and pixels share camera paths or light paths.
     shared: Option<&'a PixelSamples>,
-    /// False if the time of a ray does not matter.
+    /// True if the scene or the camera moves.
     has_motion: bool,
-    /// What makes many rays at once.
+    /// Pinhole camera that makes many rays at once, with its origin.
     pinhole: Option<(Pinhole, Vec3)>,
     direct: DirectNumbers,
     /// Sample counts, unless chosen per pixel.
     sample_counts: SampleCounts,
-    /// The map that they are chosen by.
+    /// Map of sample counts per pixel.
     count_map: Option<&'a SampleCountMap>,
-    /// True if there is nothing of that: no other numbers of direct light, nothing shared, no map.
+    /// True if direct light uses the stream of the sample, no paths are shared, and there is no count map.
     are_plain: bool,
 }
 
-/// The random numbers of direct light.
+/// Source of the random numbers of direct light.
 #[derive(Clone, Copy, Debug)]
 enum DirectNumbers {
-    /// Those of the camera sample.
+    /// The stream of the camera sample.
     Same,
-    /// Of this kind: estimators over pixels need those of a pixel to be independent of its neighbours'.
+    /// A sampler of this kind. Estimators over pixels need random numbers that are independent between neighbouring
+    /// pixels.
     Kind(SamplerKind),
-    /// Those of a block of samples.
+    /// A stream per block of samples.
     Blocks,
 }
 
-/// Memory for many samples at once.
+/// Buffers for many samples.
 #[derive(Debug, Default)]
 pub struct Scratch {
-    /// The pixels, with the fits and indices of their samples.
+    /// Fit index, pixel, and range of sample indices.
     pixels: Vec<(u32, [u32; 2], Range<u32>)>,
     streams: Vec<SampleStream>,
-    /// Points of which film positions are coordinates.
+    /// Net points whose coordinates are the film positions.
     points: Vec<NetPoint>,
     u: [Column; 2],
     weight: Column,
@@ -73,12 +74,14 @@ pub struct Scratch {
 }
 
 impl<'a> CameraSampler<'a> {
-    /// Of an image whose first sample has this index.
+    /// A sampler for an image whose first sample has the index `first_sample`.
     pub fn new(job: &'a RenderJob, first_sample: u32) -> Self {
         let scene = &job.world.scene;
         let has_motion = scene.geometry.has_motion() || scene.camera.is_moving();
         let pinhole = if has_motion { None } else { scene.camera.pinhole() };
         let settings = job.settings();
+
+        // Random numbers of direct light
         let estimator = Estimator::at_vertex(&settings.integrator, 0);
         let direct = if estimator.is_over_pixels() && settings.sampling.sampler == SamplerKind::SobolBlueNoise {
             DirectNumbers::Kind(SamplerKind::Sobol)
@@ -87,6 +90,8 @@ impl<'a> CameraSampler<'a> {
         } else {
             DirectNumbers::Same
         };
+
+        // Sample counts that vary between pixels
         let (filter, sample_counts) = (scene.film.filter.sampler(), settings.integrator.sample_counts());
         let shared = job.pixel_samples.as_ref().filter(|_| reuse::edge(job) > 1 || light_paths::per_sample(job) > 0.0);
         let is_chosen = settings.integrator.ris.proposals == Proposals::Optimal;
@@ -106,7 +111,7 @@ impl<'a> CameraSampler<'a> {
         }
     }
 
-    /// Appends samples of some pixels, each with a range of its own and given with the fits of its samples.
+    /// Appends the samples of some pixels, each given by fit index, pixel, and range of sample indices.
     pub fn samples(
         &self,
         pixels: impl Iterator<Item = (u32, [u32; 2], Range<u32>)>,
@@ -120,6 +125,8 @@ impl<'a> CameraSampler<'a> {
             }
             return;
         };
+
+        // Random numbers
         let Scratch { pixels: of_pixels, streams, points, u: [x, y], weight, d, spread } = scratch;
         let kind = self.job.settings().sampling.sampler;
         of_pixels.clear();
@@ -157,7 +164,8 @@ impl<'a> CameraSampler<'a> {
         let mut rays = PinholeRays { d: d.get_mut(len), spread: &mut spread[..len] };
         pinhole.rays(level(), [&x[..len], &y[..len]], &mut rays);
 
-        // What they have in common, and what each has: written in place, since copies of a sample take longer than all else
+        // Fill the samples in place: common fields per pixel, then the fields of each sample. Copies of samples would
+        // dominate the time
         let scene = &self.job.world.scene;
         let ray = Ray { o: *o, d: Vec3::ZERO, t_max: f32::INFINITY, time: scene.camera.time(0.0) };
         let (mut first, [dx, dy, dz]) = (0, d.get(len));
@@ -195,13 +203,13 @@ impl<'a> CameraSampler<'a> {
         }
     }
 
-    /// One sample. The direct light of a progressive estimator is drawn block by block, each with a seed of its own.
+    /// One sample. A progressive estimator draws direct light block by block, each block with its own seed.
     pub fn sample(&self, pixel: [u32; 2], sample: u32, seed: u32) -> CameraSample {
         let of_seed = self.sample_of_seed(pixel, sample, seed);
         CameraSample { direct: self.direct_stream(pixel, sample, seed).unwrap_or(of_seed.stream), ..of_seed }
     }
 
-    /// One sample, whose direct light belongs to no block.
+    /// One sample, with direct light outside of all blocks.
     pub fn sample_of_seed(&self, pixel: [u32; 2], sample: u32, seed: u32) -> CameraSample {
         let (scene, settings) = (&self.job.world.scene, self.job.settings());
         let stream = SampleStream::new(settings.sampling.sampler, pixel, sample, seed);
@@ -222,7 +230,8 @@ impl<'a> CameraSampler<'a> {
         }
     }
 
-    /// Which samples of neighbouring pixels may share its path, and which light paths it has.
+    /// Sample step ([`PixelSamples::turn`]). Samples of neighbouring pixels with the same step may share paths, and use
+    /// the same light paths.
     #[inline]
     fn turn(&self, pixel: [u32; 2], sample: u32) -> u32 {
         self.shared.map_or(sample, |of_pixels| {
@@ -230,7 +239,7 @@ impl<'a> CameraSampler<'a> {
         })
     }
 
-    /// The random numbers of direct light, if they are those of a block.
+    /// Random numbers of direct light, if they differ from the stream of the sample.
     #[inline]
     fn direct_stream(&self, pixel: [u32; 2], sample: u32, seed: u32) -> Option<SampleStream> {
         match self.direct {

@@ -1,34 +1,38 @@
-//! Which pixels share paths: those of a block, which are close together; and which are rendered together: those of a cell.
+//! Groups of pixels that share paths (blocks), and groups of pixels that are rendered together (cells). A block lies
+//! within one cell.
 //!
-//! None of that is to be seen in the image. So cells lie elsewhere every few turns, and blocks elsewhere in each cell and turn.
-//! A block has no straight edge either: near one, a pixel is in either of the blocks by chance.
+//! To keep the pattern invisible in the image, the offset of the cells changes every [`TURNS`] sample steps
+//! ([`crate::scene::PixelSamples::turn`]), and the offset of the blocks changes with the cell and the step. Blocks have
+//! no straight edges: near an edge, a pixel belongs to either block at random.
 
 use crate::film::PixelBounds;
 use lumiris_numbers::math::hash::pcg4d;
 
-/// Edge of the cells of pixels that are rendered together.
+/// Edge of the cells (pixels).
 pub const CELL: u32 = 32;
-/// Turns whose cells are the same: pixels that were rendered in a cell are added to the film once.
+/// Number of consecutive sample steps with the same cells. The pixels of a cell are added to the film once for all of
+/// them.
 pub const TURNS: u32 = 4;
-/// Edge of the cells of pixels that are estimated twice, from the corner of the image.
+/// Edge of the cells of replicas (pixels that are estimated twice); these cells begin at the corner of the image.
 pub const REPLICA_CELL: u32 = 16;
 
-/// Part of the edge of a block by which its border is drawn to and fro for each pixel, 1/[`REACH`]: as far as squares are not seen.
-/// Over the whole edge, pixels that share lie further apart, and relMSE of the box and of `ajar` is 1.3 times as much
-/// (docs/measurements/path-reuse.md).
+/// The border of a block varies per pixel by 1/[`REACH`] of its edge, which suffices to hide the squares. Variation
+/// over the whole edge would increase the distance of pixels that share paths, and multiply the relMSE of the box and
+/// of `ajar` by 1.3 (docs/measurements/path-reuse.md).
 const REACH: u32 = 3;
 
-/// Lower bits of a turn, which samples of a pixel in the same turn have in common ([`crate::scene::PixelSamples::turn`]).
+/// Lower bits of a sample step: all samples that a pixel takes in one step have the same lower bits
+/// ([`crate::scene::PixelSamples::turn`]).
 const TURN: u32 = (1 << 20) - 1;
 
-/// Seeds of hashes: where cells lie, where blocks lie in a cell, and which of them a pixel is in.
+/// Seeds of the hashes: offset of the cells, offset of the blocks in a cell, and block of a pixel near an edge.
 mod seed {
     pub(super) const CELLS: u32 = 0x63_65_6c_6c;
     pub(super) const BLOCKS: u32 = 0x72_65_75_73;
     pub(super) const PIXEL: u32 = 0x70_69_78_6c;
 }
 
-/// The cells of a turn in an image of a seed, row by row. Those at its border have fewer pixels.
+/// The cells of a sample step, row by row. Cells at the border of the image have fewer pixels.
 pub fn cells(image: &PixelBounds, turn: u32, seed: u32) -> Vec<PixelBounds> {
     let [dx, dy] = offset(turn, seed);
     let columns: Vec<[u32; 2]> = spans([image.x0, image.x1], dx).collect();
@@ -36,33 +40,33 @@ pub fn cells(image: &PixelBounds, turn: u32, seed: u32) -> Vec<PixelBounds> {
     spans([image.y0, image.y1], dy).flat_map(row).collect()
 }
 
-/// Parts of a range whose limits are multiples of the edge of cells, less an offset, from its beginning.
+/// Divides a range at the multiples of the cell edge, less `offset`, from its beginning.
 fn spans([begin, end]: [u32; 2], offset: u32) -> impl Iterator<Item = [u32; 2]> {
     let limit = move |i: u32| (begin + (i * CELL).saturating_sub(offset)).min(end);
     (0..(end - begin + offset).div_ceil(CELL)).map(move |i| [limit(i), limit(i + 1)])
 }
 
-/// How far the cells of a turn lie to the left and above those from the corner of the image.
+/// Offset of the cells of a sample step, to the left and upwards.
 #[inline]
 fn offset(turn: u32, seed: u32) -> [u32; 2] {
     let [dx, dy, ..] = pcg4d([(turn & TURN) / TURNS, seed, seed::CELLS, 0]);
     [dx % CELL, dy % CELL]
 }
 
-/// Which samples of a batch share paths.
+/// Grouping of the samples of a batch for path sharing.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Groups {
-    /// None: the batch does not have all samples of a cell.
+    /// No sharing: the batch does not contain all samples of a cell.
     #[default]
     None,
-    /// Those of a block of a cell.
+    /// Blocks within cells.
     Cells,
-    /// Those of a block of a grid over the image.
+    /// Blocks of a regular grid over the image.
     Grid,
 }
 
 impl Groups {
-    /// The group of a sample of a pixel, counted from the corner of the image.
+    /// The group of a sample. The pixel coordinates begin at the corner of the image.
     #[inline]
     pub(super) fn of(self, (edge, seed): (u32, u32), [x, y]: [u32; 2], (turn, is_replica): (u32, bool)) -> u64 {
         let (cell, block) = match self {
@@ -79,7 +83,7 @@ impl Groups {
                 (cell, [block(at[0], bx, px), block(at[1], by, py)])
             }
         };
-        // A batch has few cells, near each other, and at most CELL blocks in a row of one
+        // A batch has few adjacent cells, and a cell has at most CELL blocks per row
         let ([cell_x, cell_y], [block_x, block_y]) = (cell.map(|c| u64::from(c & 0x7ff)), block.map(u64::from));
         u64::from(turn) << 32 | cell_y << 21 | cell_x << 10 | block_y << 5 | block_x
     }
@@ -109,6 +113,8 @@ mod tests {
                     }
                 }
             }
+
+            // Cells partition the image, and are the same for TURNS steps
             assert_eq!(count.iter().sum::<usize>(), IMAGE.area());
             assert!(count.iter().all(|&n| n <= 1));
             of_turns.push(cells);

@@ -1,10 +1,8 @@
-//! Camera paths that take the light reflected by the Lambertian parts of BSDFs from elsewhere: from irradiance records
-//! or from photons.
+//! Camera paths that replace the light reflected by Lambertian lobes by a lookup: in irradiance records or photon maps.
 //!
-//! At each vertex, the light reflected by the Lambertian part ([`crate::bsdfs::Bsdf::lambertian`]) is looked up, and
-//! the path continues with the other lobes (mirrors, glass, coats, metals) to the next vertex, which does the same. A
-//! vertex where the lookup misses, or without such a part, continues as in `path`. So no light is counted twice or
-//! lost.
+//! At each vertex, the light reflected by the Lambertian lobe ([`crate::bsdfs::Bsdf::lambertian`]) is looked up, and
+//! the path continues with the other lobes (mirrors, glass, coats, metals). If the lookup misses, or there is no
+//! Lambertian lobe, the vertex is handled as in `path`. So no light is counted twice or lost.
 
 use super::path::{BatchVertices, PathVertex, Shading};
 use crate::bsdfs::Lambertian;
@@ -12,8 +10,8 @@ use crate::film::PixelSample;
 use crate::materials::SurfaceBsdf;
 use lumiris_numbers::math::Rgb;
 
-/// Adds to `out` what the Lambertian parts of the vertices of some paths reflect to the viewer: `reflected`, where that
-/// is available. It may include direct light.
+/// Adds to `out` the light that the Lambertian lobes at the vertices reflect to the viewer. `reflected` returns this
+/// radiance, or `None` if the lookup misses. It includes direct light if `includes_direct` is true.
 pub(super) fn shade<'w>(
     found: &BatchVertices<'_, 'w>,
     includes_direct: bool,

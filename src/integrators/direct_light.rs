@@ -1,4 +1,5 @@
-//! The direct light of the vertices of paths, by the columns of `mc`, `mis` and `ocv` or by the stages of other estimators.
+//! Direct light at path vertices: in columns for `mc`, `mis` and `ocv --ocv pixels`, in stages for all other
+//! estimators.
 
 use super::path::{Outcome, PathTracer, Step};
 use super::vertices::VertexSearch;
@@ -9,7 +10,7 @@ use lumiris_numbers::math::{Rgb, Vec3};
 use std::time::Instant;
 
 impl PathTracer {
-    /// Adds the direct light of vertices.
+    /// Adds the direct light at vertices.
     pub(super) fn light(&mut self, step: &Step<'_>, vertices: &Vertices<'_>, fits: &mut Fits, out: &mut [PixelSample]) {
         match &step.techniques {
             Some(techniques) => self.light_columns(step, techniques, vertices, fits, out),
@@ -17,7 +18,7 @@ impl PathTracer {
         }
     }
 
-    /// Adds the direct light of vertices whose samples are all traced.
+    /// Adds the direct light by estimators that trace all their samples.
     fn light_columns(
         &mut self,
         step: &Step<'_>,
@@ -27,6 +28,8 @@ impl PathTracer {
         out: &mut [PixelSample],
     ) {
         let job = step.job;
+
+        // Callbacks: the weight that light paths leave to a light sample, and the sums of light groups
         let VertexSearch { active, layers, guide, recording, .. } = &mut self.search;
         let path = |row: usize| &active[vertices.path[row] as usize];
         let rest = guide.as_ref().map(|guide| {
@@ -43,6 +46,8 @@ impl PathTracer {
                 None => layers.add_infinite(&job.lights, path.sample, (p, wi), path.beta * contribution),
             }
         };
+
+        // Add β·L_d, and the control variates
         let mut sinks = Sinks {
             rest: rest.as_ref().map(|rest| rest as _),
             visible: if are_kept { Some(&mut visible) } else { None },
@@ -62,10 +67,10 @@ impl PathTracer {
         self.direct.stats.select += start.elapsed();
     }
 
-    /// Adds the direct light of vertices by the stages of an estimator that selects among its samples.
+    /// Adds the direct light by estimators that select among their samples.
     fn light_points(&mut self, step: &Step<'_>, vertices: &Vertices<'_>, fits: &mut Fits, out: &mut [PixelSample]) {
         let (job, active) = (step.job, &self.search.active);
-        // In the order of the paths: fits are sums over the points of a pixel
+        // Points in the order of the paths, since fits are sums over the points of a pixel
         let mut rows = vec![u32::MAX; active.len()];
         vertices.path.iter().zip(0..).for_each(|(&path, row)| rows[path as usize] = row);
         rows.retain(|&row| row != u32::MAX);
@@ -79,6 +84,7 @@ impl PathTracer {
         let points: Vec<ShadingPoint<'_>> = rows.iter().enumerate().map(point).collect();
         self.direct.estimate(job, &step.estimator, &points, fits, &mut self.radiance);
 
+        // Record segments and outcomes, if requested
         if let Some(r) = &mut self.search.recording {
             r.segments_at(step.vertex).push(self.direct.segments().clone());
         }
@@ -88,6 +94,8 @@ impl PathTracer {
                 Outcome { sample: path(point as usize).sample, unshadowed, contribution }
             }));
         }
+
+        // Add β·L_d, and the sums of light groups
         for (point, &radiance) in self.radiance.iter().enumerate() {
             out[path(point).sample as usize].radiance += path(point).beta * radiance;
         }

@@ -1,4 +1,4 @@
-//! Which features of scenes and settings exclude each other: [`TABLE`]. Whatever it does not list works together.
+//! Features of scenes and settings that exclude each other: [`TABLE`]. All other combinations are supported.
 
 use crate::direct::Estimator;
 use crate::lights::Light;
@@ -8,12 +8,12 @@ use crate::settings::{EstimatorKind, IntegratorKind, IntegratorSettings, Target}
 use std::fmt;
 use strum::VariantNames;
 
-/// Something that an image has by its settings or its scene.
+/// A feature of the settings or of the scene.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Feature {
-    /// Its integrator.
+    /// The integrator.
     Integrator(IntegratorKind),
-    /// Its estimator of direct light.
+    /// The estimator of direct light.
     Estimator(EstimatorKind),
     /// The target of `ris`.
     Target(Target),
@@ -21,35 +21,35 @@ pub enum Feature {
     Progressive,
     /// Fewer bounces than this.
     Fewer(u32),
-    /// Paths that are not continued by the only BSDF sample of `mis`.
+    /// Paths whose next segment is not the only BSDF sample of `mis`.
     OtherContinuation,
-    /// Layers by light groups.
+    /// Light-group layers.
     LightGroups,
     /// Light paths.
     LightPaths,
     /// Pixels that share paths.
     Sharing,
-    /// A share of the tiles; whether it is asked for, callers know.
+    /// A part of the image: some of its tiles. Callers decide if it is requested.
     TileShare,
-    /// A share of the samples of each pixel; whether it is asked for, callers know.
+    /// A part of the image: some of the samples of each pixel. Callers decide if it is requested.
     SampleShare,
     /// Participating media.
     Media,
     /// Media that emit.
     Glow,
-    /// Surfaces that rays may pass: bounds of media, and mixtures with `interface`.
+    /// Surfaces that shadow rays may pass: bounds of media, and mixtures with `interface`.
     Passable,
-    /// Surfaces that alpha cuts out at random.
+    /// Surfaces with stochastic alpha.
     Alpha,
-    /// Objects in motion.
+    /// Moving objects.
     MovingObjects,
-    /// A camera in motion.
+    /// A moving camera.
     MovingCamera,
-    /// Glass whose refraction depends on the wavelength.
+    /// Glass with dispersion.
     Dispersion,
     /// No area light.
     NoAreaLight,
-    /// A camera that does not know where it sees a point.
+    /// A camera that cannot project points onto the film.
     NoProjection,
     /// A pixel filter without extent.
     PointFilter,
@@ -57,18 +57,19 @@ pub enum Feature {
 
 use Feature as F;
 
-/// Features, what excludes each of them, and why: after the name of the integrator, estimator or target, where it is one.
+/// Excluded features, the features that exclude each of them, and the reason. If a feature is an integrator, estimator
+/// or target, its name precedes the reason in messages.
 pub type Row = (&'static [Feature], &'static [Feature], &'static str);
 
-/// All exclusions; the first one that holds is the one that is reported.
+/// All exclusions. The first one that applies is reported.
 pub const TABLE: &[Row] = &[
-    // The corrections of estimators are fitted to what is visible or not, which is no bit in a medium
+    // Corrections of estimators are fitted to binary visibility; transmittance in media is not binary
     (
         &[F::Media],
         &[CACHE, PHOTONS, OCV, OPTIMAL, CORRELATED],
         "does not render participating media, which this scene has",
     ),
-    // Samples are chosen by what is visible, as if nothing let light through
+    // Samples are selected by binary visibility
     (&[F::Media], &TRACED, "does not see through participating media, which this scene has"),
     (&[F::Passable], &TRACED, "does not see through mixtures with `interface`"),
     (&[F::LightGroups], &[CACHE, PHOTONS, OCV, OPTIMAL, CORRELATED, CONTROL], "does not tell lights apart"),
@@ -119,22 +120,22 @@ const CORRELATED: Feature = F::Estimator(EstimatorKind::Correlated);
 const CONTROL: Feature = F::Target(Target::VisibilityControl);
 const TRACED: [Feature; 2] = [F::Target(Target::Gv), F::Target(Target::Gvl)];
 
-/// Features that images are rendered without where the table excludes them: with their option, and what to say then.
+/// Features that are disabled if the table excludes them: feature, name of the option, and text of the message.
 pub const OPTIONAL: [(Feature, &str, &str); 3] = [
     (F::Sharing, "path-reuse", "pixels do not share paths"),
     (F::LightPaths, "light-paths", "there are no light paths"),
     (F::LightGroups, "light-groups", "light groups have no layers"),
 ];
 
-/// Features that cannot be left out: there is no image where the table excludes them.
+/// Features that cannot be disabled: if the table excludes one, the scene is not rendered.
 const NECESSARY: [Feature; 2] = [F::Media, F::Passable];
 
-/// A feature that another one excludes. Shown as the reason, which names what would do.
+/// A feature that another one excludes. `Display` shows the reason and names the alternatives.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub struct Conflict {
-    /// What is excluded.
+    /// The excluded feature.
     pub feature: Feature,
-    /// By what.
+    /// The feature that excludes it.
     pub by: Feature,
     why: &'static str,
 }
@@ -144,18 +145,18 @@ pub fn between(feature: Feature, by: Feature) -> Option<Conflict> {
     conflicts(feature).find(|conflict| conflict.by == by)
 }
 
-/// Why this image cannot have a feature by these settings; `None` if it can.
+/// The first conflict of a feature under these settings; `None` if it is supported.
 pub fn conflict(job: &RenderJob, settings: &IntegratorSettings, feature: Feature) -> Option<Conflict> {
     conflicts(feature).find(|conflict| conflict.by.is_in(job, settings))
 }
 
-/// Why there is no image of this scene by these settings; `None` if there is.
+/// The first conflict that prevents rendering this scene with these settings; `None` if it can be rendered.
 pub fn refusal(job: &RenderJob, settings: &IntegratorSettings) -> Option<Conflict> {
     let mut present = NECESSARY.into_iter().filter(|feature| feature.is_in(job, settings));
     present.find_map(|feature| conflict(job, settings, feature))
 }
 
-/// True if this image can have a feature.
+/// True if this image supports a feature.
 pub fn allows(job: &RenderJob, feature: Feature) -> bool {
     conflict(job, &job.settings().integrator, feature).is_none()
 }
@@ -166,9 +167,11 @@ fn conflicts(feature: Feature) -> impl Iterator<Item = Conflict> {
 }
 
 impl Feature {
-    /// True if settings ask for it, or the scene has it.
+    /// True if the settings request the feature, or the scene has it.
     pub fn is_wanted(self, job: &RenderJob, s: &IntegratorSettings) -> bool {
         let scene = &job.world.scene;
+
+        // The parts of an image are checked by callers, by `between`
         match self {
             F::Integrator(kind) => s.kind == kind,
             F::Estimator(kind) => s.estimator == kind,
@@ -195,13 +198,13 @@ impl Feature {
         }
     }
 
-    /// True if the image has it.
+    /// True if the feature is wanted and, if optional, not excluded.
     fn is_in(self, job: &RenderJob, s: &IntegratorSettings) -> bool {
         let is_optional = OPTIONAL.iter().any(|row| row.0 == self);
         self.is_wanted(job, s) && !(is_optional && conflict(job, s, self).is_some())
     }
 
-    /// What it is, its name, and all of its kind, for a choice of one setting.
+    /// For an integrator, estimator or target: the word for its kind, its name, and all features of the same kind.
     fn choice(self) -> Option<(&'static str, &'static str, Vec<Feature>)> {
         fn all<T: VariantNames + std::str::FromStr>(of: fn(T) -> Feature) -> Vec<Feature> {
             T::VARIANTS.iter().filter_map(|name| name.parse().ok()).map(of).collect()
@@ -225,7 +228,8 @@ impl fmt::Display for Conflict {
     }
 }
 
-/// True if the BSDF sample of each vertex beyond the first is the next segment of the path, which finds the emitters.
+/// True if the only BSDF sample of each vertex after the first is the next segment of the path, which hits the
+/// emitters.
 fn extends_by_sample(settings: &IntegratorSettings) -> bool {
     (1..settings.depth().saturating_sub(1)).all(|vertex| match Estimator::at_vertex(settings, vertex) {
         Estimator::Mis(mis) => mis.samples >= 2 && mis.has_one_bsdf_sample(mis.samples),

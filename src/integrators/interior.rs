@@ -1,15 +1,17 @@
-//! Walks through the interiors of materials: from the surface where a path enters to that where it leaves.
+//! Random walks through the interiors of materials, from the entry point of a path to its exit point.
 //!
-//! A walk is a part of the way from one vertex to the next. It scatters by the phase function and is reflected inwards by the
-//! boundary any number of times; none of this is a vertex, so it neither counts as a bounce nor samples lights, which the
-//! boundary would hide anyway. What emits in an interior is found by chance, with its full weight.
+//! A walk belongs to the segment between two vertices. It scatters by the phase function, and the boundary reflects it
+//! inwards, any number of times. None of these events is a vertex: they do not count as bounces, and light is not
+//! sampled at them, since the boundary would hide it. Emission inside an interior is hit by chance, with its full
+//! weight.
 //!
-//! At the boundary a walk either stays, which only the reflection is responsible for, or leaves at a vertex that only
-//! refracts ([`Bsdf::Exit`]), there being light samples where the boundary is rough. The choice has the probability F of a
-//! reflection at a smooth boundary, and both ways are divided by theirs.
+//! At the boundary a walk either stays, by reflection only, or leaves at a vertex that only refracts ([`Bsdf::Exit`]).
+//! If the boundary is rough, light is sampled at that vertex. The walk stays with probability F, the reflectance of a
+//! smooth boundary, and either case is divided by its probability.
 //!
-//! In a half-space of albedo 1, walks have more than n events with a probability ~ n^(−1/2). A roulette that lets them go on
-//! from event n to n + 1 with √(1 − 1/n) balances their costs and their weights: the mean of each grows like log n.
+//! In a half-space of albedo 1, a walk has more than n events with a probability ~ n^(−1/2). Russian roulette that
+//! continues from event n to n + 1 with probability √(1 − 1/n) balances cost and weight: the means of both grow like
+//! log n.
 
 use super::segment::{BsdfTechnique, PathState, domain};
 use super::vertices::{Flown, Stage, VertexSearch};
@@ -22,22 +24,22 @@ use crate::media::{End, Flight, Glimpse, Medium, Numbers, Segment, Sides};
 use crate::scene::{RenderJob, SurfaceInteraction};
 use lumiris_numbers::math::{Ray, Rgb, Vec3};
 
-/// Events before roulette by throughput.
+/// Number of events before roulette by throughput.
 const FREE_EVENTS: u32 = 8;
-/// Events before roulette by their number.
+/// Number of events before roulette by event count.
 const MANY_EVENTS: u32 = 1024;
-/// Events at most: only walks that cannot leave have so many.
+/// Maximum number of events, reached only by walks that cannot leave.
 const MAX_EVENTS: u32 = 1 << 22;
-/// Least probability of either way at a rough boundary, where F is no more than a guess.
+/// Minimum probability of either case at a rough boundary, where F is only an approximation.
 const LEAST_CHANCE: f32 = 0.1;
 
 impl VertexSearch {
-    /// True if the path is in an interior.
+    /// True if the path is in the interior of a material.
     pub(super) fn walks(&self, job: &RenderJob, path: &PathState) -> bool {
         path.passed < MAX_EVENTS && path.medium.is_some_and(|id| job.world.scene.media.media[id as usize].is_interior())
     }
 
-    /// Lets a path fly through an interior towards what its ray meets.
+    /// Samples the free flight of a path through an interior, up to the hit of its ray.
     pub(super) fn walk(
         &mut self,
         at: &Stage<'_, '_>,
@@ -58,7 +60,7 @@ impl VertexSearch {
             }
             End::Scattered { t, weight } => (t, weight),
         };
-        // There is no vertex beyond the last for it to arrive at
+        // After the last vertex, the walk cannot reach another one
         if at.vertex < at.depth
             && path.passed < MAX_EVENTS
             && let Some(next) = self.scatter_inside(at, path, (d, t, weight), medium)
@@ -69,7 +71,8 @@ impl VertexSearch {
         Flown::Ended
     }
 
-    /// A path that is scattered in an interior, after the distance `t` in the direction `d` and with the factor `weight`.
+    /// Scatters a path in an interior, after the distance `t` in the direction `d` and with the throughput factor
+    /// `weight`.
     fn scatter_inside(
         &self,
         at: &Stage<'_, '_>,
@@ -84,8 +87,8 @@ impl VertexSearch {
         Some(go_on(next, path.ray.o + d * t, sample.wi, beta))
     }
 
-    /// The BSDF and the throughput of a path at a surface. Where a path in an interior meets the boundary it may be reflected:
-    /// then it is kept for the next trace, and the answer is `None`.
+    /// The BSDF and the throughput of a path at a surface. Returns `None` if the boundary reflects a path back into its
+    /// interior; the path is then queued for the next trace.
     pub(super) fn leave<'w>(
         &mut self,
         at: &Stage<'_, '_>,
@@ -98,12 +101,16 @@ impl VertexSearch {
         if !is_boundary || !self.walks(at.job, path) {
             return Some((bsdf, beta));
         }
+
+        // Leave: only refraction remains for the vertex
         let wo = bsdf.frame.to_local(interaction.wo);
         let p_stay = chance_to_stay(&interface, wo);
         let [u_stay, u0, u1] = self.walk_numbers(at, path);
         if u_stay >= p_stay {
             return Some((SurfaceBsdf { bsdf: Bsdf::Exit(interface), ..bsdf }, beta / (1.0 - p_stay)));
         }
+
+        // Stay: reflect the path back into the interior
         let s = interface.sample_select(wo, 0.0, [u0, u1], Transport::Radiance, Select::Reflection)?;
         let beta = beta * s.f * (s.wi.z.abs() / (s.pdf * p_stay));
         if beta.is_black() || !beta.is_finite() {
@@ -121,28 +128,28 @@ impl VertexSearch {
         None
     }
 
-    /// Random numbers of what happens at the end of a flight.
+    /// Random numbers of the event at the end of a flight.
     fn walk_numbers(&self, at: &Stage<'_, '_>, path: &PathState) -> [f32; 3] {
         let stream = at.samples[path.sample as usize].stream;
         stream.domain(domain::WALK + at.vertex).domain(path.passed).draw::<3>()
     }
 }
 
-/// The path from `o` on in the direction `wi`. No light is sampled at `o`, so the segment has the full weight of what it
-/// finds.
+/// Continues a path from `o` in the direction `wi`. No light is sampled at `o`, so emission that the segment hits has
+/// the weight 1.
 fn go_on(path: PathState, o: Vec3, wi: Vec3, beta: Rgb) -> PathState {
     let technique = BsdfTechnique { row: BsdfTechnique::NO_ROW, pdf: None, survivor: None };
     let ray = Ray { o, d: wi, ..path.ray };
     PathState { ray, beta, passed: path.passed + 1, technique: Some(technique), ..path }
 }
 
-/// Probability that a walk from `wo`, in the shading frame, is reflected by the boundary.
+/// Probability that the boundary reflects a walk back; `wo` is in the shading frame.
 fn chance_to_stay(interface: &Dielectric, wo: Vec3) -> f32 {
     let fresnel = fr_dielectric(wo.z, interface.eta);
     if interface.is_specular() { fresnel } else { fresnel.clamp(LEAST_CHANCE, 1.0 - LEAST_CHANCE) }
 }
 
-/// Russian roulette at an event of a walk: the throughput if it goes on.
+/// Russian roulette at an event of a walk. Returns the throughput of a path that survives.
 fn survive(beta: Rgb, path: &PathState, u: f32) -> Option<Rgb> {
     if beta.is_black() || !beta.is_finite() {
         return None;

@@ -1,7 +1,8 @@
-//! What the samples of a batch find of each light group.
+//! Light-group layers: per-group sums of the radiance of the samples of a batch.
 //!
-//! Every contribution to a sample is of one light: what a path meets, and what a light sample or a BSDF sample brings. Only
-//! directions that meet nothing are of all infinite lights together; their light is divided by what each of them sends.
+//! Every contribution to a sample comes from one light: emission hit by a path, a light sample, or a BSDF sample. The
+//! exception is a ray that escapes, which receives the sum of all infinite lights; this radiance is divided among them
+//! in proportion to their emission.
 
 use super::features::{self, Feature};
 use crate::accel::Hit;
@@ -9,34 +10,34 @@ use crate::lights::{LightId, LightSampling};
 use crate::scene::RenderJob;
 use lumiris_numbers::math::{Rgb, Vec3};
 
-/// Names of the layers by lights that a rendering has.
+/// Names of the light-group layers of the image.
 pub fn names(job: &RenderJob) -> &[String] {
     let is_kept = job.settings().integrator.light_groups && features::allows(job, Feature::LightGroups);
     if is_kept { job.lights.layers.names() } else { &[] }
 }
 
-/// Number of these layers.
+/// Number of light-group layers of the image.
 pub fn count(job: &RenderJob) -> usize {
     names(job).len()
 }
 
-/// The light of each layer that the samples of a batch find.
+/// Per-group sums of the samples of a batch.
 #[derive(Debug, Default)]
 pub(super) struct LayerSums {
-    /// Number of layers; 0: none are kept.
+    /// Number of layers; 0 if disabled.
     pub(super) layers: usize,
     /// By sample, then by layer.
     sums: Vec<Rgb>,
 }
 
 impl LayerSums {
-    /// Begins a batch of samples.
+    /// Begins a batch of `samples` camera samples.
     pub(super) fn begin(&mut self, samples: usize) {
         self.sums.clear();
         self.sums.resize(samples * self.layers, Rgb::BLACK);
     }
 
-    /// True if there are any.
+    /// True if layers are enabled.
     #[inline]
     pub(super) fn are_kept(&self) -> bool {
         self.layers > 0
@@ -47,7 +48,7 @@ impl LayerSums {
         &mut self.sums
     }
 
-    /// Adds what a sample has of a light at the point `p`. `wi` is the direction to it, unit.
+    /// Adds the contribution `value` of a light to a sample, at the point `p`. `wi` is the unit direction to the light.
     #[inline]
     pub(super) fn add(
         &mut self,
@@ -65,7 +66,7 @@ impl LayerSums {
         self.sums[sample as usize * self.layers + lights.layers.of(light)] += value;
     }
 
-    /// Adds what a sample has of the emission of a surface.
+    /// Adds surface emission that a path has hit.
     #[inline]
     pub(super) fn add_emission(&mut self, job: &RenderJob, sample: u32, hit: &Hit, value: Rgb) {
         if !self.are_kept() || value.is_black() {
@@ -76,7 +77,7 @@ impl LayerSums {
         }
     }
 
-    /// Adds what a sample has of all infinite lights together, at `p` from the direction `wi`.
+    /// Adds the sum of all infinite lights at `p` from the direction `wi`, divided among their layers.
     #[inline]
     pub(super) fn add_infinite(&mut self, lights: &LightSampling, sample: u32, (p, wi): (Vec3, Vec3), value: Rgb) {
         if !self.are_kept() {

@@ -1,12 +1,12 @@
 //! Light transport: from camera rays to radiance.
 //!
-//! An [`Integrator`] is what all threads share while an image is rendered: it prepares what samples need, makes a
-//! [`Tracer`] for each thread, and reports. Reading order: [`path`] is the loop over vertices, `segment` the state of a path
-//! between two of them, `vertices` traces to the next ones, `interior` walks through materials on the way there,
-//! `direct_light` adds L_d, and `scatter` samples the next segments.
-//! Pixels that are neighbours may share paths ([`reuse`]; which ones: [`cells`]), and light paths bring caustics
-//! ([`light_paths`]). [`features`] is the table of what excludes what. [`irradiance_cache`] and [`photon_map`] replace the
-//! light that Lambertian parts reflect (`diffuse`).
+//! All threads share one [`Integrator`]. It prepares the data of the samples, makes a [`Tracer`] for each thread, and
+//! reports statistics. Reading order: [`path`] is the loop over vertices, `segment` the state of a path between two
+//! vertices, `vertices` traces to the next vertices, `interior` walks through the interiors of materials,
+//! `direct_light` adds L_d, and `scatter` samples the next segments. Neighbouring pixels may share paths ([`reuse`],
+//! [`cells`]), and light paths add caustics ([`light_paths`]). [`features`] lists the features that exclude each other.
+//! [`irradiance_cache`] and [`photon_map`] replace the light reflected by Lambertian lobes (`diffuse`).
+//! [`camera_samples`] makes camera rays, and [`light_layers`] sums light by light group.
 
 pub mod camera_samples;
 pub mod cells;
@@ -37,48 +37,49 @@ use crate::settings::IntegratorKind;
 use lumiris_numbers::math::Rgb;
 use std::sync::atomic::AtomicBool;
 
-/// A way to render an image: what all threads share.
+/// A light transport algorithm; shared by all threads.
 pub trait Integrator: Sync {
-    /// Prepares the samples from index `first` on. The answer is how many samples per pixel that serves; 0 if it was told
-    /// to stop, and the samples so far are an image.
+    /// Prepares the samples from index `first` on. Returns the number of samples per pixel that the preparation serves.
+    /// Returns 0 if it was told to stop; the samples so far are then an image.
     fn prepare(&mut self, _first: u32) -> Result<u32, PhotonError> {
         Ok(u32::MAX)
     }
 
-    /// What one thread traces samples with, using what is prepared.
+    /// A tracer for one thread, which uses the prepared data.
     fn tracer(&self, features: FeatureSet) -> Box<dyn Tracer + '_>;
 
-    /// True if pixels share random numbers, so that their variance cannot be told from a few of them.
+    /// True if pixels share random numbers. The variance of a pixel then cannot be estimated from its few samples.
     fn shares_noise(&self) -> bool {
         false
     }
 
-    /// Statistics of the image, with those of all tracers.
+    /// Statistics of the image, including `paths`, the sum over all tracers.
     fn statistics(&self, paths: PathStats) -> Statistics;
 }
 
-/// What one thread traces samples with: buffers and counts.
+/// Traces samples in one thread; holds its buffers and counts.
 pub trait Tracer: Send {
-    /// Estimates the radiance of each camera sample; `out[i]` belongs to `samples[i]`. `fits` are those of the samples'
-    /// pixels.
+    /// Estimates the radiance of each camera sample; `out[i]` belongs to `samples[i]`. `fits` belong to the pixels of
+    /// the samples.
     fn trace(&mut self, job: &RenderJob, samples: &[CameraSample], fits: &mut Fits, out: &mut Vec<PixelSample>);
 
-    /// Keeps the light of so many layers by lights from now on, if it can; see [`light_layers`].
+    /// Sums the light of `count` light-group layers from now on, if supported; see [`light_layers`].
     fn keep_light_layers(&mut self, _count: usize) {}
 
-    /// The light of the layers of the last batch: by sample, then by layer; nothing if none are kept.
+    /// Light-group layers of the last batch: by sample, then by layer. Empty if layers are disabled.
     fn light_layers(&mut self) -> &mut [Rgb] {
         &mut []
     }
 
-    /// The counts and times since the last call.
+    /// Counts and times since the last call.
     fn take_stats(&mut self) -> PathStats;
 }
 
 /// Camera samples by pixel and index.
 pub type Cameras<'a> = &'a (dyn Fn([u32; 2], u32) -> CameraSample + Sync);
 
-/// The integrator that the settings ask for. It looks at the scene with `cameras`; `stop` ends its preparations early.
+/// The integrator of the settings. `cameras` gives the camera samples that preparations trace; `stop` ends preparations
+/// early.
 pub fn integrator<'a>(
     job: &'a RenderJob,
     cameras: Cameras<'_>,
@@ -102,6 +103,6 @@ pub struct Statistics {
     pub photons: Option<MapStats>,
     /// Light paths, if there are any.
     pub light: Option<LightPathStats>,
-    /// Pixels that asked for the records of the cache, by their coordinates: one entry for each record.
+    /// The pixel that requested each record of the irradiance cache.
     pub records: Vec<[u32; 2]>,
 }

@@ -1,15 +1,15 @@
-//! Path tracing with next-event estimation, a batch of paths at a time; `direct` is the case of one bounce.
+//! Path tracing with next-event estimation, a batch of paths at a time. The integrator `direct` is the case of one
+//! bounce.
 //!
-//! The radiance along a camera ray is L_e(x₁) + Σ_k β_k L_direct(x_k), where β_k = Π f_s |cos θ|/p is the throughput up
-//! to the k-th vertex and L_direct is what [`DirectStage`] estimates there, from all light that reaches
-//! the vertex straight from an emitter. So emission is added at the camera ray's hit, and never twice.
+//! The radiance along a camera ray is L_e(x₁) + Σ_k β_k L_direct(x_k). β_k = Π f_s |cos θ|/p is the throughput up to
+//! the k-th vertex. L_direct, estimated by [`DirectStage`], is the light that the vertex reflects and that comes
+//! straight from emitters. So emission is added at the hit of the camera ray, and never twice.
 //!
-//! Where `mis` has one BSDF sample and the path goes on, the sample's direction is that of the next segment, which finds
-//! the emitter itself: what is missing in the estimate at x_k, the emission that x_{k+1} sends back weighted against
-//! light sampling at x_k, is added there (`BsdfTechnique`). One ray instead of three, and one BSDF sample instead of
-//! two.
+//! If `mis` has one BSDF sample and the path continues, this sample is the next segment of the path, which hits the
+//! emitter itself. The estimate at x_k then lacks the emission of x_{k+1}, MIS-weighted against light sampling at x_k.
+//! It is added at x_{k+1} (`BsdfTechnique`). This takes one ray instead of three, and one BSDF sample instead of two.
 //!
-//! All integrators follow their paths through the one loop here; [`AtVertices`] is what they do differently.
+//! All integrators use this path loop. [`AtVertices`] is the hook for their own work at vertices.
 
 use super::cells::Groups;
 use super::light_paths::{LightImage, LightPilot};
@@ -31,16 +31,16 @@ use lumiris_numbers::samplers::SampleStream;
 use std::sync::Arc;
 use std::time::Instant;
 
-/// Path tracing: nothing is prepared, but light paths if there are any.
+/// Path tracing. Only light paths, if enabled, are prepared.
 pub struct PathIntegrator<'a> {
     job: &'a RenderJob,
-    /// Which samples share paths.
+    /// Grouping of the samples for path sharing.
     groups: Groups,
     light: Option<LightImage>,
 }
 
 impl<'a> PathIntegrator<'a> {
-    /// Of an image that is rendered in whole cells.
+    /// The integrator of an image that is rendered in whole cells.
     pub(super) fn new(job: &'a RenderJob) -> Self {
         let groups = if reuse::edge(job) > 1 { Groups::Cells } else { Groups::None };
         PathIntegrator { job, groups, light: LightImage::new(job) }
@@ -64,7 +64,7 @@ impl Integrator for PathIntegrator<'_> {
     }
 }
 
-/// Traces camera paths, and adds what light paths have found.
+/// Traces camera paths, and adds the contributions of light paths.
 struct WithLightPaths<'a> {
     paths: PathTracer,
     light: &'a LightImage,
@@ -83,13 +83,13 @@ impl Tracer for WithLightPaths<'_> {
 
 /// The vertices of a batch of paths.
 pub(super) struct BatchVertices<'a, 'w> {
-    /// Their index along the paths, from 0.
+    /// Index of the vertices along the paths, from 0.
     pub(super) vertex: u32,
     pub(super) paths: &'a [PathState],
     pub(super) vertices: &'a Vertices<'w>,
 }
 
-/// A vertex by itself.
+/// A single vertex.
 pub(super) struct PathVertex<'a, 'w> {
     pub(super) path: &'a PathState,
     pub(super) point: ShadingPoint<'w>,
@@ -109,16 +109,16 @@ impl<'a, 'w> BatchVertices<'a, 'w> {
     }
 }
 
-/// What an integrator does at vertices where it is not path tracing: it adds to the samples what is known of the light
-/// that is reflected there, and says of each vertex what remains to be done. Called once per batch.
+/// The integrator's own work at vertices, called once per batch: it adds the part of the reflected light that it
+/// computes itself to the samples, and returns the remaining work for each vertex.
 pub(super) type AtVertices<'s> = dyn for<'w> FnMut(&BatchVertices<'_, 'w>, &mut [PixelSample]) -> Vec<Shading<'w>> + 's;
 
-/// What remains to be done at a vertex; by default nothing.
+/// Remaining work at a vertex; by default none.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Shading<'w> {
-    /// BSDF for which direct light is estimated.
+    /// BSDF of the direct light.
     pub(super) lit: Option<SurfaceBsdf<'w>>,
-    /// BSDF by which the path continues.
+    /// BSDF of the next segment.
     pub(super) next: Option<SurfaceBsdf<'w>>,
 }
 
@@ -133,8 +133,8 @@ pub struct Outcome {
     pub contribution: Rgb,
 }
 
-/// Paths that are traced together: enough that stages run long, few enough that their data, about 1 kB each, stays in the
-/// cache of a core.
+/// Paths per batch: large enough for long stages, small enough that their data, about 1 kB each, stay in the cache of a
+/// core.
 pub const BATCH_PATHS: usize = 1024;
 
 /// Traces paths; holds the buffers of one worker.
@@ -146,19 +146,19 @@ pub struct PathTracer {
     pub(super) radiance: Vec<Rgb>,
     pub(super) direct: DirectStage,
     pub(super) columns: ColumnStage,
-    /// Memory of the vertices of earlier batches.
+    /// Vertex columns of earlier batches, kept for their memory.
     spare: [Vertices<'static>; 4],
-    /// Paths that samples of a batch share.
+    /// Path sharing within a batch.
     reuse: Reuse,
-    /// The vertex whose estimator all have, if not each its own.
+    /// If set, all vertices use the estimator of this vertex index.
     pub(super) estimator_of: Option<u32>,
-    /// Paths go on by specular lobes only.
+    /// Paths continue by specular lobes only.
     pub(super) only_specular: bool,
     /// Samples of direct light at first vertices, if requested.
     pub outcomes: Option<Vec<Outcome>>,
 }
 
-/// What the steps at the vertices of a batch read.
+/// Common input of the steps at the vertices of a batch.
 pub(super) struct Step<'s> {
     pub(super) job: &'s RenderJob,
     pub(super) settings: &'s IntegratorSettings,
@@ -166,27 +166,27 @@ pub(super) struct Step<'s> {
     /// Index along the paths.
     pub(super) vertex: u32,
     pub(super) estimator: Estimator,
-    /// The samples of direct light, if all of them are traced.
+    /// The direct-light techniques, if the estimator traces all its samples.
     pub(super) techniques: Option<Techniques>,
-    /// Paths go on from the vertices.
+    /// True if paths continue from the vertices.
     pub(super) continues: bool,
 }
 
 impl PathTracer {
-    /// With these features of first surfaces.
+    /// A tracer that records these features of first surfaces.
     pub fn new(features: FeatureSet) -> Self {
         let mut tracer = PathTracer::default();
         tracer.search.features = features;
         tracer
     }
 
-    /// The same, where these samples of a batch share paths if the settings say so.
+    /// The same, with path sharing if the settings enable it.
     pub fn sharing(groups: Groups, features: FeatureSet) -> Self {
         PathTracer { reuse: Reuse::of(groups), ..PathTracer::new(features) }
     }
 
-    /// Leaves to light paths what these find, as many for each camera sample of the image as given, from now on: what remains is
-    /// less than the radiance. `None`: nothing.
+    /// Leaves to light paths their share of the light from now on. `light` gives the pilot and the number of light
+    /// paths per camera sample. The estimates are then less than the radiance. `None`: nothing is left to light paths.
     pub fn leave(&mut self, job: &RenderJob, light: Option<(&LightPilot, f64)>) {
         self.search.guide = light.map(|(pilot, per_sample)| {
             let paths = per_sample * job.world.scene.film.bounds.area() as f64;
@@ -199,13 +199,13 @@ impl PathTracer {
         self.search.recording = Some(Recording::default());
     }
 
-    /// The rays that were recorded; no more are.
+    /// The recorded rays. Ends recording.
     pub fn take_recording(&mut self) -> Recording {
         self.search.recording.take().unwrap_or_default()
     }
 
-    /// Estimates the radiance of each camera sample; `out[i]` belongs to `samples[i]`. `fits` are those of the samples'
-    /// pixels; they may be none.
+    /// Estimates the radiance of each camera sample; `out[i]` belongs to `samples[i]`. `fits` belong to the pixels of
+    /// the samples, and may be empty.
     pub fn trace(
         &mut self,
         job: &RenderJob,
@@ -218,8 +218,7 @@ impl PathTracer {
         self.follow((job, settings), None, samples, fits, out);
     }
 
-    /// Follows the paths that were started, vertex by vertex: L = Σ β (L_e·w + L_d). `own` is the integrator's own work at
-    /// vertices.
+    /// The path loop, vertex by vertex: L = Σ β (L_e·w + L_d). `own` is the integrator's own work at vertices.
     pub(super) fn follow(
         &mut self,
         (job, settings): (&RenderJob, &IntegratorSettings),
@@ -231,7 +230,7 @@ impl PathTracer {
         let [mut vertices, mut left, mut lit, mut next] = std::mem::take(&mut self.spare).map(Vertices::emptied);
         let mut drawn = None;
         let depth = settings.depth();
-        // Paths of an integrator with work of its own do not carry all light, so neighbours cannot share them
+        // Paths of an integrator with its own work do not carry all light, so they cannot be shared
         let may_share = own.is_none() && self.outcomes.is_none();
         self.reuse.begin(settings.path_reuse.filter(|_| may_share), samples.len());
         fits.begin_batch(samples.len());
@@ -240,12 +239,12 @@ impl PathTracer {
                 break;
             }
 
-            // Trace, add β·L_e·w of the emitters that are hit, and arrive at the vertices
+            // Trace to the vertices, and add β·L_e·w of the emitters that are hit
             let from = LastVertices { vertices: &left, techniques: drawn };
             self.search.find(Stage { job, vertex, depth, samples, left: from, out, vertices: &mut vertices });
             let step = self.step((job, settings), vertex, samples, own.is_some());
 
-            // Let the integrator answer for its part of the light, and neighbours share their paths
+            // The integrator's own work, and path sharing
             let (lit, next) = match &mut own {
                 Some(own) => {
                     self.leave_to_integrator(*own, (job, vertex), &vertices, [&mut lit, &mut next], out);
@@ -269,7 +268,7 @@ impl PathTracer {
         self.spare = [vertices, left, lit, next].map(Vertices::emptied);
     }
 
-    /// How light is sampled at vertices of this index, and how paths go on.
+    /// The direct-light estimator at vertices of this index, and the continuation of paths.
     fn step<'s>(
         &self,
         (job, settings): (&'s RenderJob, &'s IntegratorSettings),
@@ -278,16 +277,16 @@ impl PathTracer {
         has_own: bool,
     ) -> Step<'s> {
         let estimator = Estimator::at_vertex(settings, self.estimator_of.unwrap_or(vertex));
-        // Light samples do not find all emission of media: that beyond the last vertex takes another segment
+        // Light samples do not cover all emission of media: beyond the last vertex it takes another segment
         let beyond_last = job.world.scene.media.is_emissive() && vertex < settings.depth();
         let continues = vertex + 1 < settings.depth() || beyond_last;
-        // Outcomes are those of the stages
+        // Only the stages provide outcomes
         let techniques = Techniques::of(&estimator, continues && !has_own).filter(|_| self.outcomes.is_none());
         Step { job, settings, samples, vertex, estimator, techniques, continues }
     }
 
-    /// Lets an integrator add the light that it knows. `rest` become the vertices that are lit, and those from which paths
-    /// go on.
+    /// Calls the integrator's own work. `rest` becomes the vertices at which direct light is estimated, and the
+    /// vertices from which paths continue.
     fn leave_to_integrator<'w>(
         &self,
         own: &mut AtVertices<'_>,
@@ -304,7 +303,7 @@ impl PathTracer {
         next.select(vertices, &job.lights, |i| shadings[i].next);
     }
 
-    /// Makes the next segments of the paths that go on from vertices.
+    /// Samples the next segments of paths.
     fn scatter(&mut self, step: &Step<'_>, vertices: &Vertices<'_>) {
         let start = Instant::now();
         self.next.clear();
@@ -317,7 +316,7 @@ impl PathTracer {
         self.search.stats.shade_time += start.elapsed();
     }
 
-    /// Adds the light that neighbours share.
+    /// Adds the light of shared paths.
     fn resolve_shared(&mut self, job: &RenderJob, samples: &[CameraSample], out: &mut [PixelSample]) {
         let Some(reuse) = self.reuse.active() else { return };
         let start = Instant::now();
@@ -325,7 +324,7 @@ impl PathTracer {
         self.direct.stats.t2 += start.elapsed();
     }
 
-    /// Lets the paths at Lambertian vertices be shared.
+    /// Registers the Lambertian vertices for path sharing.
     fn share(&mut self, vertex: u32, vertices: &Vertices<'_>, out: &mut [PixelSample]) {
         let Some(reuse) = self.reuse.active() else { return };
         let start = Instant::now();

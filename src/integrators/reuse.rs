@@ -1,21 +1,22 @@
-//! Paths that neighbouring pixels share [Bekaert et al. 2002].
+//! Path sharing between neighbouring pixels [Bekaert et al. 2002].
 //!
-//! Let x_i be the first Lambertian vertices of some paths, and y_j the vertices after them, Lambertian as well. L(y_j), the
-//! radiance that is reflected at y_j, is the same in all directions to one side. So what path j found from there on serves
-//! every x_i that sees y_j. Each x_i has drawn one direction by the cosine, which at y is the density
-//! g_i(y) = cos θ_i |cos θ_y|/(π ‖y − x_i‖²) per unit area, where y is visible. By the balance heuristic over all of them,
-//! the indirect light of x_i, which reflects ρ_i, is
+//! Let x_i be the first Lambertian vertices of some paths, and y_j the next vertices of these paths, Lambertian as
+//! well. L(y_j), the radiance reflected at y_j, is the same in all directions of one side. So the part of path j after
+//! y_j contributes to every x_i that is visible from y_j. Each x_i has sampled one direction in proportion to the
+//! cosine. Its density at y is g_i(y) = cos θ_i |cos θ_y|/(π ‖y − x_i‖²) per unit area, where y is visible. By the
+//! balance heuristic over all x_i, the indirect light of x_i with reflectance ρ_i is
 //!
 //! ρ_i Σ_j L(y_j) g_i(y_j) V_ij / Σ_k g_k(y_j) V_kj,
 //!
-//! where V is found by shadow segments. No path gets a greater weight than it had by itself, and the estimate is unbiased:
-//! whether an x_i takes part does not depend on the direction that it drew, and light from surfaces that are not
-//! Lambertian, beyond others that do not scatter, or of emitters, remains with its own path.
+//! where V is traced by shadow segments. No path gets a greater weight than without sharing. The estimate is unbiased,
+//! since the participation of x_i does not depend on its sampled direction. Light from non-Lambertian surfaces, from
+//! beyond non-scattering surfaces, and of emitters is not shared.
 //!
-//! The samples of one turn in a block of pixels are a group. Blocks depend on the turn, so that the noise of two pixels is never
-//! the same for all samples, and are within [cells](super::cells), which are always rendered together. Where pixels have
-//! different numbers of samples, those of one turn are of the same part of the image
-//! ([`crate::scene::PixelSamples::turn`]); the numbers are independent of the samples, and so is who is in a group.
+//! The samples of one step ([`crate::scene::PixelSamples::turn`]) in a block of pixels are a group. Blocks depend on
+//! the step, so that the noise of two pixels is never the same for all samples. Blocks are within
+//! [cells](super::cells), which are always rendered together. If sample counts vary between pixels, the samples of one
+//! step belong to the same part of the image. The counts are independent of the samples, and so is the membership of
+//! groups.
 
 use super::cells::Groups;
 use super::features::{self, Feature};
@@ -31,16 +32,16 @@ use lumiris_lanes::vertex::Ends;
 use lumiris_numbers::math::ray::SEGMENT_END;
 use lumiris_numbers::math::{Rgb, Vec3};
 
-/// Second vertices that are connected together.
+/// Number of second vertices that are connected together.
 const TOGETHER: usize = 16;
 
-/// The edge of the blocks of pixels that share paths; 1 if none do.
+/// Edge of the blocks of pixels that share paths; 1 if paths are not shared.
 pub fn edge(job: &RenderJob) -> u32 {
     if features::allows(job, Feature::Sharing) { job.settings().integrator.path_reuse.unwrap_or(1) } else { 1 }
 }
 
-/// A Lambertian vertex: its point, the bound of its rounding error, and the geometric and the shading normal on the side
-/// of the viewer.
+/// A Lambertian vertex: point, bound of its rounding error, and geometric and shading normals on the side of the
+/// viewer.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Place {
     pub(super) p: Vec3,
@@ -50,7 +51,8 @@ pub(super) struct Place {
 }
 
 impl Place {
-    /// By a point with the bound of its error, the geometric and the shading normal, and the direction to the viewer.
+    /// A vertex given by its point with the error bound, the geometric and the shading normal, and the direction to the
+    /// viewer.
     #[inline]
     pub(super) fn new((p, p_error): (Vec3, Vec3), (n, ns): (Vec3, Vec3), wo: Vec3) -> Self {
         let facing = |n: Vec3| if n.dot(wo) < 0.0 { -n } else { n };
@@ -68,11 +70,11 @@ struct First {
     beta: Rgb,
 }
 
-/// The vertex after it, from which on what the path finds is shared.
+/// The vertex after it. The light beyond is shared.
 #[derive(Clone, Copy, Debug)]
 struct Second {
     at: Place,
-    /// What the sample had found before.
+    /// Radiance of the sample up to this vertex.
     before: Rgb,
 }
 
@@ -86,38 +88,38 @@ struct Member {
     beta: Rgb,
 }
 
-/// A second vertex, and the first vertices of others that may see it.
+/// A second vertex, and the first vertices of other members that may be visible from it.
 #[derive(Clone, Copy, Debug)]
 struct Shared {
-    /// The member whose path it is of.
+    /// The member that owns the path.
     member: u32,
     /// g of that member.
     own: f32,
-    /// Where the shares of others end.
+    /// End of its entries in [`Shares::to`].
     end: usize,
 }
 
-/// What the paths of a batch share.
+/// Shared contributions of a batch.
 #[derive(Debug, Default)]
 struct Shares {
-    /// Those of one group after another.
+    /// Group by group.
     members: Vec<Member>,
     shared: Vec<Shared>,
-    /// The members that may get something, those of one second vertex after another.
+    /// The receiving members, second vertex by second vertex.
     to: Vec<u32>,
-    /// g of these, or 0 where nothing gets through.
+    /// g of the receiving members; 0 if occluded.
     g: Column,
-    /// The segments between.
+    /// The shadow segments.
     rays: RayBatch,
-    /// What the members get.
+    /// Sum of the shared radiance per member.
     sums: Vec<Rgb>,
 }
 
-/// The paths of a batch that are shared.
+/// Path sharing within a batch.
 #[derive(Debug, Default)]
 pub(super) struct Reuse {
     groups: Groups,
-    /// Edge of the blocks; 1 or 0 if the batch shares nothing.
+    /// Edge of the blocks; 1 or 0 if nothing is shared.
     edge: u32,
     /// Group and index of each sample, sorted: the index in the lower 32 bits.
     order: Vec<u128>,
@@ -131,23 +133,23 @@ pub(super) struct Reuse {
     tails: Vec<Rgb>,
 }
 
-/// The vertices of a group, and what lies between them.
+/// The vertices of a group, and the segments between them.
 #[derive(Debug, Default)]
 struct Group {
-    /// The first one of its members.
+    /// Index of its first member.
     begin: usize,
     first: Places,
-    /// Members whose second vertices were found, up to [`TOGETHER`].
+    /// Members with second vertices, up to [`TOGETHER`].
     found: Vec<u32>,
     second: Places,
     g: Column,
     o: Columns3,
     d: Columns3,
-    /// Which first vertices have segments to a second vertex that count.
+    /// First vertices with a non-zero g for a second vertex.
     kept: Vec<u32>,
 }
 
-/// Places in columns.
+/// Vertices in columns.
 #[derive(Debug, Default)]
 struct Places {
     p: Columns3,
@@ -161,7 +163,7 @@ impl Reuse {
         Reuse { groups, ..Reuse::default() }
     }
 
-    /// Begins a batch of so many samples, which share paths in blocks of the given edge, or do not.
+    /// Begins a batch of `count` samples, which share paths in blocks of the given edge; `None`: nothing is shared.
     pub(super) fn begin(&mut self, edge: Option<u32>, count: usize) {
         self.edge = edge.filter(|_| self.groups != Groups::None).unwrap_or(1);
         let count = if self.edge > 1 { count } else { 0 };
@@ -172,15 +174,15 @@ impl Reuse {
         self.count = 0;
     }
 
-    /// Itself, if the batch shares paths.
+    /// `self`, if the batch shares paths.
     #[inline]
     pub(super) fn active(&mut self) -> Option<&mut Self> {
         (self.edge > 1).then_some(self)
     }
 
-    /// The path of a sample has arrived at a Lambertian vertex that reflects `rho`; `is_next` if it has passed no surface
-    /// since the last one. The answer is its throughput from there on: if it is shared, that is one which only roulette has
-    /// changed since the first vertex, and the sample has found nothing.
+    /// Registers a Lambertian vertex with the reflectance `rho`. `is_next` is true if the path has passed no surface
+    /// since its last vertex. Returns the throughput to continue with. If the light beyond is shared, this is 1 but for
+    /// the roulette since the first vertex, and the radiance of the sample restarts at 0.
     #[inline]
     pub(super) fn arrive(
         &mut self,
@@ -192,7 +194,7 @@ impl Reuse {
         let (first, second) = (&mut self.first[sample as usize], &mut self.second[sample as usize]);
         match first {
             None => {
-                // Without throughput it draws no direction
+                // Without throughput the path ends here
                 let beyond = beta * rho;
                 *first = (!beyond.is_black() && beyond.is_finite()).then_some(First { at, vertex, beta: beyond });
                 beta
@@ -206,11 +208,13 @@ impl Reuse {
         }
     }
 
-    /// Gives each sample its part of what the paths of its group have found; returns the number of segments.
+    /// Distributes the light of the paths of each group to its samples; returns the number of segments.
     pub(super) fn resolve(&mut self, job: &RenderJob, samples: &[CameraSample], out: &mut [PixelSample]) -> u64 {
         if self.count == 0 {
             return 0;
         }
+
+        // Sort the samples by group
         let (origin, groups, edge) = (job.world.scene.film.bounds, self.groups, self.edge);
         let rule = (edge, job.settings().sampling.seed);
         let pixel = |s: &CameraSample| [s.pixel[0] - origin.x0, s.pixel[1] - origin.y0];
@@ -219,6 +223,7 @@ impl Reuse {
         self.order.extend(samples.iter().zip(0_u128..).map(|(s, i)| u128::from(group(s)) << 32 | i));
         self.order.sort_unstable();
 
+        // Separate the radiance beyond the second vertices, which is shared
         self.tails.clear();
         self.tails.extend(out.iter().map(|o| o.radiance));
         for (sample, second) in out.iter_mut().zip(&self.second) {
@@ -226,6 +231,8 @@ impl Reuse {
                 sample.radiance = second.before;
             }
         }
+
+        // Weights, visibility, distribution
         self.connect();
         job.world.accel.occluded(&self.shares.rays, Coherence::Packets, &mut self.occluded);
         self.shares.distribute(&self.occluded, &self.tails);
@@ -235,17 +242,20 @@ impl Reuse {
         self.shares.rays.len() as u64
     }
 
-    /// What the members of each group share, and the segments for it.
+    /// Computes g for all pairs of members of each group, and the shadow segments.
     fn connect(&mut self) {
         let Reuse { order, first, second, group, shares, tails, .. } = self;
         shares.clear();
         for samples in order.chunk_by(|a, b| a >> 32 == b >> 32) {
+            // First vertices
             group.begin = shares.members.len();
             for sample in samples.iter().map(|&entry| entry as u32) {
                 let Some(First { at, vertex, beta }) = &first[sample as usize] else { continue };
                 group.first.set(shares.members.len() - group.begin, at);
                 shares.members.push(Member { sample, vertex: *vertex, beta: *beta });
             }
+
+            // Second vertices whose light is not black, a few at a time
             for i in group.begin..shares.members.len() {
                 let sample = shares.members[i].sample as usize;
                 let Some(second) = second[sample].as_ref().filter(|_| !tails[sample].is_black()) else { continue };
@@ -264,7 +274,7 @@ impl Reuse {
 }
 
 impl Group {
-    /// What members get from the second vertices that were found, and the segments for it.
+    /// Connects all members to the pending second vertices.
     fn connect(&mut self, shares: &mut Shares) {
         let (len, count) = (padded(shares.members.len() - self.begin), self.found.len());
         self.first.reserve(len);
@@ -280,7 +290,8 @@ impl Group {
         self.found.clear();
     }
 
-    /// What members get from the second vertex `k` of those that were found; columns have `len` first vertices for each.
+    /// Appends the members with a non-zero g for the pending second vertex `k`. The columns have `len` first vertices
+    /// for each second vertex.
     fn share(&mut self, k: usize, len: usize, shares: &mut Shares) {
         let member = self.found[k];
         let (own, vertex) = (member as usize - self.begin, shares.members[member as usize].vertex);
@@ -312,7 +323,7 @@ impl Shares {
         rays.clear();
     }
 
-    /// Gives members their parts of what was found, by sample, from second vertices on.
+    /// Adds the radiance `tails` beyond the second vertices, given by sample, to the members, by the balance heuristic.
     fn distribute(&mut self, occluded: &[bool], tails: &[Rgb]) {
         self.sums.clear();
         self.sums.resize(self.members.len(), Rgb::BLACK);
@@ -331,14 +342,14 @@ impl Shares {
                     self.sums[to as usize] += tail * (g / sum);
                 }
             } else {
-                // Of no use to others, such as a path along a surface
+                // Not usable by others, for example a path along a surface
                 self.sums[member as usize] += tail;
             }
         }
     }
 }
 
-/// The sum, in the order of as many sums as lanes.
+/// The sum of `values`, by one partial sum per lane.
 fn sum_of(values: &[f32]) -> f32 {
     let (vectors, rest) = values.as_chunks::<LANES>();
     let mut sums = [0.0; LANES];
@@ -356,7 +367,7 @@ impl Places {
         [p, p_error, n, ns].into_iter().for_each(|columns| columns.reserve(len));
     }
 
-    /// Sets place `i`, the last one so far or the one after it.
+    /// Sets vertex `i`: the last one, or the one after it.
     fn set(&mut self, i: usize, at: &Place) {
         self.reserve(padded(i + 1));
         self.p.set(i, at.p);

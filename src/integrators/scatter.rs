@@ -1,4 +1,4 @@
-//! From vertices to the next segments of their paths, by BSDF sampling.
+//! BSDF sampling of the next path segments.
 
 use super::segment::{BsdfTechnique, PathState, domain, survive};
 use crate::bsdfs::Lobe;
@@ -11,7 +11,7 @@ use lumiris_lanes::{level, sampler};
 use lumiris_numbers::math::{Ray, Rgb, Vec3};
 use lumiris_numbers::samplers::{Domain, SampleStream};
 
-/// Directions of a batch; holds the buffers of one worker.
+/// Samples the directions of a batch; holds the buffers of one worker.
 #[derive(Debug, Default)]
 pub(super) struct Scatter {
     drawn: Vec<SampleStream>,
@@ -25,13 +25,13 @@ pub(super) struct Continuation<'a> {
     pub(super) settings: &'a IntegratorSettings,
     /// Index of the vertices along their paths.
     pub(super) vertex: u32,
-    /// The samples of direct light there, of which that of the BSDF may be the next segment.
+    /// Direct-light samples at the vertices; their BSDF sample may be the next segment.
     pub(super) techniques: Option<Techniques>,
-    /// Only by specular lobes.
+    /// Paths continue by specular lobes only.
     pub(super) only_specular: bool,
 }
 
-/// A direction in which a path continues.
+/// The direction of the next segment of a path.
 struct Direction {
     /// Origin of the ray.
     o: Vec3,
@@ -42,7 +42,7 @@ struct Direction {
     eta: f32,
     /// Density; `None` if no other technique can draw the direction, or the density is unknown.
     pdf: Option<f32>,
-    /// The segment looks for the emitter as the BSDF sample of direct light.
+    /// The segment is the BSDF sample of direct light as well.
     by_path: bool,
 }
 
@@ -55,12 +55,15 @@ impl Scatter {
         paths: &[PathState],
         next: &mut Vec<PathState>,
     ) {
+        // Draw all directions in columns
         self.draw(vertices);
         let len = padded(vertices.len());
         self.samples.reserve(len);
         self.o.reserve(len);
         vertices.sample(vertices.len(), &self.u, &mut self.samples);
         self.resample(how, vertices);
+
+        // Make segments from the directions with a density
         let BsdfSamples { wi, f_cos, pdf, lobe, eta } = &self.samples;
         kernels::origins(level(), &vertices.surface.ends(len), wi.get(len), &mut self.o.get_mut(len));
         for i in (0..vertices.len()).filter(|&i| pdf[i] > 0.0) {
@@ -81,13 +84,15 @@ impl Scatter {
         }
     }
 
-    /// Directions at vertices whose BSDFs can only be evaluated, by resampling M proposals.
+    /// Resamples M proposals at vertices whose BSDFs can only be evaluated.
     fn resample(&mut self, how: &Continuation<'_>, vertices: &Vertices<'_>) {
         for (i, bsdf) in vertices.bsdfs.iter().enumerate().filter(|(_, bsdf)| bsdf.bsdf.is_only_evaluated()) {
             let (stream, count) = (&vertices.streams[i], how.settings.bsdf_proposals.max(1));
             let proposal = |k| stream.split(domain::BSDF, count, k).draw::<3>();
             let [u_choice] = stream.domain(domain::RESAMPLE).draw::<1>();
             let BsdfSamples { wi, f_cos, pdf, lobe, eta } = &mut self.samples;
+
+            // The weight of the resampled direction replaces 1/pdf, so the pdf is set to 1
             pdf[i] = 0.0;
             let Some(r) = bsdf.resample(vertices.surface.wo.vec3(i), count, proposal, u_choice) else { continue };
             wi.set(i, r.wi);
@@ -96,7 +101,7 @@ impl Scatter {
         }
     }
 
-    /// Draws three numbers for each vertex.
+    /// Draws three random numbers for each vertex.
     fn draw(&mut self, vertices: &Vertices<'_>) {
         let (n, len) = (vertices.len(), padded(vertices.len()));
         reserve(&mut self.u.each_mut(), len);
@@ -108,8 +113,8 @@ impl Scatter {
 }
 
 impl Continuation<'_> {
-    /// The segment in a direction; `None` if it carries no light, or roulette ends the path. Roulette ends a segment that
-    /// looks for an emitter only behind that.
+    /// The segment in a direction; `None` if its throughput is 0, or if roulette ends the path. Roulette does not end a
+    /// segment that is the BSDF sample of direct light; it ends the path beyond the emitter.
     #[inline]
     fn segment(&self, vertices: &Vertices<'_>, row: usize, path: &PathState, to: &Direction) -> Option<PathState> {
         let beta = path.beta * to.weight;
@@ -117,7 +122,11 @@ impl Continuation<'_> {
         if beta.is_black() || !beta.is_finite() {
             return None;
         }
+
+        // Roulette
         let survivor = survive(beta, eta_scale, &vertices.streams[row], self.vertex + 1, self.settings);
+
+        // Density of light paths that could have sampled the same path
         let n = vertices.surface.n.vec3(row);
         let chain = if path.chain.is_caustic() { path.chain } else { path.chain.beyond_first(to.pdf, n.dot(to.wi)) };
         Some(PathState {

@@ -1,4 +1,4 @@
-//! A path on its way: its state between two vertices, and the ways in which it goes on.
+//! The state of a path between two vertices.
 
 use super::light_paths::{Chain, Guide};
 use crate::accel::Hit;
@@ -24,11 +24,11 @@ pub(super) mod domain {
     pub(crate) const ALBEDO: u32 = 4;
     /// Vertex k uses the domain `VERTEX + k` of the camera sample.
     pub(crate) const VERTEX: u32 = 16;
-    /// The way to vertex k, through media, uses the domain `FLIGHT + k`.
+    /// The segment to vertex k, through media, uses the domain `FLIGHT + k`.
     pub(crate) const FLIGHT: u32 = 1 << 19;
-    /// The light about which distances of a flight may be equiangular.
+    /// The light for equiangular distance sampling in media.
     pub(crate) const FOCUS: u32 = 1 << 18;
-    /// The walk through an interior on the way to vertex k uses the domain `WALK + k`.
+    /// The walk through an interior before vertex k uses the domain `WALK + k`.
     pub(crate) const WALK: u32 = 1 << 17;
     /// The wavelength of the path.
     pub(crate) const WAVELENGTH: u32 = 1 << 16;
@@ -47,9 +47,9 @@ pub struct PathStats {
     pub bounce_time: Duration,
     /// Time in hits, textures and materials.
     pub shade_time: Duration,
-    /// Tentative collisions of flights through media, about.
+    /// Approximate number of tentative collisions in media.
     pub collisions: u64,
-    /// Direct lighting.
+    /// Direct light.
     pub direct: DirectStats,
     /// Lookups in an irradiance cache.
     pub lookups: LookupStats,
@@ -65,7 +65,7 @@ pub struct LookupStats {
 }
 
 impl PathStats {
-    /// The times of the stages of tracing, which do not overlap.
+    /// Times of the stages of tracing, without overlap.
     pub fn stages(&self) -> [(&'static str, Duration); 6] {
         [
             ("camera_rays", self.camera_time),
@@ -77,7 +77,7 @@ impl PathStats {
         ]
     }
 
-    /// The part of the time `tracing` that no stage has.
+    /// The part of the time `tracing` outside all stages.
     pub fn beside_stages(&self, tracing: Duration) -> Duration {
         tracing.saturating_sub(self.stages().iter().map(|(_, time)| *time).sum())
     }
@@ -101,23 +101,23 @@ impl PathStats {
 pub struct CameraSample {
     /// Its ray.
     pub ray: CameraRay,
-    /// Weight of the pixel filter times that of the camera.
+    /// Weight of the pixel filter times weight of the camera.
     pub weight: f32,
     /// Its random numbers.
     pub stream: SampleStream,
-    /// Random numbers of direct light, which progressive estimators draw anew for every block of samples: they are
-    /// independent of those of earlier blocks, wherever the path goes.
+    /// Random numbers of direct light. Progressive estimators use a new stream for every block of samples, so that a
+    /// block is independent of earlier blocks.
     pub direct: SampleStream,
     /// Sample counts at its first vertex.
     pub sample_counts: SampleCounts,
-    /// Which samples of neighbouring pixels may share its path, and which light paths it has: its index, where all pixels
-    /// have as many samples.
+    /// Sample step ([`crate::scene::PixelSamples::turn`]). Samples of neighbouring pixels with the same step may share
+    /// paths, and use the same light paths. Equals the sample index if all pixels have the same number of samples.
     pub turn: u32,
-    /// The fit of its pixel.
+    /// Index of the fit of its pixel.
     pub fit: u32,
-    /// Its pixel; any, where none is the sample's.
+    /// Its pixel; arbitrary for rays that belong to no pixel.
     pub pixel: [u32; 2],
-    /// True if it is of a second estimate of its pixel, by which the variance is known.
+    /// True if the sample belongs to a replica: a second estimate of its pixel, used to estimate the variance.
     pub is_replica: bool,
 }
 
@@ -128,29 +128,29 @@ pub(super) struct PathState {
     pub(super) sample: u32,
     pub(super) ray: Ray,
     pub(super) beta: Rgb,
-    /// Squared relative index of refraction along the path, which roulette takes out of β.
+    /// Squared relative index of refraction along the path. Russian roulette divides it out of β.
     pub(super) eta_scale: f32,
-    /// Width of a pixel at the ray's origin, and its growth per unit length.
+    /// Pixel width at the origin of the ray, and its growth per unit length.
     pub(super) width: f32,
     pub(super) spread: f32,
-    /// Surfaces without scattering passed since the last vertex.
+    /// Number of non-scattering surfaces passed since the last vertex.
     pub(super) passed: u32,
     /// Distance travelled through such surfaces.
     pub(super) travelled: f32,
-    /// The technique that drew the direction, if the segment looks for emitters.
+    /// The technique that sampled the direction, if the segment may hit emitters.
     pub(super) technique: Option<BsdfTechnique>,
-    /// What the ray goes through.
+    /// The medium around the ray.
     pub(super) medium: Option<MediumId>,
-    /// The wavelength (nm) that the path has got where its index of refraction depends on it.
+    /// Wavelength (nm), once a dispersive material has chosen one.
     pub(super) wavelength: Option<f32>,
-    /// The path has ended in a medium, and only looks for the features of the first surface behind.
+    /// The path has ended in a medium, and continues only to the features of the first surface behind.
     pub(super) is_ghost: bool,
-    /// What light paths could have found as well.
+    /// The part of the path that light paths can sample as well.
     pub(super) chain: Chain,
 }
 
 impl PathState {
-    /// What the path carries of the emission of a surface, with the weight of the technique that found it.
+    /// Emission of a surface hit, times throughput and MIS weight.
     pub(super) fn emission(
         &self,
         job: &RenderJob,
@@ -168,6 +168,8 @@ impl PathState {
         if self.technique.is_some() && lights.lights[light as usize].is_dark_from(left.ctx(self).p) {
             return Rgb::BLACK;
         }
+
+        // Weight against light paths, then against light samples
         let s = &interaction.surface;
         let hit = LightHit { t: self.depth(interaction), p: s.p, n: s.n, uv: s.uv };
         let mut l = self.beta * lights.lights[light as usize].l(&hit, interaction.wo);
@@ -180,7 +182,7 @@ impl PathState {
         }
     }
 
-    /// The throughput beyond what the last segment has hit; `None` if roulette ends the path there.
+    /// The throughput beyond the surface hit by the last segment; `None` if roulette ends the path there.
     #[inline]
     pub(super) fn beta_beyond_emitter(&self) -> Option<Rgb> {
         match &self.technique {
@@ -189,7 +191,7 @@ impl PathState {
         }
     }
 
-    /// Multiplies what it carries by what a medium lets pass.
+    /// Multiplies the throughput by `weight`, the transmittance of a medium over its sampling probability.
     pub(super) fn weaken(&mut self, weight: Rgb) {
         self.beta *= weight;
         if let Some(technique) = &mut self.technique {
@@ -222,7 +224,7 @@ impl PathState {
         self.travelled + interaction.distance
     }
 
-    /// The path beyond a surface that does not scatter, with the throughput `beta`.
+    /// The path beyond a non-scattering surface, with the throughput `beta`.
     pub(super) fn pass(&self, job: &RenderJob, beta: Rgb, interaction: &SurfaceInteraction) -> PathState {
         PathState {
             beta,
@@ -237,30 +239,30 @@ impl PathState {
     }
 }
 
-/// BSDF sampling at the last vertex, as multiple importance sampling weights it against light sampling there.
+/// BSDF sampling at the last vertex, for its MIS weight against light sampling there.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct BsdfTechnique {
-    /// The row of that vertex; [`Self::NO_ROW`] if no light was sampled there.
+    /// The row of the last vertex; [`Self::NO_ROW`] if no light was sampled there.
     pub(super) row: u32,
     /// Density of the direction; `None` for a specular lobe, which no other technique samples.
     pub(super) pdf: Option<f32>,
-    /// Throughput of the path beyond the first surface, if roulette lets it go on.
+    /// Throughput beyond the first surface; `None` if roulette ends the path there.
     pub(super) survivor: Option<Rgb>,
 }
 
 impl BsdfTechnique {
-    /// Of a point where no light was sampled.
+    /// Stands for a point where no light was sampled.
     pub(super) const NO_ROW: u32 = u32::MAX;
 }
 
-/// The last vertices of the paths of a batch, and the samples that were drawn there.
+/// The last vertices of the paths of a batch, and the direct-light techniques used there.
 pub(super) struct LastVertices<'a, 'w> {
     pub(super) vertices: &'a Vertices<'w>,
     pub(super) techniques: Option<Techniques>,
 }
 
 impl LastVertices<'_, '_> {
-    /// Where light was sampled at the last vertex of a path.
+    /// The point at which light was sampled last.
     #[inline]
     pub(super) fn ctx(&self, path: &PathState) -> LightCtx {
         match path.technique {
@@ -271,7 +273,7 @@ impl LastVertices<'_, '_> {
         }
     }
 
-    /// The weight of what a path has found by its BSDF sample, where light sampling has the density `p_light`.
+    /// MIS weight of an emitter hit by the BSDF sample of a path; light sampling has the density `p_light`.
     #[inline]
     pub(super) fn weight(&self, path: &PathState, p_light: impl FnOnce(&LightCtx) -> f32) -> f32 {
         let Some(techniques) = &self.techniques else { return 1.0 };
@@ -282,8 +284,9 @@ impl LastVertices<'_, '_> {
     }
 }
 
-/// Russian roulette before bounce `bounce` on what the path that left the vertex of `stream` carries, its throughput
-/// `beta` without the scaling of refraction: the throughput of a path that goes on.
+/// Russian roulette before bounce `bounce`, for a path that leaves the vertex of `stream` with the throughput `beta`.
+/// The survival probability is the maximum of β · `eta_scale`, so refraction does not count as a loss. Returns the
+/// throughput of a path that survives.
 #[inline]
 pub(super) fn survive(
     beta: Rgb,
@@ -310,7 +313,7 @@ mod tests {
         let streams = (0..4096).map(|i| SampleStream::new(SamplerKind::Sobol, [i % 64, i / 64], i, 1));
         let (beta, eta_scale) = (Rgb::new(0.1, 0.2, 0.05), 2.25);
 
-        // Refraction does not count as a loss: paths go on with probability 0.2·2.25
+        // Refraction does not count as a loss: the survival probability is 0.2·2.25
         let (mut sum, mut count) = (Rgb::BLACK, 0);
         for stream in streams.clone() {
             assert_eq!(survive(beta, eta_scale, &stream, 2, &settings), Some(beta));
@@ -322,7 +325,7 @@ mod tests {
         assert!((share - 0.45).abs() < 0.04, "{share}");
         assert!((mean.g - 0.2).abs() < 0.02 && (mean.r - 0.1).abs() < 0.01, "{mean:?}");
 
-        // What carries more than one goes on as it is
+        // A throughput above 1 is unchanged
         let bright = Rgb::splat(1.5);
         assert!(streams.into_iter().all(|stream| survive(bright, 1.0, &stream, 9, &settings) == Some(bright)));
     }

@@ -1,5 +1,4 @@
-//! From rays to vertices: paths are traced to the next surface that scatters, and carry what they see of emitters on the
-//! way.
+//! Traces paths to their next vertices, and adds the emission on the way.
 
 use super::light_layers::LayerSums;
 use super::light_paths::{Chain, Guide};
@@ -19,7 +18,7 @@ use lumiris_numbers::samplers::{Domain, SampleStream};
 use std::sync::Arc;
 use std::time::Instant;
 
-/// Surfaces without scattering that a path may pass between two vertices.
+/// Maximum number of non-scattering surfaces between two vertices.
 const MAX_PASSED: u32 = 64;
 
 /// Copies of the rays traced, batch by batch, for measurements.
@@ -42,56 +41,57 @@ impl Recording {
     }
 }
 
-/// A batch of paths whose next vertices are found.
+/// A batch of paths to be traced to the next vertices.
 pub(super) struct Stage<'a, 'w> {
     pub(super) job: &'w RenderJob,
-    /// Index of the vertices along their paths, and the maximum number of these.
+    /// Index of the vertices along their paths, and the maximum number of vertices.
     pub(super) vertex: u32,
     pub(super) depth: u32,
     pub(super) samples: &'a [CameraSample],
-    /// What the paths come from.
+    /// The last vertices.
     pub(super) left: LastVertices<'a, 'w>,
-    /// Takes what the paths see.
+    /// Receives emission and features.
     pub(super) out: &'a mut [PixelSample],
-    /// Takes the vertices.
+    /// Receives the vertices.
     pub(super) vertices: &'a mut Vertices<'w>,
 }
 
-/// How a path comes through its medium.
+/// The result of a flight through a medium.
 pub(super) enum Flown {
-    /// Straight to what its ray meets.
+    /// No collision before the hit of the ray.
     Through,
-    /// It does not: it is scattered on the way, or ends.
+    /// The path was scattered or absorbed.
     Ended,
-    /// It is scattered on the way. This one goes on straight, for the features of the first surface, which denoisers want.
+    /// The path was scattered. The ghost continues straight on, for the features of the first surface, used by
+    /// denoisers.
     Ghost(PathState),
 }
 
-/// Paths on their way to the next vertex.
+/// The active paths of a batch; holds the buffers of one worker.
 #[derive(Debug, Default)]
 pub(super) struct VertexSearch {
     pub(super) active: Vec<PathState>,
     /// Indices of the paths that are traced.
     traced: Vec<u32>,
-    /// Indices of those that go on in the next trace, without a vertex.
+    /// Indices of the paths that continue in the next trace, without a vertex.
     pub(super) passing: Vec<u32>,
-    /// Indices of those that meet nothing and look for emitters.
+    /// Indices of the paths that hit nothing, and receive light from infinite lights.
     escaped: Vec<u32>,
     rays: RayBatch,
     hits: Vec<Option<Hit>>,
-    /// Geometries and distances from the camera of first vertices on plain meshes, in the order of these.
+    /// Geometry and distance from the camera of first vertices on plain meshes, in the order of these vertices.
     plain: Vec<(GeometryId, f32)>,
     /// Counts and times.
     pub(super) stats: PathStats,
     /// Omits emission towards the camera, and all features except the depth.
     pub(super) only_reflected: bool,
-    /// The features of first surfaces that are determined.
+    /// Requested features of first surfaces.
     pub(super) features: FeatureSet,
-    /// What is of each light group.
+    /// Sums per light group.
     pub(super) layers: LayerSums,
-    /// Of the light paths that bring a part of the light, if any do.
+    /// Guide of the light paths, if light paths contribute.
     pub(super) guide: Option<Arc<Guide>>,
-    /// Copies of what is traced, if requested.
+    /// Copies of the traced rays, if requested.
     pub(super) recording: Option<Recording>,
 }
 
@@ -102,6 +102,8 @@ impl VertexSearch {
         out.resize(samples.len(), PixelSample::default());
         self.layers.begin(samples.len());
         self.active.clear();
+
+        // One path per camera sample
         self.active.extend(samples.iter().enumerate().map(|(i, s)| PathState {
             sample: i as u32,
             ray: s.ray.ray,
@@ -119,14 +121,15 @@ impl VertexSearch {
         }));
     }
 
-    /// Traces the active paths to their next vertices, and adds the emission that they meet on the way. `at.vertices` are
-    /// those of the active paths that arrive at a surface or a particle that scatters.
+    /// Traces the active paths to their next vertices, and adds the emission on the way. `at.vertices` receives the
+    /// vertices of the paths that reach a scattering surface or scatter in a medium.
     pub(super) fn find(&mut self, mut at: Stage<'_, '_>) {
         let mut coherence = if at.vertex == 0 { Coherence::Coherent } else { Coherence::Incoherent };
         self.plain.clear();
         self.traced.clear();
         self.traced.extend(0..self.active.len() as u32);
         while !self.traced.is_empty() {
+            // Trace, and process each hit
             self.trace(at.job, at.vertex, coherence);
             coherence = Coherence::Incoherent;
             let start = Instant::now();
@@ -136,12 +139,15 @@ impl VertexSearch {
                 self.arrive(&mut at, &mut paths, index, hit.as_ref());
             }
             (self.active, self.hits, self.traced) = (paths, hits, traced);
+
+            // Trace the paths again that passed a surface
             self.add_infinite(&mut at);
             std::mem::swap(&mut self.traced, &mut self.passing);
             self.passing.clear();
             self.escaped.clear();
             self.stats.shade_time += start.elapsed();
         }
+
         let start = Instant::now();
         at.vertices.finish(&at.job.lights);
         self.set_numbers(&mut at);
@@ -151,10 +157,12 @@ impl VertexSearch {
         self.stats.shade_time += start.elapsed();
     }
 
-    /// Lets a path that has been traced fly through its medium, add what it meets, and get its vertex or go on.
+    /// Processes a traced path: flight through its medium, emission, and vertex or continuation.
     #[inline]
     fn arrive(&mut self, at: &mut Stage<'_, '_>, paths: &mut Vec<PathState>, index: u32, hit: Option<&Hit>) {
         let mut index = index;
+
+        // Medium
         if paths[index as usize].medium.is_some() {
             match self.fly(at, (index, &mut paths[index as usize]), hit) {
                 Flown::Through => {}
@@ -165,6 +173,8 @@ impl VertexSearch {
                 }
             }
         }
+
+        // Surface or environment
         let path = &mut paths[index as usize];
         match hit {
             Some(hit) if self.take_plain(at, (index, path), hit) => {}
@@ -174,7 +184,7 @@ impl VertexSearch {
         }
     }
 
-    /// The times of vertices, and their random numbers.
+    /// Sets times and random numbers of the vertices.
     fn set_numbers(&self, at: &mut Stage<'_, '_>) {
         let Vertices { path, time, streams, direct, .. } = &mut *at.vertices;
         let sample = |&path: &u32| &at.samples[self.active[path as usize].sample as usize];
@@ -185,7 +195,7 @@ impl VertexSearch {
         direct.extend(path.iter().map(|path| inner.of(&outer.of(&sample(path).direct))));
     }
 
-    /// The features of first vertices on plain meshes.
+    /// Sets the features of first vertices on plain meshes.
     fn set_plain_features(&self, at: &mut Stage<'_, '_>) {
         let Vertices { path, surface, .. } = &*at.vertices;
         for (row, &(object, depth)) in at.vertices.plain().zip(&self.plain) {
@@ -205,8 +215,8 @@ impl VertexSearch {
         !path.is_ghost && (path.technique.is_some() || vertex == 0 && !self.only_reflected)
     }
 
-    /// Takes a hit of a mesh that reflects the same everywhere, whose point is determined together with others; false if
-    /// this is none.
+    /// Handles the hit of a mesh with a constant Lambertian reflectance, whose points are computed together with
+    /// others. Returns false for all other hits.
     #[inline]
     fn take_plain(&mut self, at: &mut Stage<'_, '_>, (index, path): (u32, &mut PathState), hit: &Hit) -> bool {
         let is_last = at.vertex >= at.depth;
@@ -214,6 +224,8 @@ impl VertexSearch {
         if path.medium.is_some() || path.is_ghost || is_last && at.vertex == 0 {
             return false;
         }
+
+        // Add the vertex
         let Some(beta) = path.beta_beyond_emitter().filter(|_| !is_last) else { return true };
         let Shape::Mesh(mesh) = &at.job.world.scene.geometry.geometries[hit.geometry as usize].shape else {
             return false;
@@ -223,6 +235,8 @@ impl VertexSearch {
             self.plain.push((hit.geometry, path.travelled + distance));
         }
         (path.beta, path.width) = (beta, path.width + path.spread * distance);
+
+        // Density of light paths
         path.chain = if self.begins_chain(at.vertex, path) {
             Chain::at_first(facing_normal(at.job, hit, path.ray.d).dot(path.ray.d), path.width)
         } else {
@@ -232,16 +246,20 @@ impl VertexSearch {
         true
     }
 
-    /// Takes any other hit, and adds its vertex, if the path goes on from one.
+    /// Handles any other hit, and adds its vertex if the path continues.
     #[inline]
     fn take(&mut self, at: &mut Stage<'_, '_>, (index, path): (u32, &mut PathState), hit: &Hit) {
         let interaction = SurfaceInteraction::new(at.job, &path.ray, (path.width, path.spread), hit);
         let (sample, out) = (&at.samples[path.sample as usize], &mut at.out[path.sample as usize]);
+
+        // Emission
         if self.looks_for_emitters(at.vertex, path) {
             let emission = path.emission(at.job, &at.left, &interaction, self.guide.as_deref());
             out.radiance += emission;
             self.layers.add_emission(at.job, path.sample, &interaction.hit, emission);
         }
+
+        // Surfaces without scattering
         let Some(mut beta) = path.beta_beyond_emitter() else { return };
         let Some(mut bsdf) = interaction.scatter(at.job) else {
             if path.passed < MAX_PASSED || self.walks(at.job, path) {
@@ -250,6 +268,8 @@ impl VertexSearch {
             }
             return;
         };
+
+        // Features of the first surface
         if at.vertex == 0 && self.features != FeatureSet::None {
             out.features.get_or_insert_with(|| {
                 if self.only_reflected {
@@ -263,12 +283,16 @@ impl VertexSearch {
         if at.vertex >= at.depth || path.is_ghost {
             return;
         }
+
+        // Dispersion
         if let Some(eta) = bsdf.bsdf.eta_mut()
             && let Some(dispersion) = interaction.dispersion(at.job)
         {
             let (lambda, weight) = self.wavelength(at, path);
             (*eta, path.wavelength, beta) = (dispersion.eta(lambda), Some(lambda), beta * weight);
         }
+
+        // The vertex, unless the path stays in an interior
         let media = interaction.sides(at.job, path.medium);
         let Some((bsdf, beta)) = self.leave(at, (index, path, beta), &interaction, (bsdf, media)) else { return };
         let SurfaceInteraction { surface, wo, width, .. } = interaction;
@@ -277,18 +301,18 @@ impl VertexSearch {
         at.vertices.push(Single { path: index, p: surface.p, p_error: surface.p_error, wo, bsdf, media });
     }
 
-    /// True if light paths bring light to what the path has met.
+    /// True if light paths may reach the vertex.
     #[inline]
     fn begins_chain(&self, vertex: u32, path: &PathState) -> bool {
         self.guide.is_some() && vertex == 0 && path.passed == 0
     }
 
-    /// What light paths could have found as well, at a vertex of this BSDF.
+    /// The part of the path that light paths can sample as well, at a vertex with this BSDF.
     fn chain(&self, at: &Stage<'_, '_>, path: &PathState, met: &SurfaceInteraction, bsdf: &SurfaceBsdf<'_>) -> Chain {
         if self.guide.is_none() || path.passed > 0 {
             return Chain::NONE;
         }
-        // The emitter is to be found by the next segment, and the last vertex has none
+        // The emitter must be hit by the next segment, and the last vertex has none
         match (bsdf.makes_caustics, path.chain.is_open()) {
             (true, true) if at.vertex + 1 < at.depth => path.chain.bundled(),
             (false, _) if at.vertex == 0 && bsdf.bsdf.is_evaluated_exactly() => {
@@ -298,7 +322,7 @@ impl VertexSearch {
         }
     }
 
-    /// The wavelength of a path, and the factor of its throughput for choosing one.
+    /// The wavelength of a path, and the throughput factor of its sampling.
     fn wavelength(&self, at: &Stage<'_, '_>, path: &PathState) -> (f32, Rgb) {
         path.wavelength.map_or_else(
             || {
@@ -309,19 +333,21 @@ impl VertexSearch {
         )
     }
 
-    /// Lets a path fly through its medium towards what its ray meets, and adds what the medium emits.
+    /// Samples the free flight of a path through its medium, and adds the emission of the medium.
     fn fly(&mut self, at: &mut Stage<'_, '_>, (index, path): (u32, &mut PathState), hit: Option<&Hit>) -> Flown {
         let Some(id) = path.medium.filter(|_| !path.is_ghost) else { return Flown::Through };
         let medium = &at.job.world.scene.media.media[id as usize];
         if medium.is_interior() {
             return self.walk(at, medium, (index, path), hit);
         }
+
+        // Segment and random numbers
         let scale = path.ray.d.length();
         let (o, d) = (path.ray.o, path.ray.d / scale);
         let segment = Segment { o, d, length: hit.map_or(f32::INFINITY, |hit| hit.t * scale) };
         let stream = at.samples[path.sample as usize].stream;
         let mut numbers = Numbers::new(stream.domain(domain::FLIGHT + at.vertex).domain(path.passed));
-        // What light samples could have found as well, which need no more to be seen than what is near
+        // Emission lookups with their MIS weight. Where light is sampled as well, no minimum rate of lookups is needed
         let technique = path.technique.filter(|technique| technique.pdf.is_some());
         let least = if technique.is_none() { at.job.lights.glimpse_rate(id) } else { 0.0 };
         let weigh = |glimpse: &Glimpse| {
@@ -331,6 +357,8 @@ impl VertexSearch {
         let focus = || focus(at.job, &segment, &stream, at.vertex);
         let flight = medium.fly(&segment, path.beta, &mut numbers, focus, (least, weigh));
         self.stats.collisions += u64::from(numbers.drawn);
+
+        // Add the emission, and make the vertex
         let Flight { emitted, end } = flight;
         at.out[path.sample as usize].radiance += path.beta * emitted;
         match end {
@@ -363,7 +391,7 @@ impl VertexSearch {
             escaped.len(),
             |i| left.ctx(path(i)),
             |i| path(i).ray.d,
-            // No light was sampled where a path begins
+            // No light was sampled at the camera
             |i, ctx, light| if path(i).technique.is_some() { lights.sampler.pmf(ctx, light) } else { 0.0 },
             |i, le, p_light| {
                 let path = path(i);
@@ -377,7 +405,7 @@ impl VertexSearch {
         );
     }
 
-    /// First hits of the paths.
+    /// Traces the first hits of the paths.
     fn trace(&mut self, job: &RenderJob, vertex: u32, coherence: Coherence) {
         self.rays.set(self.traced.iter().map(|&index| &self.active[index as usize].ray));
         if let Some(r) = &mut self.recording {
@@ -397,8 +425,9 @@ impl VertexSearch {
     }
 }
 
-/// The middle of a light that the light sampler chooses for a point of a segment; `None` if that is at infinity. Where the
-/// point is only changes the noise: light is expected from the near part of the segment.
+/// The centre of a light that the light sampler chooses for a point of the segment; `None` if the light is infinite.
+/// The choice of the point only affects the noise. It is at most the scene radius away, since most light is expected
+/// near the origin.
 fn focus(job: &RenderJob, segment: &Segment, stream: &SampleStream, vertex: u32) -> Option<Vec3> {
     let lights = &job.lights;
     if lights.infinite.len() == lights.lit.len() {
@@ -410,7 +439,7 @@ fn focus(job: &RenderJob, segment: &Segment, stream: &SampleStream, vertex: u32)
     lights.lights[chosen.light as usize].bounds().map(|bounds| bounds.bounds.center())
 }
 
-/// The geometric normal at a hit of a mesh in world space by a ray of direction `d`, on the side that it comes from.
+/// The geometric normal at a hit of a mesh in world space, on the side from which a ray of direction `d` comes.
 fn facing_normal(job: &RenderJob, hit: &Hit, d: Vec3) -> Vec3 {
     let Shape::Mesh(mesh) = &job.world.scene.geometry.geometries[hit.geometry as usize].shape else { return -d };
     let [a, b, c] = mesh.triangle(hit.primitive as usize);

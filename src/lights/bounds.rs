@@ -130,6 +130,8 @@ mod tests {
         for i in 0..20_000 {
             let mut cone =
                 || (sample_uniform_sphere(stream.random::<[f32; 2]>()), 1.0 - 2.0 * stream.random::<f32>().powi(3));
+
+            // Same axes, opposite axes, nearly equal and nearly opposite axes, and random axes
             let a = cone();
             let b = match i % 6 {
                 0 => (a.0, cone().1),
@@ -138,6 +140,8 @@ mod tests {
                 3 => ((cone().0 * 1e-4 - a.0).normalize(), a.1),
                 _ => cone(),
             };
+
+            // The edges of both cones are inside of the union
             let (axis, cos) = union_cones(a, b);
             assert!(axis.is_finite() && (axis.length() - 1.0).abs() < 1e-5 && cos.is_finite());
             for c in [a, b] {

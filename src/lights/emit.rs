@@ -76,6 +76,7 @@ impl Light {
                 EmissionSample::in_space(*p, sample_uniform_sphere(u_direction), *intensity * (4.0 * PI))
             }
             Light::Spot { p, axis, cos_total, cos_falloff_start, intensity } => {
+                // In proportion to the falloff, so that the power is constant
                 let cos = spot::sample_spot_cos(u_direction[0], *cos_total, *cos_falloff_start);
                 let d = Frame::from_z(*axis).to_world(direction(cos, TAU * u_direction[1]));
                 let solid_angle = spot::spot_solid_angle(*cos_total, *cos_falloff_start);

@@ -64,6 +64,8 @@ fn lights() -> Vec<(&'static str, Light)> {
     let both = Emission { two_sided: true, ..Emission::constant(l) };
     let area = |shape: &Shape, emission: &Emission| Light::Area(area_lights_of(shape, emission).lights.remove(0));
     let one = Emission::constant(l);
+
+    // Shapes of area lights
     let down = rectangle_mesh(Vec3::new(-0.3, -0.6, 1.5), Vec3::Y, Vec3::X * 0.8);
     let corners = [Vec3::new(0.0, -0.7, 1.2), Vec3::new(-0.5, 0.5, 1.6), Vec3::new(0.8, 0.3, 1.4)];
     let mut mesh = TriangleMesh::new(corners.to_vec(), vec![[0, 1, 2]]).unwrap();
@@ -154,9 +156,12 @@ fn photons_deposit_the_irradiance_that_direct_light_has() {
             let mut differences = [Moments::default(); 3];
             let mut sum = 0.0;
             for _ in 0..200_000 {
+                // Irradiance of the receiver by emission
                 let photon = light
                     .sample_le(SCENE, stream.random::<[f32; 2]>(), stream.random::<[f32; 2]>())
                     .map_or(Rgb::BLACK, |s| deposit(&s, n));
+
+                // The same by direct light
                 let [x, y] = stream.random::<[f32; 2]>().map(|u| (2.0 * u - 1.0) * HALF);
                 let ctx = LightCtx::on(Vec3::new(x, y, 0.0), n);
                 let li = light
@@ -167,6 +172,8 @@ fn photons_deposit_the_irradiance_that_direct_light_has() {
                     moments.add(f64::from(photon[c]) - f64::from(li[c]));
                 }
             }
+
+            // The difference is 0 on average
             lit |= sum > 0.0;
             for moments in differences.into_iter().filter(|_| sum > 0.0) {
                 moments.assert_mean(0.0, 1e-6, 0.0);
@@ -280,6 +287,8 @@ fn check_directions(samples: &[EmissionSample], frame: Frame, density: impl Fn(V
         let [x, y] = place.map(|x| ((x * CELLS as f32).max(0.0) as usize).min(CELLS - 1));
         observed[y * CELLS + x] += 1.0;
     }
+
+    // Integrate the density over the cells
     let n = CELLS * FINE;
     let mut expected = vec![0.0; CELLS * CELLS];
     for i in 0..n * n {
@@ -287,6 +296,8 @@ fn check_directions(samples: &[EmissionSample], frame: Frame, density: impl Fn(V
         let w = frame.to_world(lumiris_numbers::math::warp::direction(2.0 * x - 1.0, TAU * y));
         expected[(i / n) / FINE * CELLS + (i % n) / FINE] += density(w);
     }
+
+    // Compare
     let total: f64 = expected.iter().sum();
     let solid_angle = 4.0 * std::f64::consts::PI / (n * n) as f64;
     assert!((total * solid_angle - 1.0).abs() < 0.01, "the density integrates to {}", total * solid_angle);
@@ -302,6 +313,7 @@ fn directions_from_points_and_from_infinity_follow_their_densities() {
     check_directions(&emitted(&point, 10), world, uniform);
     check_directions(&emitted(&Light::InfiniteConstant { l: Rgb::WHITE }, 11), world, uniform);
 
+    // Spot lights
     let axis = Vec3::new(0.48, 0.6, 0.64);
     for (cos_total, cos_falloff_start) in [(0.5, 0.875), (-0.5, 0.25), (0.75, 0.75)] {
         let light = Light::Spot { p: Vec3::ONE, axis, cos_total, cos_falloff_start, intensity: Rgb::WHITE };
@@ -311,6 +323,7 @@ fn directions_from_points_and_from_infinity_follow_their_densities() {
         check_directions(&emitted(&light, 12), Frame::from_z(axis), density);
     }
 
+    // Environment maps
     for (mapping, size) in [(EnvironmentMapping::EqualArea, [8, 8]), (EnvironmentMapping::LatLong, [9, 5])] {
         let light = environment(mapping, size);
         let density = |w: Vec3| f64::from(light.pdf_li(&LightCtx::at(Vec3::ZERO), -w, &super::LightHit::INFINITE));

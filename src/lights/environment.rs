@@ -132,6 +132,8 @@ impl EnvironmentMap {
         if mapping == EnvironmentMapping::EqualArea && width != height {
             return Err(format!("an equal-area environment map must be square, but it is {width}×{height}"));
         }
+
+        // Table of the density; its values are stored beside the texels
         let texels = with_border(&texels, [width, height], mapping);
         let distribution = TexelDistribution::new(&[], 1);
         let mut map = EnvironmentMap { width, height, mapping, filter, texels, distribution, luminance_integral: 0.0 };
@@ -205,6 +207,8 @@ impl EnvironmentMap {
             for i in 0..count {
                 (directions[0][i], directions[1][i], directions[2][i]) = w(start + i).into();
             }
+
+            // Map coordinates, in lanes where possible
             let w = |i: usize| Vec3::new(directions[0][i], directions[1][i], directions[2][i]);
             match self.mapping {
                 EnvironmentMapping::EqualArea => {
@@ -215,6 +219,8 @@ impl EnvironmentMap {
                     (0..count).for_each(|i| (places[0][i], places[1][i]) = self.to_square(w(i)).into());
                 }
             }
+
+            // Lookups
             for (i, found) in found[..count].iter_mut().enumerate() {
                 let p = Vec2::new(places[0][i], places[1][i]);
                 *found = (self.lookup(p), self.pdf_at(w(i), p));

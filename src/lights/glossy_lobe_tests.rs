@@ -14,6 +14,7 @@ fn second_moments(alpha: f32) -> [f64; 2] {
     let metal = Conductor { distribution, eta: Rgb::WHITE, k: Rgb::splat(4.0) };
     let mut sums = [0.0; 2];
     for _ in 0..200 {
+        // Lights at random distances
         let lights: Vec<Light> = (0..60)
             .map(|_| {
                 let p = sample_uniform_sphere(s.random::<[f32; 2]>()) * (1.0 + 9.0 * s.random::<f32>());
@@ -22,9 +23,13 @@ fn second_moments(alpha: f32) -> [f64; 2] {
             .collect();
         let tree = LightTree::new(&lights.iter().map(Light::bounds).collect::<Vec<_>>());
         let wo = sample_cosine_hemisphere(s.random::<[f32; 2]>());
+
+        // Contexts with and without the lobe
         let (alpha, share) = Bsdf::Conductor(metal).glossy_lobe(wo).unwrap();
         let diffuse = LightCtx::on(Vec3::ZERO, Vec3::Z);
         let glossy = LightCtx { lobe: GlossyLobe::new(wo, Vec3::Z, alpha, share), ..diffuse };
+
+        // Second moment Σ v²/p of the estimate, relative to the squared mean
         let values = lights.iter().map(|light| {
             let sample = light.sample_li(&diffuse, [0.5; 2]).unwrap();
             f64::from(sample.li.g * metal.f(wo, sample.wi).g * sample.wi.z.max(0.0))

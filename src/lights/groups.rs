@@ -122,6 +122,8 @@ impl LightGroups {
         match &self.choice {
             Choice::Tree { cut, above } => {
                 let Some(choice) = sampler.tree() else { return pmfs };
+
+                // Group 0 has the infinite lights
                 let p_infinite = turns.probability(Turns::BESIDE, || choice.infinite_probability(ctx));
                 let of_tree = &mut pmfs[usize::from(self.has_infinite)..];
                 if !cut.is_empty() {
@@ -134,6 +136,8 @@ impl LightGroups {
             }
             Choice::Fixed(groups) => groups.iter().zip(&mut pmfs).for_each(|(group, p)| *p = group.pmf),
         }
+
+        // Mixture with the visibility cache
         if let LightSampler::Photons(choice) = sampler {
             choice.group_pmfs(ctx, |light| self.group_of(light), &mut pmfs);
         }
@@ -171,6 +175,7 @@ impl LightGroups {
                 Some(one_of(&sampler.tree()?.infinite, u, group_pmf))
             }
             Choice::Tree { cut, .. } => {
+                // A group of the tree is a subtree of the cut
                 let place = *cut.get(group - usize::from(self.has_infinite))?;
                 let (light, pmf, u) = sampler.tree()?.tree.sample_below(ctx, place, u)?;
                 Some(SampledLight { light, pmf: pmf * group_pmf, u })
@@ -227,6 +232,7 @@ mod tests {
                     assert!((pmfs.iter().sum::<f32>() - 1.0).abs() < 1e-5, "{kind:?} {pmfs:?}");
                     assert!(groups.len() <= max.max(usize::from(infinite > 0) + usize::from(points > 0)));
 
+                    // Choose a group, then a light
                     let mut s = pcg32([points, infinite, max as u32]);
                     let mut observed = vec![0.0; set.lights.len()];
                     let n = 20_000;
@@ -245,6 +251,8 @@ mod tests {
                         assert!((0.0..1.0).contains(&choice.u));
                         observed[choice.light as usize] += 1.0;
                     }
+
+                    // Compare the frequencies of the lights
                     let pmf = |i: usize| f64::from(set.sampler.pmf(&ctx, i as LightId)) * f64::from(n);
                     let expected: Vec<f64> = (0..set.lights.len()).map(pmf).collect();
                     assert_chi_squared(&observed, &expected, 1e-6);

@@ -1,7 +1,7 @@
 //! Lights at a point whose radiant intensity is an image: goniometric diagrams and slide projectors, as in pbrt-v4.
 //!
-//! An image covers the sphere by the equal-area octahedral map, or a rectangle of the plane z = 1 in the space of the light.
-//! Texels are looked up without interpolation.
+//! An image covers the sphere by the equal-area octahedral map, or a rectangle of the plane z = 1 in the space of the
+//! light. Texels are looked up without interpolation.
 
 use super::emit::EmissionSample;
 use super::environment::cleaned;
@@ -140,6 +140,7 @@ impl ImageLight {
         let (axis, cos_theta_o, steradians) = match self.mapping {
             ImageMapping::Sphere => (Vec3::Z, -1.0, 4.0 * PI),
             ImageMapping::Plane { half: [hx, hy] } => {
+                // The cone touches the corners of the image
                 let cos = 1.0 / (1.0 + hx * hx + hy * hy).sqrt();
                 (
                     (self.world_from_light * Vec3::Z).normalize(),

@@ -3,7 +3,7 @@
 //!
 //! | light | E |
 //! |---|---|
-//! | triangle, rectangle | L̄/2 · abs Σ_edges γᵢ (Γᵢ · n) of the polygon above the horizon [Lambert 1760; Baum et al. 1989] |
+//! | triangle, rectangle | L̄/2 · abs Σ_edges γᵢ (Γᵢ · n), polygon above the horizon [Lambert 1760; Baum et al. 1989] |
 //! | one-sided sphere, seen from outside and wholly above the horizon | L̄ π (r/d)² cos θ_c |
 //! | constant environment | π L |
 //!
@@ -74,6 +74,7 @@ impl Irradiances {
 
 /// L̄ of a light; black if E is never available, or if the light has no power.
 fn mean_l(light: &Light) -> Rgb {
+    // E is available for flat and spherical lights, and constant environments
     let l = match light {
         Light::Area(area) => match &area.shape {
             AreaShape::Triangle(_) | AreaShape::Rectangle(_) => area.mean_radiance(),

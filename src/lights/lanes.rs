@@ -6,8 +6,8 @@ use super::Light;
 pub use lumiris_lanes::LightLanes;
 
 impl Light {
-    /// [`sample_li`](Self::sample_li) of an infinite light for each pair of numbers `u[0][i]`, `u[1][i]`; false if it has no
-    /// kernel. The results are those of single samples up to rounding.
+    /// [`sample_li`](Self::sample_li) of an infinite light for each pair of numbers `u[0][i]`, `u[1][i]`. Returns false
+    /// if the light has no kernel. The results equal single samples up to rounding.
     pub fn sample_li_lanes(&self, u: [&[f32]; 2], out: &mut LightLanes<'_>) -> bool {
         let level = lumiris_lanes::level();
         match self {
@@ -35,10 +35,13 @@ mod tests {
     /// that its single call has only where that is on an edge.
     fn assert_like_singles(light: &Light, stream: &mut Pcg32, tolerance: f32) {
         for n in [1, 5, 8, 31, 32, 33, 100] {
+            // Sample in lanes
             let u: [Vec<f32>; 2] = std::array::from_fn(|_| (0..n).map(|_| stream.random()).collect());
             let mut columns: [Vec<f32>; 7] = std::array::from_fn(|_| vec![0.0; n]);
             let [x, y, z, r, g, b, pdf] = &mut columns;
             assert!(light.sample_li_lanes([&u[0], &u[1]], &mut LightLanes { wi: [x, y, z], li: [r, g, b], pdf }));
+
+            // Compare with single samples
             for i in 0..n {
                 let [x, y, z, r, g, b, pdf] = columns.each_ref().map(|column| column[i]);
                 let Some(single) = light.sample_li(&LightCtx::at(Vec3::ZERO), [u[0][i], u[1][i]]) else {

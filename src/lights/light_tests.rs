@@ -67,6 +67,8 @@ pub(super) fn quadric(kind: QuadricKind, placement: Affine3A) -> Quadric {
 pub(super) fn quadric_surface(kind: QuadricKind, placement: Affine3A) -> Surface {
     let light = light_of(&Shape::Quadric(quadric(kind, placement)));
     let inverse = placement.inverse();
+
+    // From coordinates to points
     let point = move |[u, v]: [f32; 2]| {
         let local = match kind {
             QuadricKind::Sphere { radius, z_min, z_max, phi_max } => {
@@ -83,6 +85,8 @@ pub(super) fn quadric_surface(kind: QuadricKind, placement: Affine3A) -> Surface
         };
         placement.transform_point3(local)
     };
+
+    // From points to coordinates
     let invert = move |p: Vec3| {
         let p = inverse.transform_point3(p);
         let phi = lumiris_numbers::math::warp::azimuth(p);
@@ -191,6 +195,8 @@ fn rectangles_follow_their_density_near_far_and_grazing() {
         r.transform_vector3(Vec3::new(0.0, 1.0, 0.0)),
     );
     let at = |x, y, z| r.transform_point3(Vec3::new(x, y, z));
+
+    // Inside and outside of the projection, near the plane, and beyond the limit of uniform sampling
     for from in [
         at(1.0, 0.5, 1.0),
         at(0.3, 0.8, -0.1),
@@ -254,6 +260,8 @@ fn disks_cylinders_and_patches_follow_their_density() {
             }
         }
     }
+
+    // A bent patch
     let v = Vec3::new;
     let patch = patch_surface([v(0.0, 0.0, 0.0), v(1.0, 0.1, 0.0), v(0.2, 2.0, 0.3), v(1.5, 1.2, -0.4)]);
     for from in [v(0.5, 0.5, 1.0), v(3.0, 3.0, 2.0), v(-10.0, 0.0, 5.0)] {

@@ -187,6 +187,7 @@ impl LightSampling {
         scratch: &mut Scratch,
         out: &mut LightSamples,
     ) {
+        // A single light needs no choice
         if let Some(light) = self.sampler.only_light() {
             let len = padded(n);
             self.sample_one_light(light, n, at.p, [&u[1][..len], &u[2][..len]], out);
@@ -202,6 +203,8 @@ impl LightSampling {
             self.sample_chosen(&chosen, at.p, [&u[1], &u[2]], scratch, out);
             scratch.chosen = chosen;
         }
+
+        // Infinite lights overlap
         self.unite_infinite(0..n, |i| at.get(i), out);
     }
 
@@ -473,10 +476,14 @@ mod tests {
                 assert_eq!(out.pdf[i], 0.0);
                 continue;
             };
+
+            // The single sample, with all infinite lights
             let (mut li, mut pdf) = (s.li, s.pdf);
             if lights.infinite.contains(&light) && lights.infinite.len() > 1 {
                 (li, pdf) = lights.infinite_in_direction(&ctx, s.wi);
             }
+
+            // Both agree up to rounding
             let what = lights.lights[light as usize].kind_name();
             drawn += 1;
             assert!((out.pdf[i] - pdf).abs() <= 2e-4 * pdf, "{what} {} {pdf}", out.pdf[i]);

@@ -201,6 +201,7 @@ impl LightSampling {
         pmf: impl Fn(usize, &LightCtx, LightId) -> f32,
         mut out: impl FnMut(usize, Rgb, f32),
     ) {
+        // A single infinite light is evaluated for all directions at once
         if let [light] = self.set.infinite[..] {
             self.set.lights[light as usize].le_and_pdf_many(
                 n,
@@ -285,9 +286,13 @@ mod tests {
             let mut s = pcg32([1, 2, 3]);
             for ns in [Vec3::ZERO, Vec3::Z] {
                 let ctx = LightCtx::on(Vec3::new(0.4, 0.3, 0.0), ns);
+
+                // The probabilities are a distribution, and 0 for the dark light only
                 let pmf: Vec<f64> = (0..6).map(|i| f64::from(set.sampler.pmf(&ctx, i))).collect();
                 assert!((pmf.iter().sum::<f64>() - 1.0).abs() < 1e-5, "{kind:?} {pmf:?}");
                 assert_eq!(pmf.iter().map(|&p| p > 0.0).collect::<Vec<_>>(), [true, true, false, true, true, true]);
+
+                // Samples follow it
                 let count = 50_000;
                 let mut observed = vec![0.0; 6];
                 for _ in 0..count {
@@ -421,6 +426,7 @@ mod tests {
 
     #[test]
     fn what_photons_tell_is_of_lights_that_send_out_some() {
+        // An absorbing, emitting medium
         let grid = RgbGrid {
             sigma_a: Some(Samples::new([1; 3], vec![Rgb::WHITE]).unwrap()),
             sigma_s: None,
@@ -432,11 +438,15 @@ mod tests {
         let media = MediumSet { media: vec![Medium::Heterogeneous(Arc::new(fire))], ..Default::default() };
         let mut builder = builder();
         builder.add_media(&media);
+
+        // A set with a visibility cache
         let choice = |glows| LightChoice { glows, ..LightSamplerKind::Tree.into() };
         let mut set = with_cache(builder, choice(true), &[0, 2]);
         let is_glow = |light: &LightId| set.medium_of(*light).is_some();
         let glow = (0..set.lights.len() as LightId).find(is_glow).unwrap();
         let ctx = LightCtx::at(Vec3::new(0.4, 0.3, 0.0));
+
+        // The cache has no say about the medium, whether or not it is sampled
         for glows in [true, false, true] {
             set.choose_by(choice(glows), 1);
             assert_eq!((set.find_glows(), set.sampler.pmf(&ctx, glow) > 0.0), (glows, glows));

@@ -92,6 +92,8 @@ impl LightSetBuilder {
         let (center, radius) = scene_bounds.bounding_sphere();
         let has_extent = radius > 0.0 && radius.is_finite();
         let scene_radius = if has_extent { radius } else { 1.0 };
+
+        // Infinite lights with a radiance in all directions, and lights with power
         let has_le = |light: &Light| light.is_infinite() && !light.is_delta();
         let infinite = (0..self.lights.len()).filter(|&i| has_le(&self.lights[i])).map(|i| i as LightId).collect();
         let is_lit = |&i: &usize| self.lights[i].phi(scene_radius) > 0.0;

@@ -158,8 +158,8 @@ impl LightTree {
         self.descend(place, u, |place, _| self.left_probability(ctx, place))
     }
 
-    /// Chooses a light by `u` in [0, 1): its id, its probability, and `u` remapped to be uniform again. The point's `turns` hold
-    /// the probabilities that are known.
+    /// Chooses a light by `u` in [0, 1). Returns its id, its probability, and `u` remapped to be uniform again. `turns`
+    /// are the precomputed probabilities of the point.
     #[inline]
     pub fn sample(&self, ctx: &impl Deref<Target = LightCtx>, u: f32, turns: Turns<'_>) -> Option<(LightId, f32, f32)> {
         if self.is_empty() {
@@ -174,6 +174,7 @@ impl LightTree {
         let (mut place, mut number, mut pmf, mut u) = (place as usize, 1, 1.0, u);
         let mut node = &self.nodes[place];
         while !node.is_leaf {
+            // Descend, and rescale the random number
             let p = left(place, number);
             let turns_left = u < p;
             if turns_left {
@@ -307,9 +308,10 @@ impl LightTree {
         }
     }
 
-    /// [`Self::sample`] with the importances `importance(place, node, count)`, which are positive where those of the nodes
-    /// are: so many of `leaves`, ascending places of leaves, are below the node. These leaves themselves are chosen only
-    /// where no light beside them can contribute. Nodes are numbered as in [`Self::sums`].
+    /// [`Self::sample`] with the importances `importance(place, node, count)`, which must be positive where the
+    /// importance of the node is. `count` is the number of `leaves` below the node; `leaves` are positions of leaves in
+    /// ascending order. These leaves are chosen only if no other light can contribute. Nodes are numbered as in
+    /// [`Self::sums`].
     #[inline]
     pub(super) fn sample_by(
         &self,
@@ -422,6 +424,8 @@ mod tests {
         (0..count)
             .map(|i| {
                 let mut vector = || Vec3::new(s.random::<f32>(), s.random::<f32>(), s.random::<f32>());
+
+                // Every second light is in a cluster at the centre
                 let p = if i % 2 == 0 { vector() } else { vector() * 0.02 + 0.5 } * scale;
                 let l = Rgb::splat(s.random::<f32>().powi(4) * 10.0 + 0.01);
                 let axis = sample_uniform_sphere(s.random::<[f32; 2]>());
@@ -505,6 +509,7 @@ mod tests {
             for _ in 0..400 {
                 let ctx = random_ctx(&mut s, scale);
                 for (i, light) in lights.iter().enumerate() {
+                    // Any of four samples with radiance
                     let contributes = (0..4).any(|_| {
                         let sample = light.sample_li(&ctx, s.random::<[f32; 2]>());
                         sample.is_some_and(|s| !s.li.is_black() && (ctx.ns == Vec3::ZERO || s.wi.dot(ctx.ns) != 0.0))

@@ -171,6 +171,7 @@ impl VisibilityCache {
     }
 
     fn from_sorted(origin: Vec3, radius: f32, items: &[(u64, LightId, u32)]) -> Self {
+        // A hash table with a load of at most one half
         let cells = items.chunk_by(|a, b| a.0 == b.0);
         let slots = (2 * cells.clone().count()).next_power_of_two();
         let mut cache = VisibilityCache {
@@ -182,6 +183,8 @@ impl VisibilityCache {
             sums: Vec::with_capacity(items.len()),
             paths: Vec::new(),
         };
+
+        // Entries and cumulative counts by cell
         for cell in cells {
             let slot = cache.find(cell[0].0);
             cache.slots[slot] = Slot { key: cell[0].0, first: cache.entries.len() as u32, len: cell.len() as u32 };
@@ -358,6 +361,8 @@ mod tests {
             [(p, Vec3::Z, 3), (p, Vec3::NEG_Z, 7), (p + Vec3::Z * 5.0, Vec3::Z, 9)]
         });
         let cache = VisibilityCache::new(photons, 0.15);
+
+        // Lookups on both sides, and outside of the cache
         let lights = |p, n| cache.lookup(p, n).iter().map(|(id, _)| *id).collect::<Vec<_>>();
         assert_eq!(lights(at(0.5, 0.5), Vec3::Z), [3]);
         assert_eq!(lights(at(0.5, 0.5), Vec3::NEG_Z), [7]);
@@ -366,6 +371,8 @@ mod tests {
         assert!(lights(at(50.0, 0.5), Vec3::Z).is_empty());
         assert!(lights(at(-50.0, f32::NAN), Vec3::Z).is_empty());
         assert!(cache.bytes() > 0 && cache.radius() == 0.15);
+
+        // Counts
         let contributing = cache.lookup_with_sums(at(0.5, 0.5), Vec3::Z);
         assert_eq!(contributing.sums.last().copied(), Some(contributing.lights[0].1));
         assert!(contributing.count(3) > 0 && contributing.count(8) == 0 && cache.paths(9) == 100.0);

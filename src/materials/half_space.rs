@@ -49,6 +49,8 @@ impl HalfSpace {
     pub fn reflectance(&self, albedo: f64) -> f64 {
         let h = self.h(albedo);
         let n = self.nodes.len();
+
+        // Fixed-point iteration of the upward radiance below the boundary
         let (mut up, mut next) = (vec![0.0; n], vec![0.0; n]);
         for _ in 0..MAX_STEPS {
             let mut change: f64 = 0.0;
@@ -66,6 +68,8 @@ impl HalfSpace {
                 break;
             }
         }
+
+        // ρ: flux through the boundary over incident flux
         let flux = |radiance: &dyn Fn(usize) -> f64| {
             self.nodes.iter().enumerate().map(|(i, [mu, w])| w * mu * radiance(i)).sum::<f64>()
         };

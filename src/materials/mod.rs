@@ -381,6 +381,7 @@ impl MaterialSet {
                 })
             }
             Material::CoatedDiffuse { reflectance, coat } => {
+                // A coat without a scattering medium has a closed form with a table; all others are random walks
                 let base = t.albedo(reflectance);
                 if let (Some(table), true) = (self.coat_of[id as usize], t.albedo(coat.albedo).is_black()) {
                     let (table, distribution) = (&self.coats[table as usize], t.distribution(coat.roughness));

@@ -115,9 +115,13 @@ impl PrincipledMaterial {
         let unit = |id: FloatTextureId| t.float(id).clamp(0.0, 1.0);
         let specular = unit(self.specular);
         let f0 = sqr((self.ior - 1.0) / (self.ior + 1.0));
+
+        // Roughness along and across the direction of anisotropy
         let alpha = sqr(unit(self.roughness));
         let factor = self.direction.and_then(|d| d.map).map_or(1.0, |map| t.rgb(map).b.clamp(0.0, 1.0));
         let [along, across] = self.anisotropy.times(factor).alphas(alpha);
+
+        // An interface with an IOR of about 1 does not refract
         let coat_alpha = sqr(unit(self.coat_roughness));
         let refracts = !self.is_thin && (self.ior - 1.0).abs() > 1e-3;
         Principled {

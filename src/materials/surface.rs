@@ -192,6 +192,8 @@ mod tests {
         let rough = TrowbridgeReitz::new(0.3, 0.15);
         let isotropic = TrowbridgeReitz::new(0.2, 0.2);
         let smooth = TrowbridgeReitz::new(0.0, 0.0);
+
+        // BSDFs with lane kernels
         let tables = [
             (CoatTable::for_roughness(1.5, 0.01, isotropic), isotropic),
             (CoatTable::for_roughness(1.5, 0.01, smooth), smooth),
@@ -218,6 +220,7 @@ mod tests {
         for bsdf in bsdfs {
             for n in [1, 8, 13, 32, 100] {
                 for _ in 0..8 {
+                    // Random directions
                     let frame = Frame::from_z(sample_uniform_sphere(stream.random::<[f32; 2]>()));
                     let surface = SurfaceBsdf { bsdf, frame, n: frame.z, makes_caustics: false };
                     let wo = sample_uniform_sphere(stream.random::<[f32; 2]>());
@@ -234,6 +237,8 @@ mod tests {
                         }
                         v
                     };
+
+                    // Compare
                     let (lanes, single) = (run(false), run(true));
                     for (a, b) in lanes.iter().flatten().zip(single.iter().flatten()) {
                         assert_near(*a, *b, &(bsdf, wo));

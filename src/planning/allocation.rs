@@ -1,19 +1,21 @@
-//! Camera samples where they lower the error most: more for pixels of more noise, fewer for expensive ones.
+//! Adaptive sampling: numbers of camera samples per pixel that minimise the error of the image.
 //!
-//! The relative error of an image is Σ v_p/n_p over pixels of relative variance v_p with n_p samples. For a given time
-//! Σ c_p n_p, where c_p is the cost of a sample, it is least for n_p ∝ √(v_p/c_p). Both come from a *pilot*: a few samples
-//! per pixel with random numbers of their own. So n_p is independent of the samples of the image, and the mean of a
-//! pixel's samples remains unbiased: were n_p to follow from the very samples that are averaged, pixels whose first samples
+//! The relative error is Σ v_p/n_p over pixels with the relative variance v_p and n_p samples. For a given time
+//! Σ c_p n_p, where c_p is the cost of a sample, it is least for n_p ∝ √(v_p/c_p). Variance and cost are estimated by a
+//! *pilot*: a few samples per pixel with random numbers of their own. So n_p is independent of the samples of the
+//! image, and the mean of a pixel stays unbiased. If n_p depended on the averaged samples, pixels whose first samples
 //! happen to be dark would stay dark.
 //!
-//! What visible lights make of v_p is known from more samples than the rest, which see nothing but these lights and so cost
-//! little: it lies in few pixels, those at the edges. The rest is averaged over neighbours. In the image, too, samples may
-//! see lights by more camera rays than become paths (`render::looks`): as many as their own variance and cost ask for, as if they
-//! were independent. Of those of nets fewer would do for the relative error, which falls by 5 % then; the absolute one triples.
+//! The variance of visible emission is concentrated in few pixels, at the edges of lights. It is measured by more
+//! samples than the rest: emission rays, which cost little. The variance of the rest is averaged over neighbours. In
+//! the image, too, samples may have several emission rays (`render::looks`). Their number follows from their own
+//! variance and cost as if they were independent. Low-discrepancy samples need fewer for the relative error, which
+//! would fall by 5 %, but the absolute error would triple.
 //!
-//! What is gained is estimated from the pilot, too, by one half of the pixels with numbers from the other half: where noise is much the same everywhere, as in most paths of many bounces, numbers remain uniform.
+//! The gain is estimated from the pilot, too: on one half of the pixels, with counts computed from the other half.
+//! Where the noise is similar everywhere, as in most paths of many bounces, counts stay uniform.
 //!
-//! The numbers depend on scene, settings and seed only; costs are counted in rays and proposals and not in seconds.
+//! The counts depend on scene, settings and seed only. Costs are counted in rays and proposals, not in seconds.
 
 use super::allocation_counts::{ALONE, Pixel, Rules, SHARED, Share, counts};
 use super::constants::{
@@ -36,10 +38,11 @@ use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// Combined with the seed of the image to give that of the pilot.
+/// Combined with the seed of the image to give the seed of the pilot.
 const PILOT_SEED: u32 = 0x61_6c_6c_6f;
 
-/// The camera samples of each pixel, if the settings ask for different numbers and allow them.
+/// Camera samples of each pixel; `None` if the settings do not ask for adaptive sampling, do not allow it, or nothing
+/// is gained.
 pub(super) fn allocate(job: &RenderJob, how: &Preparation<'_>) -> Result<Option<PixelSamples>, PlanError> {
     let settings = job.settings();
     if let Some(noise) = settings.sampling.noise.filter(|_| settings.allows_adaptive()) {
@@ -58,8 +61,8 @@ pub(super) fn allocate(job: &RenderJob, how: &Preparation<'_>) -> Result<Option<
     Ok(is_better.then_some(PixelSamples { bounds: pilot.bounds, spp, counts, looks }))
 }
 
-/// Completes settings that ask for a standard error: its maximum number of samples per pixel, unless `has_spp`. `Err` says what it
-/// needs.
+/// Completes settings with a target noise: sets the maximum number of samples per pixel unless `has_spp`. `Err` names
+/// the missing requirement.
 pub fn complete_for_noise(settings: &mut Settings, has_spp: bool) -> Result<(), &'static str> {
     if settings.sampling.noise.is_none() {
         return Ok(());
@@ -77,34 +80,34 @@ pub fn complete_for_noise(settings: &mut Settings, has_spp: bool) -> Result<(), 
     }
 }
 
-/// True if samples of an image that is rendered with the settings `of_paths` may be split: their looks have the noise of visible
-/// lights then.
+/// True if samples of an image rendered with the settings `of_paths` may have several emission rays, which then take
+/// over the noise of visible lights.
 pub(super) fn may_split(settings: &Settings, of_paths: &IntegratorSettings) -> bool {
     let sampling = settings.sampling;
     let is_open = sampling.allocation != Allocation::Uniform || sampling.noise.is_some();
     is_open && Settings { integrator: *of_paths, sampling }.allows_adaptive()
 }
 
-/// What a pilot's samples of a pixel say, in few bytes: a pilot has all pixels of an image at once.
+/// Statistics of the pilot's samples of a pixel. Compact, because a pilot holds all pixels of an image at once.
 #[derive(Clone, Copy, Debug, Default)]
 struct Measured {
     count: u32,
-    /// Σ of the samples without what they see of visible lights.
+    /// Σ of the samples without visible emission.
     radiance: [f32; 3],
-    /// Variance of these; 0 of fewer than two.
+    /// Variance of these; 0 for fewer than two samples.
     variance: [f32; 3],
-    /// Mean of what samples see of visible lights.
+    /// Mean visible emission.
     sight: [f32; 3],
-    /// Variance of that from each of two sets of samples.
+    /// Variance of the visible emission, from each of two sets of emission rays.
     sight_variance: [[f32; 3]; 2],
-    /// Cost of a sample, and of one that sees visible lights alone; 0 where nothing was measured.
+    /// Cost of a sample, and of an emission ray; 0 if nothing was measured.
     cost: f32,
     look: f32,
     /// Material of the first surface, or [`NO_MATERIAL`].
     material: u32,
 }
 
-/// The material of pixels that see no surface.
+/// The material of pixels without a surface.
 const NO_MATERIAL: u32 = u32::MAX;
 
 impl Measured {
@@ -125,7 +128,7 @@ impl Measured {
         }
     }
 
-    /// The variance of what samples see of visible lights, by some of the sets.
+    /// Variance of the visible emission, averaged over the given sets.
     fn mean_sight_variance(&self, sets: &[usize]) -> [f64; 3] {
         let of = |c: usize| sets.iter().map(|&k| f64::from(self.sight_variance[k][c])).sum::<f64>() / sets.len() as f64;
         [0, 1, 2].map(of)
@@ -137,18 +140,18 @@ fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
     a.into_iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
-/// What samples see that go no further than the first surface.
+/// Two sets of emission rays of a pixel, and the material of the first surface.
 struct Sight {
     sets: [PixelAccumulator; 2],
     material: u32,
 }
 
-/// The variance of a sample.
+/// Variance of a single sample.
 fn variance(sums: &PixelSums) -> [f64; 3] {
     sums.variance_of_mean().map(|v| v * sums.count as f64)
 }
 
-/// A few samples of the pixels, or of some of them.
+/// The pilot: a few samples of all pixels, or of some.
 struct Pilot<'a> {
     job: &'a RenderJob,
     stage: Stage<'a>,
@@ -163,19 +166,19 @@ struct Pilot<'a> {
 
 #[derive(Clone, Copy)]
 struct PilotSampling {
-    /// Samples of a pixel.
+    /// Samples per pixel.
     spp: u32,
-    /// Part of the pixels that have them.
+    /// Fraction of the pixels that are sampled.
     fraction: f32,
     seed: u32,
-    /// Edge of the blocks of pixels that have them together, and share paths.
+    /// Edge of the blocks of pixels that are sampled together and share paths (pixels).
     edge: u32,
-    /// Samples of each of two sets that see visible lights alone.
+    /// Emission rays per pixel in each of the two sets.
     sight: u32,
 }
 
 impl<'a> Pilot<'a> {
-    /// Without samples.
+    /// A pilot without samples.
     fn new(job: &'a RenderJob, how: &'a Preparation<'a>) -> Self {
         let (sampling, edge) = (&job.settings().sampling, reuse::edge(job));
         let rules = if edge > 1 { SHARED } else { ALONE };
@@ -194,8 +197,9 @@ impl<'a> Pilot<'a> {
         Pilot { job, stage, stop: how.stop, sampling, rules, left: LeftToLightPaths::new(job, how), bounds, pixels }
     }
 
-    /// Samples the tiles whose numbers are chosen. Tiles with the same remainder lie on lattices.
+    /// Samples all tiles, [`TILES_AT_ONCE`] at a time.
     fn measure(&mut self) {
+        // Sample one tile, unless stopped
         let tiles = self.bounds.tiles(COST_TILE);
         let features = if self.rules.radius.is_none() { FeatureSet::NoAlbedo } else { FeatureSet::None };
         let probe = || Probe::new(self.job, &self.left, features);
@@ -205,6 +209,8 @@ impl<'a> Pilot<'a> {
             self.stage.add(1);
             measured
         };
+
+        // Chunks of tiles in parallel
         for tiles in tiles.chunks(TILES_AT_ONCE) {
             let measured: Vec<_> = tiles.par_iter().map_init(probe, of_tile).collect();
             for (tile, measured) in tiles.iter().zip(measured) {
@@ -216,17 +222,17 @@ impl<'a> Pilot<'a> {
         }
     }
 
-    /// The pixels up to `radius` away in each direction.
+    /// Pixels at most `radius` from pixel `i` in both directions.
     fn around(&self, i: usize, radius: usize) -> impl Iterator<Item = usize> + use<> {
         around(i, (self.bounds.width() as usize, self.bounds.height() as usize), radius)
     }
 
-    /// 1/(m² + ε) of each channel; m is the mean of what a pixel sees of visible lights, and of the rest of its neighbours.
+    /// 1/(m² + ε) per channel. m is the visible emission of the pixel plus the mean of the rest over its neighbours.
     fn relative_to(&self, i: usize) -> [f64; 3] {
         self.relative_beside(i, self.pixels[i].sight.map(f64::from))
     }
 
-    /// The same beside visible lights of this radiance.
+    /// The same for the given visible emission.
     fn relative_beside(&self, i: usize, sight: [f64; 3]) -> [f64; 3] {
         let (mut sum, mut count) = ([0.0; 3], 0);
         for q in self.around(i, self.rules.mean_radius).map(|q| &self.pixels[q]) {
@@ -239,21 +245,21 @@ impl<'a> Pilot<'a> {
         })
     }
 
-    /// Relative variance of a sample without visible lights, added up over channels. `None` where it is not known.
+    /// Relative variance of a sample without visible emission, summed over channels; `None` for fewer than two samples.
     fn relative_variance(&self, i: usize) -> Option<f64> {
         let p = &self.pixels[i];
         let of_channels = self.relative_to(i).into_iter().zip(p.variance);
         (p.count >= 2).then(|| of_channels.map(|(relative, v)| relative * f64::from(v)).sum())
     }
 
-    /// The same of visible lights, by some of the sets of samples.
+    /// Relative variance of the visible emission, by the given sets.
     fn of_sight(&self, i: usize, sets: &[usize]) -> f64 {
         let variance = self.pixels[i].mean_sight_variance(sets);
         if variance == [0.0; 3] { 0.0 } else { dot(variance, self.relative_to(i)) }
     }
 
-    /// What is known of each pixel: the relative variance, averaged over the chosen ones of the neighbours or of all pixels of
-    /// the material, and that of visible lights by some of the sets of samples.
+    /// Estimates for each pixel. The relative variance without visible emission is averaged over chosen pixels: the
+    /// neighbours, or all pixels with the same material. The variance of visible emission uses the given sets.
     fn known(&self, is_chosen: impl Fn(usize) -> bool + Sync, sets: &[usize]) -> Vec<Pixel> {
         let known = |i: usize| self.relative_variance(i).filter(|_| is_chosen(i));
         let rest = match self.rules.radius {
@@ -264,7 +270,7 @@ impl<'a> Pilot<'a> {
             }
             None => self.of_materials(known),
         };
-        // Few pixels may have no sample of a tile among them
+        // In a tile with few pixels, none may be sampled: it has the mean cost
         let (sum, count) =
             self.pixels.iter().filter(|p| p.cost > 0.0).fold((0.0, 0), |(sum, n), p| (sum + f64::from(p.cost), n + 1));
         let mean = (sum / f64::from(count.max(1))) as f32;
@@ -277,7 +283,8 @@ impl<'a> Pilot<'a> {
         rest.into_par_iter().enumerate().map(of_pixel).collect()
     }
 
-    /// Σ of what is known of pixels of the same first material, and their number: near the mean of all where they are few.
+    /// Σ of the estimates over pixels with the same first material, and their number. A material with few pixels is
+    /// close to the mean of all.
     fn of_materials(&self, known: impl Fn(usize) -> Option<f64>) -> Vec<[f64; 2]> {
         let (mut all, mut of_material) = ([0.0; 2], BTreeMap::<u32, [f64; 2]>::new());
         for (i, pixel) in self.pixels.iter().enumerate() {
@@ -292,8 +299,8 @@ impl<'a> Pilot<'a> {
         self.pixels.iter().map(of).collect()
     }
 
-    /// The relative variance of visible lights that a pixel has, or its neighbours together: a few samples do not see the
-    /// edge of a light in all pixels that it touches.
+    /// Relative variance of visible emission of a pixel, or of its neighbourhood if that is larger: a few samples do
+    /// not hit the edge of a light in all pixels that it crosses.
     fn of_sight_around(&self, i: usize, sets: &[usize]) -> f64 {
         let (mut variance, mut sight, mut count) = ([0.0; 3], [0.0; 3], 0.0);
         for q in self.around(i, SIGHT_RADIUS).map(|q| &self.pixels[q]) {
@@ -311,13 +318,17 @@ impl<'a> Pilot<'a> {
         of_all.max(self.of_sight(i, sets))
     }
 
-    /// By how much the numbers lower error × cost: of half of the pixels, with numbers that follow from the other half, and
-    /// of visible lights by one set of samples with numbers that follow from the other. Where pixels share paths, the
-    /// geometric mean for the relative and for the absolute error, which is nearly all at edges of visible lights.
+    /// Factor by which the counts reduce error × cost. It is measured on one half of the pixels with counts from the
+    /// other half; visible emission by one set of emission rays with counts from the other set. Where pixels share
+    /// paths, it is the geometric mean of the factors for the relative and the absolute error. Nearly all of the
+    /// absolute error is at edges of visible lights.
     fn gain(&self, spp: u32) -> f64 {
+        // Counts from even pixels and the first set
         let width = self.bounds.width() as usize;
         let is_even = |i: usize| (i % width + i / width).is_multiple_of(2);
         let (counts, looks) = counts(&self.known(is_even, &[0]), (&self.rules, spp));
+
+        // Errors and costs of odd pixels by the second set, uniform and adaptive
         let (mut uniform, mut adaptive) = ([0.0; 3], [0.0; 3]);
         for i in (0..counts.len()).filter(|&i| !is_even(i)) {
             let Some(relative) = self.relative_variance(i) else { continue };
@@ -336,14 +347,17 @@ impl<'a> Pilot<'a> {
                 sums.iter_mut().zip([relative, absolute, cost]).for_each(|(sum, term)| *sum += term);
             }
         }
+
+        // Ratio of the products
         let [relative, absolute, cost] = [0, 1, 2].map(|k| uniform[k] / adaptive[k]);
         let gain = cost * if self.rules.doubles { (relative * absolute).sqrt() } else { relative };
         if gain.is_finite() { gain } else { 1.0 }
     }
 }
 
-/// Σ over the neighbours up to `radius` away in each direction, in rows of so many.
+/// Σ over the neighbours at most `radius` away in both directions, in rows of `width` pixels.
 fn box_sums(mut values: Vec<[f64; 2]>, width: usize, radius: usize) -> Vec<[f64; 2]> {
+    // Sums of a line by prefix sums
     let sums_of = |line: &[[f64; 2]]| -> Vec<[f64; 2]> {
         let prefix: Vec<[f64; 2]> = std::iter::once([0.0; 2])
             .chain(line.iter().scan([0.0; 2], |sum, v| {
@@ -357,6 +371,8 @@ fn box_sums(mut values: Vec<[f64; 2]>, width: usize, radius: usize) -> Vec<[f64;
         };
         (0..line.len()).map(sum).collect()
     };
+
+    // Rows, then columns
     let height = values.len() / width.max(1);
     values.par_chunks_mut(width.max(1)).for_each(|row| row.copy_from_slice(&sums_of(row)));
     let columns: Vec<Vec<[f64; 2]>> = (0..width)
@@ -366,13 +382,14 @@ fn box_sums(mut values: Vec<[f64; 2]>, width: usize, radius: usize) -> Vec<[f64;
     (0..values.len()).into_par_iter().map(|i| columns[i % width][i / width]).collect()
 }
 
-/// What the pilot's samples in a tile say.
+/// Statistics of the pilot's samples in a tile.
 fn pilot_tile(
     job: &RenderJob,
     probe: &mut Probe<'_>,
     tile: &PixelBounds,
     PilotSampling { spp, fraction, seed, edge, sight: sight_spp }: PilotSampling,
 ) -> Vec<Measured> {
+    // Choose blocks of pixels
     let settings = &Estimator::without_fits(&job.settings().integrator, 0);
     let origin = job.world.scene.film.bounds;
     let seeing = &IntegratorSettings { max_depth: 0, ..*settings };
@@ -382,9 +399,13 @@ fn pilot_tile(
     };
     let all: Vec<[u32; 2]> = tile.pixels().collect();
     let (places, chosen): (Vec<usize>, Vec<[u32; 2]>) = (0..).zip(&all).filter(|(_, pixel)| is_chosen(pixel)).unzip();
+
+    // Visible emission of the samples, which is subtracted from them
     let mut seen = Vec::with_capacity(chosen.len() * spp as usize);
     probe.trace(seeing, &chosen, (0..spp, seed), |_, sample| seen.push(sample.radiance));
     probe.take_cost(0);
+
+    // Samples without visible emission
     let mut sums = vec![PixelAccumulator::default(); all.len()];
     let mut seen = seen.into_iter();
     probe.trace(settings, &chosen, (0..spp, seed), |i, sample| {
@@ -392,19 +413,22 @@ fn pilot_tile(
         sums[places[i]].add(0, &PixelSample { radiance, ..PixelSample::default() });
     });
     let cost = probe.take_cost(chosen.len() * spp as usize);
+
+    // Emission rays
     let sight = see(probe, seeing, (&all, tile.width() as usize), (sight_spp, seed));
     let looks: u64 = sight.iter().flat_map(|sight| &sight.sets).map(|sums| u64::from(sums.radiance.count)).sum();
     let costs = [cost, LOOK_COST * probe.take_cost(looks as usize)];
     sums.iter().zip(&sight).map(|(samples, sight)| Measured::of(samples, sight, costs)).collect()
 }
 
-/// Two sets of samples that see visible lights alone, at pixels in rows of the given width: more for pixels beside which these differ.
+/// Two sets of emission rays, of pixels in rows of the given width. Pixels whose neighbours differ get more of them.
 fn see(
     probe: &mut Probe<'_>,
     settings: &IntegratorSettings,
     (pixels, width): (&[[u32; 2]], usize),
     (spp, seed): (u32, u32),
 ) -> Vec<Sight> {
+    // Samples of both sets, with seeds of their own
     let none = || Sight { sets: <[PixelAccumulator; 2]>::default(), material: NO_MATERIAL };
     let mut sums: Vec<Sight> = std::iter::repeat_with(none).take(pixels.len()).collect();
     let seeds = [1, 2].map(|set| pcg4d([seed, PILOT_SEED, 0, set])[0]);
@@ -420,6 +444,8 @@ fn see(
         let luminance = |sums: &PixelAccumulator| luminance(sums.radiance.values());
         sums.iter().map(|sight| sight.sets.each_ref().map(luminance)).collect::<Vec<_>>()
     };
+
+    // All pixels, then those at edges
     let all: Vec<usize> = (0..pixels.len()).collect();
     let first = add(&all, 0..spp);
     let differs = |i: &usize| {

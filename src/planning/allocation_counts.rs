@@ -1,59 +1,59 @@
-//! How many camera samples pixels get, and how many looks each of these, from the variance and the cost of both.
+//! Numbers of camera samples and of emission rays per pixel, computed from variance and cost of both.
 
 use super::constants::{BISECTIONS, CHUNK, ITERATIONS, MAX_LOOKS, MIN_SPLIT, RANGE};
 use rayon::prelude::*;
 
-/// What numbers follow from.
+/// Parameters of the computation.
 #[derive(Clone, Copy)]
 pub(super) struct Rules {
-    /// Samples of the pilot as a fraction of those of the image.
+    /// Samples of the pilot as a fraction of the samples of the image.
     pub(super) fraction: f64,
-    /// Pixels to each side over which means are averaged.
+    /// Radius of the neighbourhood over which means are averaged (pixels).
     pub(super) mean_radius: usize,
-    /// The same of variances; `None`: over all pixels of a material.
+    /// Radius of the neighbourhood over which variances are averaged (pixels). `None`: all pixels of a material.
     pub(super) radius: Option<usize>,
-    /// True if pixels have this number of samples or twice, 4 times or 8 times as many.
+    /// True if counts are 1, 2, 4 or 8 times the count of the settings.
     pub(super) doubles: bool,
-    /// Gain below which numbers remain uniform.
+    /// Minimum gain for counts that are not uniform.
     pub(super) min_gain: f64,
 }
 
-/// Where pixels have paths of their own.
+/// Parameters for pixels with paths of their own.
 pub(super) const ALONE: Rules =
     Rules { fraction: 0.05, mean_radius: 1, radius: Some(2), doubles: false, min_gain: 1.05 };
-/// Where they share them: few samples do not tell what is left of the noise of one pixel from that of others, so numbers
-/// follow from visible lights, whose edges gain nothing by sharing, and from materials: metal and glass share nothing
-/// either. All others have as many samples as each other, so that they share all of their paths.
+/// Parameters for pixels that share paths. Few samples cannot separate the remaining noise of one pixel from the noise
+/// of others, so counts follow from visible lights and from materials. The edges of lights gain nothing by sharing, and
+/// metal and glass share nothing. All other pixels have the same count, so that they share all of their paths.
 pub(super) const SHARED: Rules = Rules { fraction: 0.025, mean_radius: 4, radius: None, doubles: true, min_gain: 1.03 };
 
-/// What is known of a pixel.
+/// Estimates of a pixel.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Pixel {
-    /// Relative variance of a sample without visible lights.
+    /// Relative variance of a sample without visible emission.
     pub(super) rest: f32,
-    /// Relative variance of what a sample sees of visible lights.
+    /// Relative variance of the visible emission of a sample.
     pub(super) sight: f32,
     /// Cost of a sample.
     pub(super) cost: f32,
-    /// Cost of a look.
+    /// Cost of an emission ray.
     pub(super) look: f32,
 }
 
-/// What a pixel gets.
+/// Samples and emission rays of a pixel.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Share {
     /// Samples, relative to the mean.
     pub(super) samples: f64,
-    /// Looks of each, its own included.
+    /// Emission rays per sample, including its own.
     pub(super) looks: u8,
 }
 
 impl Share {
-    /// That of all pixels of an image whose samples are not distributed.
+    /// The share of every pixel if sampling is uniform.
     pub(super) const ONE: Share = Share { samples: 1.0, looks: 1 };
 
-    /// Error and cost of a pixel that gets it. The path of a sample has a look of its own; where there are more, that one is
-    /// repeated, to be told from what the path finds later.
+    /// Error and cost of a pixel with this share. The path of a sample includes one emission ray. If there are more,
+    /// this ray is traced again, to separate its emission from the rest of the path.
     pub(super) fn of(self, pixel: &Pixel) -> [f64; 2] {
         let Pixel { rest, sight, cost, look } = *pixel;
         let looks = f64::from(self.looks);
@@ -62,13 +62,14 @@ impl Share {
         [error, (f64::from(cost.max(1.0)) + of_looks) * self.samples]
     }
 
-    /// What makes error + rate × cost least. Samples and looks follow from their own variances: n ∝ √(v/c).
+    /// The share with the least error + rate × cost. Samples and emission rays each follow from their own variance:
+    /// n ∝ √(v/c).
     fn best(pixel: &Pixel, rate: f64, rules: &Rules) -> Share {
         let [rest, sight, cost, look] =
             [pixel.rest, pixel.sight, pixel.cost.max(1.0), pixel.look.max(1.0)].map(f64::from);
         let all_looks = (sight / (look * rate)).sqrt();
         let with_looks = |samples: f64| {
-            // Not a number where nothing varies
+            // NaN if nothing varies, which `max` replaces by 1
             let looks = (all_looks / samples + 0.5).max(1.0).min(f64::from(MAX_LOOKS));
             Share { samples, looks: looks as u8 }
         };
@@ -84,7 +85,7 @@ impl Share {
             let loss = loss(share);
             best = if loss < best.1 { (share, loss) } else { best };
         };
-        // Where no light is seen a look more is never worth its cost
+        // Without visible emission, further emission rays are never worth their cost
         let is_lit = sight > 0.0;
         if rules.doubles {
             for samples in [1.0, 2.0, 4.0, 8.0] {
@@ -101,9 +102,9 @@ impl Share {
     }
 }
 
-/// Numbers of samples of pixels, and of the looks of each sample: those of the least error, of the same cost as `spp` samples
-/// everywhere; or if samples are doubled, `spp` or 2, 4 or 8 times as many, where that lowers error × cost of the image. Pixels
-/// whose cost is 0, of which nothing is known, have no part in that.
+/// Samples per pixel, and emission rays per sample. Minimises the error at the cost of `spp` samples everywhere. With
+/// [`Rules::doubles`], counts are 1, 2, 4 or 8 times `spp`, and minimise error × cost of the image. Pixels of cost 0,
+/// without estimates, are not counted.
 pub(super) fn counts(pixels: &[Pixel], (rules, spp): (&Rules, u32)) -> (Vec<u32>, Vec<u8>) {
     let sums = |rate: f64| -> [f64; 2] {
         let of_chunk = |pixels: &[Pixel]| {
@@ -112,7 +113,7 @@ pub(super) fn counts(pixels: &[Pixel], (rules, spp): (&Rules, u32)) -> (Vec<u32>
                 [sum[0] + of_pixel[0], sum[1] + of_pixel[1]]
             })
         };
-        // In the order of chunks, whoever is first
+        // Summed in the order of chunks, independent of threads
         let of_chunks: Vec<[f64; 2]> = pixels.par_chunks(CHUNK).map(of_chunk).collect();
         of_chunks.into_iter().fold([0.0; 2], |a, b| [a[0] + b[0], a[1] + b[1]])
     };
@@ -124,7 +125,7 @@ pub(super) fn counts(pixels: &[Pixel], (rules, spp): (&Rules, u32)) -> (Vec<u32>
     } else {
         let costs = pixels.iter().map(|pixel| pixel.cost).filter(|cost| *cost > 0.0);
         let all: f64 = costs.map(|cost| f64::from(cost.max(1.0))).sum();
-        // Bisection of the logarithm; costs fall as the rate rises
+        // Bisection of the logarithm: the cost falls as the rate rises
         let (mut low, mut high) = (-100.0_f64, 60.0_f64);
         for _ in 0..BISECTIONS {
             let middle = 0.5 * (low + high);
@@ -144,20 +145,20 @@ mod tests {
     use super::*;
     use std::f64::consts::SQRT_2;
 
-    /// Pixels of these variances without visible lights, and of these costs.
+    /// Pixels with these variances and costs, without visible emission.
     fn pixels(variances: &[f32], costs: &[f32]) -> Vec<Pixel> {
         let pixel = |(&rest, &cost): (&f32, &f32)| Pixel { rest, sight: 0.0, cost, look: 1.0 };
         variances.iter().zip(costs).map(pixel).collect()
     }
 
-    /// Numbers of samples of pixels without visible lights.
+    /// Sample counts of pixels without visible emission.
     fn numbers(variances: &[f32], costs: &[f32], (rules, spp): (&Rules, u32)) -> Vec<u32> {
         let (counts, looks) = counts(&pixels(variances, costs), (rules, spp));
         assert!(looks.iter().all(|looks| *looks == 1));
         counts
     }
 
-    /// Error and cost of pixels with the numbers that they got.
+    /// Error and cost of pixels with the computed counts.
     fn error_and_cost(pixels: &[Pixel], (counts, looks): &(Vec<u32>, Vec<u8>), spp: u32) -> [f64; 2] {
         let all = pixels.iter().zip(counts.iter().zip(looks));
         all.fold([0.0; 2], |sum, (pixel, (&n, &looks))| {
@@ -168,7 +169,7 @@ mod tests {
 
     #[test]
     fn numbers_of_samples_follow_noise_and_cost_and_keep_the_time() {
-        // Two in three pixels have a quarter of the variance of the others, and one of these costs twice as much
+        // Two in three pixels have a quarter of the variance of the third, and one of the two costs twice as much
         let weights: Vec<f32> = (0..300).map(|i| if i % 3 == 0 { 4.0 } else { 1.0 }).collect();
         let costs: Vec<f32> = (0..300).map(|i| if i % 3 == 1 { 2.0 } else { 1.0 }).collect();
         let counts = numbers(&weights, &costs, (&ALONE, 64));
@@ -193,7 +194,7 @@ mod tests {
 
     #[test]
     fn what_varies_by_visible_lights_has_more_looks_and_not_more_paths() {
-        // One pixel in 50 sees the edge of a lamp; a path costs 10 looks
+        // One pixel in 50 covers the edge of a lamp; a path costs 10 emission rays
         let pixel = |i: usize| Pixel {
             rest: 1.0,
             sight: if i.is_multiple_of(50) { 400.0 } else { 0.0 },
@@ -205,13 +206,13 @@ mod tests {
             let given = counts(&all, (&rules, 64));
             let (edge, other) = ((given.0[0], given.1[0]), (given.0[1], given.1[1]));
             assert_eq!(other.1, 1);
-            // √(s c/(r c_look)) where both are free
+            // √(s c/(r c_look)) if neither count is at a limit
             assert!((50..64).contains(&edge.1), "{edge:?} {other:?}");
             assert!(edge.0 < 2 * other.0, "{edge:?} {other:?}");
             let [_, cost] = error_and_cost(&all, &given, 64);
             let uniform: f64 = all.iter().map(|pixel| f64::from(pixel.cost)).sum();
             assert!(rules.doubles || (cost / uniform - 1.0).abs() < 0.01, "looks are in the time: {cost} {uniform}");
-            // Better than samples alone by far, and than twice or half as many looks
+            // Much better than samples alone, and better than half or twice as many emission rays
             let alone: Vec<Pixel> = all.iter().map(|p| Pixel { rest: p.rest + p.sight, sight: 0.0, ..*p }).collect();
             let loss = |given: &(Vec<u32>, Vec<u8>)| error_and_cost(&all, given, 64).iter().product::<f64>();
             assert!(loss(&given) < 0.65 * loss(&counts(&alone, (&rules, 64))));
@@ -220,7 +221,7 @@ mod tests {
                 assert!(loss(&given) <= 1.001 * loss(&(given.0.clone(), changed)), "{looks}");
             }
         }
-        // The same of an image in which light varies as much: a look more is worth no more than what it costs
+        // If the rest varies as much, few additional emission rays are worth their cost
         let still: Vec<Pixel> = all.iter().map(|p| Pixel { rest: 400.0, ..*p }).collect();
         assert!(counts(&still, (&ALONE, 64)).1.iter().all(|looks| *looks <= 3));
     }
@@ -252,7 +253,7 @@ mod tests {
 
     #[test]
     fn who_shares_has_a_power_of_two_of_samples_and_the_others_as_many_as_each_other() {
-        // One pixel in 100 has 10,000 times the variance, one 20 times, one 1.5 times
+        // One pixel in 100 has 10,000 times the variance, one 20 times, and one 1.5 times
         let weight = |i: usize| {
             if i % 100 == 7 {
                 1e4
@@ -275,7 +276,7 @@ mod tests {
                 .enumerate()
                 .all(|(i, n)| [12, 24, 48, 96].contains(n) && (i % 100 == 7 || i % 100 == 8 || *n == 12))
         );
-        // None is better with twice or half as many, all pixels of its kind together
+        // No count is better halved or doubled for all pixels of its kind
         let best = loss(&counts);
         for kind in [7, 8, 9] {
             for factor in [0.5, 2.0] {

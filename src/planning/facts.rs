@@ -1,8 +1,7 @@
-//! Facts of a scene that the [rule](super::rule) chooses by: counts of its lights and of what the camera sees.
+//! Facts of a scene, the inputs of the [rule](super::rule): number of lights, sky, and diffuse surfaces in view.
 //!
-//! Some camera rays, light samples where they arrive, and one more ray from each diffuse surface there show how much of the image is
-//! diffuse surfaces beside others, and whether these see the sky. Nothing is timed, so the facts of a scene are the same on all
-//! machines.
+//! Measured by camera rays, light samples at their hits, and one more ray from each diffuse hit. Nothing is timed, so
+//! the facts of a scene are the same on all machines.
 
 use super::constants::{FACT_RAYS, LIGHT_SAMPLES};
 use crate::accel::{Coherence, RayBatch};
@@ -22,19 +21,21 @@ const SEED: u32 = 0x66_61_63_74;
 /// Facts of a scene.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Facts {
-    /// Lights with power; all triangles of a mesh are one.
+    /// Number of lights with power. All triangles of a mesh count as one.
     pub lights: usize,
-    /// Share of the lights at infinity in the direct light that arrives at the surfaces that the camera sees.
+    /// Fraction of lights at infinity in the direct light at the surfaces visible to the camera.
     pub sky: f64,
-    /// Fraction of these surfaces that are diffuse, and see another diffuse surface by the cosine.
+    /// Fraction of these surfaces that are diffuse and next to another diffuse surface: a cosine-distributed ray hits
+    /// one.
     pub diffuse_pairs: f64,
     /// Fraction of the rays from diffuse surfaces that leave the scene.
     pub open: f64,
 }
 
 impl Facts {
-    /// The facts of the scene of a job.
+    /// Measures the facts of the scene of a job.
     pub fn of(job: &RenderJob) -> Self {
+        // Lights, one per mesh
         let set = &job.world.scene.lights;
         let sources = set.sources();
         let of_mesh = |light: &LightId| sources[*light as usize];
@@ -42,9 +43,12 @@ impl Facts {
         let lights = meshes.len() + set.lit.iter().filter(|light| of_mesh(light).is_none()).count();
         let mut facts = Facts { lights, ..Facts::default() };
 
+        // Visible surfaces and their light
         let rays: Vec<Ray> = camera_rays(job).collect();
         let seen: Vec<SurfaceInteraction> = hits(job, &rays).into_iter().flatten().collect();
         facts.sky = sky(job, &seen);
+
+        // Diffuse surfaces, and the surfaces around them
         let diffuse: Vec<&SurfaceInteraction> = seen.iter().filter(|at| is_diffuse(job, at)).collect();
         let rays: Vec<Ray> = (0..).zip(&diffuse).map(|(i, at)| cosine_ray(at, i)).collect();
         let (mut pairs, mut left) = (0, 0);
@@ -61,12 +65,12 @@ impl Facts {
     }
 }
 
-/// Camera rays all over the image.
+/// Camera rays distributed over the image.
 fn camera_rays(job: &RenderJob) -> impl Iterator<Item = Ray> {
     let bounds = job.world.scene.film.bounds;
     let camera = CameraSampler::new(job, 0);
     (1..=FACT_RAYS).map(move |i| {
-        // Points of the R2 sequence [Roberts 2018]
+        // R2 sequence [Roberts 2018]
         let place = |step: f64, size: u32| ((f64::from(i) * step).fract() * f64::from(size)) as u32;
         let pixel =
             [bounds.x0 + place(0.754_877_666, bounds.width()), bounds.y0 + place(0.569_840_291, bounds.height())];
@@ -79,15 +83,17 @@ fn normal(at: &SurfaceInteraction) -> Vec3 {
     if at.surface.n.dot(at.wo) < 0.0 { -at.surface.n } else { at.surface.n }
 }
 
-/// A ray by the cosine from a surface.
+/// A cosine-distributed ray from a surface.
 fn cosine_ray(at: &SurfaceInteraction, i: u32) -> Ray {
     let [u, v, ..] = pcg4d([i, SEED, 0, 0]).map(unit_f32);
     let d = Frame::from_z(normal(at)).to_world(sample_cosine_hemisphere([u, v]));
     Ray { o: at.origin(d), d, t_max: f32::INFINITY, time: 0.0 }
 }
 
-/// Share of the lights at infinity in the irradiance of surfaces, by light samples that are traced; 0 where there is no light.
+/// Fraction of lights at infinity in the irradiance of surfaces, estimated by traced light samples; 0 if there is no
+/// light.
 fn sky(job: &RenderJob, seen: &[SurfaceInteraction]) -> f64 {
+    // Sample lights at each surface
     let (mut segments, mut found) = (RayBatch::default(), Vec::new());
     for (i, at) in (0..).zip(seen) {
         let n = normal(at);
@@ -99,8 +105,12 @@ fn sky(job: &RenderJob, seen: &[SurfaceInteraction]) -> f64 {
             found.push((job.world.scene.lights.lights[light as usize].is_infinite(), value));
         }
     }
+
+    // Trace shadow rays
     let mut occluded = Vec::new();
     job.world.accel.occluded(&segments, Coherence::Incoherent, &mut occluded);
+
+    // Sum the unoccluded light
     let sum = |is_counted: fn(bool) -> bool| -> f64 {
         let visible = found
             .iter()
@@ -112,7 +122,7 @@ fn sky(job: &RenderJob, seen: &[SurfaceInteraction]) -> f64 {
     if all > 0.0 { of_sky / all } else { 0.0 }
 }
 
-/// What rays meet first.
+/// The first hits of rays.
 fn hits(job: &RenderJob, rays: &[Ray]) -> Vec<Option<SurfaceInteraction>> {
     let (mut batch, mut hits) = (RayBatch::default(), Vec::new());
     batch.set(rays.iter());
@@ -122,7 +132,7 @@ fn hits(job: &RenderJob, rays: &[Ray]) -> Vec<Option<SurfaceInteraction>> {
     rays.iter().zip(&hits).map(at).collect()
 }
 
-/// True if a surface reflects alike to all directions, and does nothing else.
+/// True if the only lobe of a surface is diffuse.
 fn is_diffuse(job: &RenderJob, at: &SurfaceInteraction) -> bool {
     at.scatter(job).is_some_and(|bsdf| matches!(bsdf.bsdf, Bsdf::Diffuse(_)))
 }

@@ -1,8 +1,11 @@
-//! Completes what settings leave open until the scene is loaded, on one page: [`prepare`].
+//! Completes the settings that stay open until the scene is loaded; entry point [`prepare`].
 //!
-//! The estimator `auto` is chosen by a [rule] from [facts] of the scene. Where more is asked for, [trials](tune) look for better
-//! settings. Then pilots tell how many camera samples each pixel gets: by their [noise](allocation), or for a [standard
-//! error](noise) that is asked for. All of it but trials is a function of scene, settings and seed, and counts in place of measuring time.
+//! * `rule`, [`facts`]: chooses the estimator for `auto` from facts of the scene.
+//! * [`tune`], `trials`: searches for more efficient settings by timed trials, on request.
+//! * [`allocation`], `allocation_counts`, `noise`, `probe`: pilots for the number of camera samples of each pixel.
+//! * [`proposals`], [`visibility_cache`]: proposals of `ris` per pixel; the cache of contributing lights.
+//!
+//! Except for trials, the results are a function of scene, settings and seed: work is counted, not timed.
 
 pub mod allocation;
 mod allocation_counts;
@@ -26,18 +29,18 @@ use crate::settings::table::rows;
 use crate::settings::{Allocation, EstimatorKind, Settings};
 use tune::Tuning;
 
-/// What was chosen for an image, as far as its settings left it open.
+/// Choices made for an image where its settings were open.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Plan {
-    /// What trials found, if they were asked for.
+    /// Result of the trials, if requested.
     pub tuning: Option<Tuning>,
-    /// The settings that were chosen, by their names in metadata: with these, rendering gives the same image to the bit.
+    /// The chosen settings, by their names in metadata. Rendering with them gives a bit-identical image.
     pub chosen: Vec<(&'static str, String)>,
-    /// What the user should know of settings that have no effect.
+    /// Warnings about settings without effect.
     pub warnings: Vec<String>,
 }
 
-/// Completes what the settings of `job` leave open, or says why there can be no image.
+/// Completes the open settings of `job`. Fails if no image is possible.
 pub fn prepare(job: &mut RenderJob, how: &Preparation<'_>) -> Result<Plan, PlanError> {
     if let Some(conflict) = features::refusal(job, &job.settings().integrator) {
         return Err(conflict.into());
@@ -64,7 +67,7 @@ pub fn has_pilot(settings: &Settings) -> bool {
         || sampling.noise.is_some()
 }
 
-/// Makes the choices, which are not part of the plan yet.
+/// Makes the choices, but does not record them in the plan.
 fn complete(job: &mut RenderJob, open: &Settings, how: &Preparation<'_>) -> Result<Plan, PlanError> {
     let pool = preparation::thread_pool(how.threads)?;
     (how.observe)("looking at the scene", None);
@@ -84,7 +87,7 @@ fn complete(job: &mut RenderJob, open: &Settings, how: &Preparation<'_>) -> Resu
     Ok(Plan { tuning, chosen: Vec::new(), warnings: warnings(job) })
 }
 
-/// What settings ask for, and the scene does not allow. Settings that do not apply are said to have no effect where they are given.
+/// Warnings about requested features that the scene does not allow. Settings that do not apply are reported elsewhere.
 fn warnings(job: &RenderJob) -> Vec<String> {
     let settings = &job.settings().integrator;
     let applies = |flag: &str| rows().any(|row| row.flag == flag && row.applies.to(job.settings()));
@@ -94,8 +97,8 @@ fn warnings(job: &RenderJob) -> Vec<String> {
     wanted.filter_map(warning).collect()
 }
 
-/// The settings that differ, either as they are set or by what is recorded of them: where something was open and the choice is
-/// what is recorded of open settings, too, it would be chosen again.
+/// Settings that differ from `before`, by value or by their record in metadata. A choice whose record equals the record
+/// of the open setting is included: otherwise it would be open again.
 fn chosen(before: &Settings, after: &Settings) -> Vec<(&'static str, String)> {
     let recorded: Vec<_> = before.recorded().collect();
     let is_set = |key: &str| rows().any(|row| row.key == key && (row.get)(before) != (row.get)(after));

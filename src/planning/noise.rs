@@ -1,17 +1,17 @@
-//! `--noise`: as many camera samples as a standard error needs, block by block.
+//! `--noise`: numbers of camera samples for a given noise, block by block.
 //!
-//! The noise of a block is defined in [`crate::film::noise`]. A *pilot* estimates its mean and its variance: each pixel is
-//! rendered twice with n samples, by two seeds of their own, and half the squared difference of the two is the variance of n samples, whatever the sampler gains over
-//! independent ones. It falls at least as fast as 1/n, which says how many samples the block needs. The schedule: n = 2,
-//! doubled for blocks that need more than [`REACH`] times the pilot's samples, until none does or the limit is reached.
+//! The noise of a block is defined in [`crate::film::noise`]. A *pilot* estimates its mean and variance. It renders
+//! each pixel twice with n samples, with two seeds of its own. Half the squared difference is the variance of n
+//! samples, including the gain of the sampler over independent samples. This variance falls at least as fast as 1/n,
+//! which gives the number of samples that the block needs. The pilot starts with n = 2. It doubles n for blocks that
+//! need more than [`REACH`] times its samples, until none does or the limit is reached.
 //!
-//! What the samples see of visible lights is known apart from the rest. Where it is much of the variance, as at the edge of
-//! a lamp, samples see lights by more camera rays than their own (`render::looks`): as many as make the time least in which the block
-//! has the noise that is asked for.
+//! Visible emission is measured separately. If it causes much of the variance, as at the edge of a lamp, samples have
+//! several emission rays (`render::looks`). Their number minimises the time for the requested noise.
 //!
-//! So the number of samples follows from the pilot alone, and is independent of the samples of the image, whose mean is
-//! therefore unbiased. Rendering until the image's own samples agree would stop too early where they agree by chance: where
-//! they all miss what is rare and bright.
+//! The counts depend on the pilot only and are independent of the samples of the image, whose mean is therefore
+//! unbiased. Rendering until the image's own samples agree would stop too early where they agree by chance: where all
+//! of them miss rare, bright light.
 
 use super::constants::{FIRST, LOOK_COST, LOOKS_KNOWN, MAX_LOOKS, REACH};
 use super::preparation::{PlanError, Preparation, Stage};
@@ -26,11 +26,12 @@ use lumiris_numbers::math::luminance;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// Combined with the seed of the image to give those of the pilot.
+/// Combined with the seed of the image to give the seeds of the pilot.
 const SEED: u32 = 0x6e_6f_69_73;
 
-/// The camera samples of each pixel for a noise of `threshold` in every block, at most those of the settings.
+/// Camera samples of each pixel for a noise of at most `threshold` in every block, up to the limit of the settings.
 pub(super) fn counts_for(job: &RenderJob, threshold: f32, how: &Preparation<'_>) -> Result<PixelSamples, PlanError> {
+    // Count the samples of each block
     let seed = job.settings().sampling.seed;
     let seeds = [0, 1].map(|k| pcg4d([seed, SEED, 0, k])[0]);
     let bounds = job.world.scene.film.bounds;
@@ -46,6 +47,7 @@ pub(super) fn counts_for(job: &RenderJob, threshold: f32, how: &Preparation<'_>)
     let probe = || Probe::new(job, &left, FeatureSet::None);
     let of_blocks: Vec<Numbers> = blocks.par_iter().map_init(probe, of_block).collect::<Result<_, PlanError>>()?;
 
+    // Spread the counts over the pixels
     let (mut counts, mut looks) = (vec![1; bounds.area()], vec![1; bounds.area()]);
     for (block, numbers) in blocks.iter().zip(of_blocks) {
         for ([x, y], of_pixel) in block.pixels().zip(numbers.looks) {
@@ -56,23 +58,25 @@ pub(super) fn counts_for(job: &RenderJob, threshold: f32, how: &Preparation<'_>)
     if looks.iter().all(|n| *n == 1) {
         looks = Vec::new();
     }
+
+    // Compute the mean count
     let mean = counts.iter().map(|&n| u64::from(n)).sum::<u64>().div_ceil(counts.len().max(1) as u64);
     Ok(PixelSamples { bounds, spp: (mean as u32).max(1), counts, looks })
 }
 
-/// What the pixels of a block get: samples, and looks of each of these, pixel by pixel.
+/// Samples per pixel of a block, and emission rays per sample, pixel by pixel.
 struct Numbers {
     samples: u32,
     looks: Vec<u8>,
 }
 
-/// Sums of the pilot's samples of a block by two seeds.
+/// Sums of the pilot's samples in a block, by two seeds.
 struct Sums {
-    /// Of what the samples find.
+    /// Radiance, row by row.
     all: [Vec<[f64; 3]>; 2],
-    /// Of what they see of visible lights, which is a part of that.
+    /// Visible emission, which is part of the radiance.
     seen: [Vec<[f64; 3]>; 2],
-    /// Cost of a sample, and of a look.
+    /// Cost of a sample and of an emission ray.
     costs: [f64; 2],
 }
 
@@ -83,6 +87,7 @@ fn numbers_of_block(
     (seeds, threshold): ([u32; 2], f32),
     stop: &AtomicBool,
 ) -> Numbers {
+    // Settings of the samples and of emission rays
     let Settings { integrator, sampling } = job.settings();
     let integrator = &Estimator::without_fits(integrator, 0);
     let (limit, pilot_limit) = (sampling.spp, sampling.pilot_spp());
@@ -91,7 +96,10 @@ fn numbers_of_block(
     let none = || seeds.map(|_| vec![[0.0; 3]; block.area()]);
     let mut sums = Sums { all: none(), seen: none(), costs: [0.0; 2] };
     let (mut done, mut until) = (0, FIRST);
+
+    // Double the samples until they suffice
     loop {
+        // Add up radiance, visible emission and their costs
         let Sums { all, seen, costs } = &mut sums;
         for ((sums, settings), of_kind) in [(all, integrator), (seen, &seeing)].into_iter().zip(costs) {
             probe.take_cost(0);
@@ -102,6 +110,8 @@ fn numbers_of_block(
             }
             *of_kind = probe.take_cost(2 * pixels.len() * (until - done) as usize);
         }
+
+        // Estimate the samples that are needed
         done = until;
         let (needed, looks) = numbers_for(&sums, block.width() as usize, done, threshold);
         if needed <= f64::from(REACH * 2 * done) || 2 * done >= pilot_limit || stop.load(Ordering::Relaxed) {
@@ -111,14 +121,14 @@ fn numbers_of_block(
     }
 }
 
-/// Samples for a noise of `threshold`, and the looks of each pixel, where pixels in rows of `width` have the sums of `n` samples
-/// of each seed.
+/// Samples for a noise of `threshold`, and emission rays of each pixel. The pixels, in rows of `width`, have sums of
+/// `n` samples of each seed.
 fn numbers_for(Sums { all, seen, costs }: &Sums, width: usize, n: u32, threshold: f32) -> (f64, Vec<u8>) {
     let pixels = all[0].len();
     let per_sample = 1.0 / f64::from(n);
     let luminances =
         |sums: &[Vec<[f64; 3]>; 2], i: usize| [&sums[0], &sums[1]].map(|sums| luminance(sums[i]) * per_sample);
-    // Of a sample
+    // Variance of a single sample
     let variance = |[a, b]: [f64; 2]| 0.5 * (a - b) * (a - b) * f64::from(n);
     let (mut mean, mut whole, mut rest) = (0.0, 0.0, 0.0);
     let mut of_sight = Vec::with_capacity(pixels);
@@ -138,7 +148,8 @@ fn numbers_for(Sums { all, seen, costs }: &Sums, width: usize, n: u32, threshold
     if sight == 0.0 {
         return alone;
     }
-    // Time × variance, with so many looks of pixels at edges, is least where their number is that; few samples tell it for few
+    // Emission rays at edge pixels: the number that minimises time × variance, limited because few samples estimate it
+    // poorly
     let [cost, look] = [costs[0].max(1.0), LOOK_COST * costs[1].max(1.0)];
     let part = at_edges as f64 / count;
     let looks = (sight / at_edges as f64 * cost / (rest * look))
@@ -153,8 +164,8 @@ fn numbers_for(Sums { all, seen, costs }: &Sums, width: usize, n: u32, threshold
     (samples(split), edges.into_iter().map(|is_edge| if is_edge { looks as u8 } else { 1 }).collect())
 }
 
-/// The pixels, in rows of `width`, that are not 0, and those beside them: few samples do not see an edge in all pixels that it
-/// touches.
+/// Marks pixels, in rows of `width`, whose value or a neighbour's is not 0: few samples do not hit an edge in all
+/// pixels that it crosses.
 fn around_any(values: &[f64], width: usize) -> Vec<bool> {
     let size = (width, values.len() / width.max(1));
     let is_any = |i: usize| around(i, size, 1).any(|q| values[q] > 0.0);
@@ -166,8 +177,8 @@ mod tests {
     use super::*;
     use lumiris_test_support::random::{RngExt, pcg32};
 
-    /// Sums of 4 samples of so many pixels, of which each sees light that is spread as uniform numbers from 0 to 2 times
-    /// `sight`, beside such numbers from 0 to 2.
+    /// Sums of 4 samples of each pixel. The visible emission is uniform in 0 to 2 × `sight`, the rest
+    /// uniform in 0 to 2.
     fn sums(pixels: usize, sight: impl Fn(usize) -> f64) -> Sums {
         let mut s = pcg32([3, 1, 4]);
         let mut sum = || (0..4).map(|_| 2.0 * f64::from(s.random::<f32>())).sum::<f64>();
@@ -178,7 +189,7 @@ mod tests {
 
     #[test]
     fn a_block_gets_the_samples_that_its_noise_asks_for() {
-        // Mean 1, variance 1/3 of each of 4 samples
+        // Mean 1 and variance 1/3 of each of 4 samples
         let still = sums(4096, |_| 0.0);
         let expected = 1.0 / 3.0 / (0.02 * 1.01_f64).powi(2);
         let (found, looks) = numbers_for(&still, 64, 4, 0.02);
@@ -191,19 +202,19 @@ mod tests {
 
     #[test]
     fn the_edge_of_a_lamp_gets_looks_and_not_samples() {
-        // One column of 64 sees the edge of a lamp
+        // One column of 64 covers the edge of a lamp
         let is_edge = |i: usize| i % 64 == 20;
         let lamp = sums(4096, |i| if is_edge(i) { 100.0 } else { 0.0 });
         let (found, looks) = numbers_for(&lamp, 64, 4, 0.02);
         assert!((0..4096).all(|i| (looks[i] > 1) == (19..=21).contains(&(i % 64))), "in pixels beside it, too");
         let n = f64::from(looks[20]);
-        // √(s c/(r c_look)), s being the mean over three columns
+        // √(s c/(r c_look)), where s is the mean over three columns
         let best = (1e4 / 3.0 * 20.0 / LOOK_COST).sqrt().min(f64::from(4 * LOOKS_KNOWN));
         assert!((n / best - 1.0).abs() < 0.1, "{n} {best}");
         let wanted = |mean: f64| (0.02 * (mean + 0.01)).powi(2);
         let expected = (1.0 / 3.0 + 1e4 / 3.0 / 64.0 / n) / wanted(1.0 + 100.0 / 64.0);
         assert!((found / expected - 1.0).abs() < 0.2, "{found} {expected}");
-        // Where the rest varies as much, more looks are not worth their time
+        // If the rest varies as much, additional emission rays are not worth their time
         let faint = sums(4096, |i| if is_edge(i) { 0.2 } else { 0.0 });
         assert!(numbers_for(&faint, 64, 4, 0.02).1.iter().all(|n| *n == 1));
     }

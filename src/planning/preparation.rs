@@ -1,37 +1,37 @@
-//! How an image is prepared, what ends that, and why it may fail.
+//! Parameters of the preparation of an image: threads, deadline, observers, errors.
 
 use crate::integrators::features::Conflict;
 use crate::settings::Settings;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 
-/// Maximum number of samples per pixel where the time alone is given.
+/// Maximum samples per pixel if only the time is given.
 const MAX_SPP_FOR_TIME: u32 = 1 << 20;
-/// Samples per pixel that pilots are made for where time is given: at most, and as samples of all pixels for each second.
+/// Samples per pixel that pilots assume if the time is given: maximum, and samples of all pixels per second.
 const PILOT_SPP_FOR_TIME: u32 = 64;
 const PILOT_SAMPLES_PER_SECOND: f64 = (1 << 18) as f64;
-/// How often somebody looks at the clock.
+/// Interval between checks of the deadline.
 const TICK: Duration = Duration::from_millis(10);
 
-/// Gets the name of what is under way, and the part of it that is done, if that is known; called from worker threads.
+/// Receives the name of the current stage, and the completed fraction if available. Called from worker threads.
 pub type StageObserver<'a> = dyn Fn(&'static str, Option<f64>) + Sync + 'a;
 
-/// How an image is prepared.
+/// Parameters of the preparation of an image.
 #[derive(Clone, Copy)]
 pub struct Preparation<'a> {
     /// Number of threads; all processors if `None`.
     pub threads: Option<usize>,
-    /// True if the map of the best M/N is wanted even if it is not used.
+    /// True if the map of the best M/N is requested even if it is not used.
     pub ratio_map: bool,
-    /// When pilots that are not done are given up: the image has settings then that need none.
+    /// Time after which unfinished pilots are abandoned. The image then has settings that need none.
     pub deadline: Option<Instant>,
-    /// True if trials of settings may replace the choice of the rule.
+    /// True if trials may replace the choice of the rule.
     pub tunes: bool,
-    /// Told about how much processor time trials will take, once that is known.
+    /// Receives the expected CPU time of trials.
     pub expect: &'a (dyn Fn(Duration) + Sync),
-    /// Ends the preparation.
+    /// Stops the preparation.
     pub stop: &'a AtomicBool,
-    /// Told what is under way.
+    /// Receives the current stage.
     pub observe: &'a StageObserver<'a>,
 }
 
@@ -52,17 +52,17 @@ impl Default for Preparation<'_> {
 }
 
 impl Preparation<'_> {
-    /// On so many threads.
+    /// Preparation on the given number of threads.
     pub fn on(threads: Option<usize>) -> Self {
         Preparation { threads, ..Preparation::default() }
     }
 
-    /// An error once it is to end.
+    /// Returns an error after a stop.
     pub(super) fn goes_on(&self) -> Result<(), PlanError> {
         if self.stop.load(Ordering::Relaxed) { Err(PlanError::Stopped) } else { Ok(()) }
     }
 
-    /// Does work that is told to stop at the deadline, too.
+    /// Runs work that is stopped at the deadline as well.
     pub(super) fn until_deadline<T>(&self, work: impl FnOnce(&Preparation<'_>) -> T) -> T {
         let Some(deadline) = self.deadline else { return work(self) };
         let (is_done, stop) = (AtomicBool::new(false), AtomicBool::new(false));
@@ -82,21 +82,21 @@ impl Preparation<'_> {
     }
 }
 
-/// Why an image could not be prepared.
+/// Reason why an image could not be prepared.
 #[derive(Debug, thiserror::Error)]
 pub enum PlanError {
     /// The threads could not be started.
     #[error(transparent)]
     Threads(#[from] ThreadError),
-    /// The settings leave out something of the scene.
+    /// The settings exclude a feature of the scene.
     #[error(transparent)]
     Features(#[from] Conflict),
-    /// It was stopped.
+    /// The preparation was stopped.
     #[error("stopped before the first sample")]
     Stopped,
 }
 
-/// Why threads could not start.
+/// Threads could not be started.
 #[derive(Debug, thiserror::Error)]
 #[error("cannot start {threads} threads: {cause}")]
 pub struct ThreadError {
@@ -104,14 +104,14 @@ pub struct ThreadError {
     cause: rayon::ThreadPoolBuildError,
 }
 
-/// Threads, all cores if their number is not given.
+/// A thread pool; one thread per core if no number is given.
 pub fn thread_pool(threads: Option<usize>) -> Result<rayon::ThreadPool, ThreadError> {
     let threads = threads.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, usize::from));
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
     pool.map_err(|cause| ThreadError { threads, cause })
 }
 
-/// Work that consists of so many parts.
+/// A stage of the preparation, with progress by parts.
 pub(super) struct Stage<'a> {
     how: &'a Preparation<'a>,
     name: &'static str,
@@ -120,22 +120,22 @@ pub(super) struct Stage<'a> {
 }
 
 impl<'a> Stage<'a> {
-    /// Begins it.
+    /// Starts the stage.
     pub(super) fn new(how: &'a Preparation<'a>, name: &'static str, parts: usize) -> Self {
         (how.observe)(name, None);
         Stage { how, name, parts, done: AtomicUsize::new(0) }
     }
 
-    /// Some more parts are done.
+    /// Adds completed parts.
     pub(super) fn add(&self, parts: usize) {
         let done = self.done.fetch_add(parts, Ordering::Relaxed) + parts;
         (self.how.observe)(self.name, Some((done as f64 / self.parts.max(1) as f64).min(1.0)));
     }
 }
 
-/// Completes settings of an image of so many pixels that is to be rendered in a time: the maximum number of samples per pixel,
-/// unless `has_spp`, and the number that pilots are made for, unless it is given. Both follow from what is asked for, and not from
-/// measured times, so that pilots and texture footprints are the same on every machine.
+/// Completes settings of an image with `pixels` pixels and a time limit. Sets the maximum number of samples per pixel
+/// unless `has_spp`, and the number that pilots assume unless it is given. Both follow from the request, not from
+/// measured times, so pilots and texture footprints are the same on every machine.
 pub fn complete_for_time(settings: &mut Settings, has_spp: bool, time: Duration, pixels: usize) {
     let sampling = &mut settings.sampling;
     if !has_spp {
@@ -146,7 +146,7 @@ pub fn complete_for_time(settings: &mut Settings, has_spp: bool, time: Duration,
     sampling.pilot_spp = sampling.pilot_spp.or(Some(for_pilots).filter(|&spp| spp < sampling.spp));
 }
 
-/// When pilots are given up of an image that takes this time since its start: when half of what is left by now is over.
+/// Time at which pilots are abandoned: after half of the time that is left now.
 pub fn pilot_deadline(start: Instant, limit: Duration) -> Option<Instant> {
     Instant::now().checked_add(limit.saturating_sub(start.elapsed()) / 2)
 }
@@ -167,7 +167,7 @@ mod tests {
         assert_eq!(completed(None, None, 60.0, 1 << 16), (MAX_SPP_FOR_TIME, Some(64), 0.125));
         assert_eq!(completed(None, None, 40.0, 1 << 20), (MAX_SPP_FOR_TIME, Some(10), 0.125));
         assert_eq!(completed(None, None, 1e-6, 1 << 20).1, Some(1));
-        // Not more than there are samples, and what is given stays
+        // No more than the given samples, and given values stay
         assert_eq!(completed(Some(16), None, 60.0, 1 << 16), (16, None, 0.25));
         assert_eq!(completed(Some(1000), Some(300), 60.0, 1 << 16).1, Some(300));
     }

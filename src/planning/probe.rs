@@ -1,4 +1,4 @@
-//! Samples of some pixels with random numbers of their own, outside the film: what pilots measure with.
+//! Samples of some pixels with random numbers of their own, outside the film: the measuring instrument of pilots.
 
 use crate::direct::Fits;
 use crate::film::accumulator::RadianceAccumulator;
@@ -16,11 +16,11 @@ use std::ops::Range;
 use super::constants::{COLLISION_COST, LIGHT_PILOT};
 use super::preparation::Preparation;
 
-/// What light paths find in an image that has them: pilots leave it to them as the image does.
+/// Light that an image leaves to light paths. Pilots leave out the same light.
 pub(super) struct LeftToLightPaths(Option<(LightPilot, f64)>);
 
 impl LeftToLightPaths {
-    /// Traces a pilot of light paths, if there are any. On the threads of the current pool.
+    /// Traces a pilot of light paths, if the image has any, on the threads of the current pool.
     pub(super) fn new(job: &RenderJob, how: &Preparation<'_>) -> Self {
         let per_sample = f64::from(light_paths::per_sample(job));
         if per_sample > 0.0 {
@@ -30,13 +30,13 @@ impl LeftToLightPaths {
         LeftToLightPaths(pilot.map(|pilot| (pilot, per_sample)))
     }
 
-    /// Nothing is left to them.
+    /// Nothing is left to light paths.
     pub(super) const fn none() -> Self {
         LeftToLightPaths(None)
     }
 }
 
-/// Traces samples; holds the buffers of a thread.
+/// Traces samples. Holds the buffers of a thread.
 pub(super) struct Probe<'a> {
     job: &'a RenderJob,
     camera: CameraSampler<'a>,
@@ -47,7 +47,7 @@ pub(super) struct Probe<'a> {
 }
 
 impl<'a> Probe<'a> {
-    /// A probe of an image, whose paths leave to light paths what these find, and which pixels share as they do in the image.
+    /// A probe of an image. It leaves out the light of `left`, and pixels share paths as in the image.
     pub(super) fn new(job: &'a RenderJob, left: &LeftToLightPaths, features: FeatureSet) -> Self {
         let groups = if features::allows(job, Feature::Sharing) { Groups::Grid } else { Groups::None };
         let mut tracer = PathTracer::sharing(groups, features);
@@ -56,8 +56,8 @@ impl<'a> Probe<'a> {
         Probe { job, camera, tracer, samples: Vec::new(), scratch: Scratch::default(), results: Vec::new() }
     }
 
-    /// Traces samples of some pixels with the random numbers of a seed, and passes them on with the indices of their pixels. Pixels
-    /// that share paths must be a batch.
+    /// Traces samples of some pixels with the random numbers of a seed. `add` receives them with the index of their
+    /// pixel. Pixels that share paths must be in one batch.
     pub(super) fn trace(
         &mut self,
         settings: &IntegratorSettings,
@@ -65,13 +65,17 @@ impl<'a> Probe<'a> {
         (samples, seed): (Range<u32>, u32),
         mut add: impl FnMut(usize, &PixelSample),
     ) {
+        // As many pixels at once as fit into a batch
         let size = (BATCH_PATHS / samples.len().max(1)).max(1);
         let sample_counts = settings.sample_counts();
         for (part, pixels) in pixels.chunks(size).enumerate() {
+            // Draw the camera samples
             self.samples.clear();
             let of_pixels = pixels.iter().map(|&pixel| (0, pixel, samples.clone()));
             self.camera.samples(of_pixels, seed, &mut self.scratch, &mut self.samples);
             self.samples.iter_mut().for_each(|sample| sample.sample_counts = sample_counts);
+
+            // Trace them
             self.tracer.trace(self.job, settings, &self.samples, &mut Fits::default(), &mut self.results);
             for (i, results) in self.results.chunks(samples.len().max(1)).enumerate() {
                 results.iter().for_each(|result| add(part * size + i, result));
@@ -79,7 +83,7 @@ impl<'a> Probe<'a> {
         }
     }
 
-    /// The sums of samples of some pixels.
+    /// Sums of samples of some pixels.
     pub(super) fn sums(
         &mut self,
         settings: &IntegratorSettings,
@@ -93,14 +97,14 @@ impl<'a> Probe<'a> {
         sums.iter().map(RadianceAccumulator::values).collect()
     }
 
-    /// Mean cost of the camera samples since the last call, of which there were as many as given; that of one which hits nothing is
-    /// 1. Rays that go on where a medium begins or ends are more than samples.
+    /// Mean cost of the camera samples since the last call; `samples` is their number. A sample that hits nothing costs
+    /// 1. Camera rays that continue behind the boundary of a medium count as rays, not as samples.
     pub(super) fn take_cost(&mut self, samples: usize) -> f64 {
         cost(&crate::integrators::Tracer::take_stats(&mut self.tracer), samples)
     }
 }
 
-/// The pixels of an image of this width and height that lie at most `radius` from pixel `i` in both directions.
+/// The pixels of an image with this width and height that are at most `radius` from pixel `i` in both directions.
 pub(super) fn around(i: usize, (width, height): (usize, usize), radius: usize) -> impl Iterator<Item = usize> {
     let window = |i: usize, len: usize| i.saturating_sub(radius)..i.saturating_add(radius + 1).min(len);
     let columns = window(i % width, width);
@@ -121,7 +125,7 @@ mod tests {
     fn the_cost_of_samples_is_that_of_all_their_rays_and_collisions() {
         let mut stats = PathStats { camera_rays: 12, bounce_rays: 5, collisions: 4, ..PathStats::default() };
         (stats.direct.proposals, stats.direct.collisions) = (8, 6);
-        // Two of the camera rays went on behind the bounds of a medium
+        // Two of the camera rays continued behind the boundary of a medium
         assert_eq!(cost(&stats, 10), (12.0 + 10.0 + 8.0 + 10.0 * COLLISION_COST) / 10.0);
         assert_eq!(cost(&PathStats::default(), 0), 0.0);
     }

@@ -1,4 +1,4 @@
-//! Processor time: what other programs do does not count.
+//! CPU time, which excludes the time of other programs.
 
 use rustix::time::{ClockId, clock_gettime};
 use std::time::Duration;
@@ -8,12 +8,12 @@ fn time(clock: ClockId) -> Duration {
     Duration::new(u64::try_from(t.tv_sec).unwrap_or(0), u32::try_from(t.tv_nsec).unwrap_or(0))
 }
 
-/// Of this process so far, of threads that have ended too.
+/// CPU time of this process so far, including finished threads.
 pub fn of_process() -> Duration {
     time(ClockId::ProcessCPUTime)
 }
 
-/// Of this thread so far.
+/// CPU time of this thread so far.
 pub fn of_thread() -> Duration {
     time(ClockId::ThreadCPUTime)
 }

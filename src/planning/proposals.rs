@@ -1,6 +1,8 @@
-//! The best number of proposals M for N samples of `ris` in each pixel [Talbot 2005, Eq. 4.3]: the time of an estimate is the same
-//! in all, and M and N follow from the variances of the light there, which a pilot estimates from proposals that are all traced. What
-//! a proposal and a sample take is [`COSTS`], and not measured: the choice follows from scene, settings and seed.
+//! The best number of proposals M for N samples of `ris` in each pixel [Talbot 2005, Eq. 4.3].
+//!
+//! The time of an estimate is the same in all pixels. M and N follow from the variances of the light in the pixel,
+//! which a pilot estimates from proposals that are all traced. The times of proposals and samples are [`COSTS`], not
+//! measured, so the choice depends on scene, settings and seed only.
 
 use super::constants::{PILOT_PROPOSALS, PILOT_RADIUS, RIS_PILOT_SPP};
 use super::preparation::Preparation;
@@ -18,7 +20,7 @@ use rayon::prelude::*;
 /// Seed of the pilot. It must not use the random numbers of the image, whose samples would then depend on the choice.
 const PILOT_SEED: u32 = 0x70_69_6c_6f;
 
-/// Chooses M and N of each pixel, if the settings or `how` ask for that.
+/// Chooses M and N of each pixel, if the settings or `how` request it.
 pub(super) fn choose(job: &mut RenderJob, how: &Preparation<'_>) {
     let settings = &job.settings().integrator;
     let is_wanted = settings.ris.proposals == Proposals::Optimal || how.ratio_map;
@@ -29,7 +31,7 @@ pub(super) fn choose(job: &mut RenderJob, how: &Preparation<'_>) {
     }
 }
 
-/// The best M/N of each pixel for the time of an estimate. On the threads of the current pool.
+/// The best M/N of each pixel for the time of an estimate, computed on the threads of the current pool.
 pub fn sample_count_map(job: &RenderJob, costs: Costs, time: f64) -> SampleCountMap {
     let variances = pilot(job);
     let ratio = |v: &Option<Variances>| {
@@ -45,7 +47,7 @@ pub fn sample_count_map(job: &RenderJob, costs: Costs, time: f64) -> SampleCount
     }
 }
 
-/// V(f/p) and V(f/q) around each pixel, row by row; `None` where there is nothing to light.
+/// V(f/p) and V(f/q) around each pixel, row by row; `None` where there is no surface to light.
 fn pilot(job: &RenderJob) -> Vec<Option<Variances>> {
     // Moments of each pixel
     let bounds = job.world.scene.film.bounds;

@@ -1,18 +1,18 @@
-//! The rule by which the estimator `auto` chooses: from [facts](super::facts) of the scene, and from no time that is measured, so
-//! that a scene has the same image on all machines.
+//! The rule by which the estimator `auto` chooses settings. Its inputs are [facts](super::facts) of the scene and no
+//! measured times, so a scene has the same image on all machines.
 //!
 //! | scene | choice |
 //! |---|---|
 //! | direct light | `mis` with 8 samples |
-//! | paths of up to 8 bounces among diffuse surfaces, indoors | 4 samples, 3 at later vertices, paths shared by 6 × 6 pixels, no roulette |
-//! | the same in the open | 6 samples, 3 later, shared by 4 × 4 pixels, no roulette |
+//! | paths of ≤ 8 bounces among diffuse surfaces, indoors | 4 samples, 3 later, shared by 6 × 6 pixels, no roulette |
+//! | the same, outdoors | 6 samples, 3 later, shared by 4 × 4 pixels, no roulette |
 //! | longer paths among diffuse surfaces | 3 samples, 2 later, shared by 4 × 4 pixels |
-//! | other paths, mostly of surfaces that are not diffuse | 8 samples, of which 3 by the BSDF, 2 later |
-//! | a sky beside lamps | as many of the light samples as it has of the light |
-//! | 16 lights or more, most of which photons find hidden | `contributing` in place of `mis` |
-//! | metal or glass, and lamps | a quarter of a light path for each camera sample |
+//! | other paths, mostly of surfaces that are not diffuse | 8 samples, 3 of them from the BSDF, 2 later |
+//! | sky and lamps | fraction of the light samples for the sky: its fraction of the light |
+//! | 16 lights or more, most of them hidden according to photons | `contributing` instead of `mis` |
+//! | metal or glass, and lamps | one light path per four camera samples |
 //!
-//! [docs/measurements/efficiency](../../../docs/measurements/efficiency/README.md) is the evidence. A setting that is given stays.
+//! Evidence: [docs/measurements/efficiency](../../../docs/measurements/efficiency/README.md). Given settings stay.
 
 use super::constants::{
     DIRECT_SAMPLES, FEW_BOUNCES, GLOSSY_BSDF, INDOORS, LIGHT_PATHS, LONG, MANY_LIGHTS, MIN_PAIRS, MOST_HIDDEN, OPEN,
@@ -26,7 +26,7 @@ use crate::scene::RenderJob;
 use crate::settings::{Allocation, ContributingSettings, EstimatorKind, IntegratorKind, IntegratorSettings, Settings};
 use std::collections::BTreeSet;
 
-/// Chooses what the settings of `job` leave open, if their estimator is `auto`; the facts by which it did. On the threads of the
+/// Chooses the open settings of `job` if its estimator is `auto`, and returns the facts. Runs on the threads of the
 /// current pool.
 pub(super) fn apply(job: &mut RenderJob) -> Option<Facts> {
     let Settings { integrator: base, sampling } = *job.settings();
@@ -40,7 +40,7 @@ pub(super) fn apply(job: &mut RenderJob) -> Option<Facts> {
     if !matches!(base.kind, IntegratorKind::Direct | IntegratorKind::Path) {
         return None;
     }
-    // Media that glow are lights only where the path is the one BSDF sample
+    // Glowing media are lights only if the path continues by the one BSDF sample
     if job.lights.find_glows() && base.bsdf_fraction.is_none() {
         job.change(|s| s.integrator.bsdf_fraction = Some(0.0));
     }
@@ -59,7 +59,7 @@ pub(super) fn apply(job: &mut RenderJob) -> Option<Facts> {
     Some(facts)
 }
 
-/// `mis` with the numbers for a scene with these facts, where they are open.
+/// `mis` with the sample counts for a scene with these facts, where they are open.
 fn with_numbers(settings: &IntegratorSettings, facts: &Facts, shares: bool) -> IntegratorSettings {
     let mut s = *settings;
     let is_mixed = facts.lights > 1 && facts.sky > 0.0 && facts.sky < 1.0;
@@ -80,14 +80,14 @@ fn with_numbers(settings: &IntegratorSettings, facts: &Facts, shares: bool) -> I
         (true, false, true) => OUTDOORS,
         (true, false, false) => INDOORS,
     };
-    // The path goes on by the one BSDF sample of later vertices
+    // The path continues by the one BSDF sample of later vertices
     if numbers == UNSHARED && s.samples.is_none() && s.later_samples.is_none() {
         s.bsdf_fraction = s.bsdf_fraction.or(Some(GLOSSY_BSDF));
     }
     s.samples = s.samples.or(Some(numbers.first));
     s.later_samples = s.later_samples.or(Some(numbers.later));
     s.path_reuse = s.path_reuse.or(Some(numbers.edge));
-    // What a path finds serves many pixels
+    // A shared path serves many pixels, so roulette does not pay
     let is_default = s.roulette_depth == IntegratorSettings::default().roulette_depth;
     if s.path_reuse.is_some_and(|edge| edge > 1) && !is_long && is_default {
         s.roulette_depth = None;
@@ -95,7 +95,7 @@ fn with_numbers(settings: &IntegratorSettings, facts: &Facts, shares: bool) -> I
     s
 }
 
-/// Takes `contributing` if photons find that most lights are hidden where the camera looks.
+/// Chooses `contributing` if photons show that most lights are hidden from the visible points.
 fn choose_contributing(job: &mut RenderJob, facts: &Facts) {
     let before = job.settings().integrator;
     let depth = before.depth();
@@ -106,7 +106,7 @@ fn choose_contributing(job: &mut RenderJob, facts: &Facts) {
     let Some((cache, _)) = build_visibility_cache(job) else { return };
     job.lights.set_visibility_cache(Some(cache));
     let points = seen_points(job);
-    // Some triangles of a lamp face away from any point
+    // Some triangles of a lamp face away from any point, so lamps are counted instead of triangles
     let sources = job.world.scene.lights.sources();
     let lamp = |&(light, _): &(LightId, u32)| sources[light as usize].map_or((1, light), |source| (0, source));
     let found = |&(p, n): &_| {

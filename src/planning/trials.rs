@@ -1,8 +1,8 @@
-//! Trials of settings on some cells of the image: the time of a camera sample and its variance.
+//! Trials of settings on some cells of the image: CPU time and variance of a camera sample.
 //!
-//! A cell is rendered twice, by two seeds. The difference of both means tells the variance of a pixel, relative to its value, and the
-//! processor time of the thread is the cost. All trials have the same cells and seeds, so that the ratio of two of them is known
-//! better than either; the jackknife over cells tells how well.
+//! A cell is rendered twice, with two seeds. The difference of both means gives the relative variance of a pixel, and
+//! the CPU time of the thread gives the cost. All trials have the same cells and seeds, so the ratio of two trials has
+//! a smaller error than either. The jackknife over cells estimates it.
 
 use super::allocation::may_split;
 use super::constants::{CELL, MIN_ERRORS, MIN_GAIN};
@@ -17,33 +17,33 @@ use crate::settings::{IntegratorSettings, Settings};
 use lumiris_numbers::math::hash::pcg4d;
 use rayon::prelude::*;
 
-/// Combined with the seed of the image to give those of trials.
+/// Combined with the seed of the image to give the seeds of trials.
 const SEED: u32 = 0x74_72_69_61;
 
-/// Where trials are made, and by what their errors are relative.
+/// Cells of trials, and the scale of their errors.
 pub(super) struct Trials {
     cells: Vec<Vec<[u32; 2]>>,
     spp: u32,
     seeds: [u32; 2],
     left: LeftToLightPaths,
-    /// By cell and pixel, once the first trial was made: 1/√(m² + ε) of each channel, m being the mean of its images.
+    /// 1/√(m² + ε) of each channel, by cell and pixel, where m is the mean of the images of the first trial.
     scales: Vec<Vec<[f64; 3]>>,
-    /// By cell and pixel, how images of the two seeds differ in what they see of lights, whose noise is left to looks.
+    /// Difference of the two seeds' images in visible emission, by cell and pixel. Its noise is left to emission rays.
     seen: Vec<Vec<[f64; 3]>>,
 }
 
-/// What was measured of settings: processor time of a camera sample (ns), and sums over the pixels of each cell of |d| and d², d being
-/// the difference of the two images.
+/// Result of a trial: CPU time per camera sample (ns), and sums of |d| and d² over the pixels of each cell. d is the
+/// difference of the two images.
 #[derive(Clone, Debug)]
 pub(super) struct Measured {
     pub(super) nanoseconds: f64,
     of_cells: Vec<[f64; 2]>,
-    /// True if the squared mean of deviations counts, as where samples go to the noise.
+    /// True if the error is the squared mean of |d|: direct light, whose adaptive samples follow the noise.
     by_deviations: bool,
 }
 
 impl Trials {
-    /// Trials on about `count` cells, other ones for each `round`, with so many samples of a pixel and seed.
+    /// Trials on about `count` cells, with `spp` samples per pixel and seed. Every `round` has other cells.
     pub(super) fn new(job: &RenderJob, how: &Preparation<'_>, (count, round): (usize, u32), spp: u32) -> Self {
         let bounds = job.world.scene.film.bounds;
         let all: Vec<PixelBounds> = bounds.tiles(CELL);
@@ -56,13 +56,16 @@ impl Trials {
         Trials { cells, spp, seeds, left: LeftToLightPaths::new(job, how), scales: Vec::new(), seen: Vec::new() }
     }
 
-    /// Measures the settings of the job. On the threads of the current pool.
+    /// Measures the settings of the job on the threads of the current pool.
     pub(super) fn measure(&mut self, job: &RenderJob) -> Measured {
+        // Light that is left to light paths
         let Settings { integrator: settings, .. } = job.settings();
         let knows_light = light_paths::per_sample(job) > 0.0;
         let none = LeftToLightPaths::none();
         let left = if knows_light { &self.left } else { &none };
         let probe = || Probe::new(job, left, FeatureSet::None);
+
+        // In the first trial, measure visible emission
         if self.seen.is_empty() {
             let seeing = IntegratorSettings { max_depth: 0, ..*settings };
             let is_split = may_split(job.settings(), settings);
@@ -73,18 +76,24 @@ impl Trials {
             };
             self.seen = self.cells.par_iter().map_init(probe, of_cell).collect();
         }
+
+        // Render both images
         let of_cell = |probe: &mut Probe<'_>, cell: &Vec<[u32; 2]>| {
             let start = processor_time::of_thread();
             let images = self.seeds.map(|seed| self.means(probe, settings, cell, seed));
             (images, (processor_time::of_thread() - start).as_secs_f64())
         };
         let images: Vec<_> = self.cells.par_iter().map_init(probe, of_cell).collect();
+
+        // In the first trial, set the scales
         if self.scales.is_empty() {
             let scale = |(a, b): (&[f64; 3], &[f64; 3])| {
                 [0, 1, 2].map(|c| 1.0 / (0.25 * (a[c] + b[c]).powi(2) + DEFAULT_EPSILON).sqrt())
             };
             self.scales = images.iter().map(|([a, b], _)| a.iter().zip(b).map(scale).collect()).collect();
         }
+
+        // Sum the differences
         let sums = |k: usize| {
             let ([a, b], _) = &images[k];
             let mut sums = [0.0; 2];
@@ -97,6 +106,8 @@ impl Trials {
             }
             sums
         };
+
+        // Divide the CPU time by the number of samples
         let samples = self.cells.iter().map(Vec::len).sum::<usize>() as f64 * f64::from(2 * self.spp);
         let seconds: f64 = images.iter().map(|(_, seconds)| seconds).sum();
         Measured {
@@ -119,18 +130,18 @@ impl Trials {
 }
 
 impl Measured {
-    /// The relative error of an image times a constant, by all cells but the one given: the mean of variances, or its geometric mean
-    /// with the squared mean of deviations, since adaptive numbers go to the noise.
+    /// Relative error of an image up to a constant factor, by all cells except `without`. It is the squared mean of
+    /// |d|, or its geometric mean with the mean of d², because adaptive sampling follows the noise.
     fn error(&self, without: Option<usize>) -> f64 {
         let cells = self.of_cells.iter().enumerate().filter(|(i, _)| Some(*i) != without);
         let (sums, count) = cells.fold(([0.0; 2], 0.0), |([a, b], n), (_, s)| ([a + s[0], b + s[1]], n + 1.0));
         let [deviation, variance] = sums.map(|sum| sum / f64::max(count, 1.0));
-        // Alike where all pixels have the same deviation d: |d| is 0.8 of it on average, which is left out
+        // Both are equal if all pixels have the same |d|. The factor 0.8 between mean and standard deviation is omitted
         let squared = deviation * deviation / f64::from(3 * CELL * CELL);
         if self.by_deviations { squared } else { (squared * variance).sqrt() }
     }
 
-    /// How many times as efficient as `other` it is, as a logarithm, and the standard error of that.
+    /// Logarithm of the efficiency relative to `other`, and its standard error.
     pub(super) fn gain_over(&self, other: &Measured) -> (f64, f64) {
         let gain =
             |without| (other.error(without) * other.nanoseconds).ln() - (self.error(without) * self.nanoseconds).ln();
@@ -143,7 +154,7 @@ impl Measured {
         (if all.is_finite() { all } else { 0.0 }, variance.sqrt())
     }
 
-    /// True if it is better by more than chance.
+    /// True if the gain is significant.
     pub(super) fn is_better_than(&self, other: &Measured) -> bool {
         let (gain, error) = self.gain_over(other);
         gain > MIN_GAIN.ln().max(MIN_ERRORS * error)

@@ -1,6 +1,8 @@
-//! Settings that trials find to be more efficient than the [rule](super::rule)'s: for long renders, farms and sequences, where half a
-//! minute of trials pays. From the rule's choice on, one setting after the other is changed for as long as that gains more than chance.
-//! What is found is compared with the rule on other cells, and taken if it gains a tenth.
+//! Trials that search for settings more efficient than the [rule](super::rule)'s choice: for long renderings, farms and
+//! sequences, where half a minute of trials pays off.
+//!
+//! Starting from the rule's choice, one setting after the other is changed as long as the gain is significant. The
+//! result is compared with the rule on other cells, and is adopted if it gains 10 %.
 
 use super::constants::{MANY_LIGHTS, MIN_ERRORS, OTHERS, TUNE_CELLS, TUNE_GAIN, TUNE_SPP, TUNE_TRIALS};
 use super::facts::Facts;
@@ -13,47 +15,49 @@ use crate::scene::RenderJob;
 use crate::settings::{Allocation, ContributingSettings, EstimatorKind, IntegratorSettings, Settings, bsdf_samples};
 use serde::{Deserialize, Serialize};
 
-/// Settings that were tried.
+/// One trial.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 pub struct Trial {
-    /// How they differ from the best so far.
+    /// Name: the difference from the best settings so far.
     pub name: String,
-    /// Processor time of a camera sample (ns).
+    /// CPU time per camera sample (ns).
     pub nanoseconds: f64,
     /// 1/(error × time), relative to the rule.
     pub efficiency: f64,
-    /// Standard error of the logarithm of that.
+    /// Standard error of the logarithm of the efficiency.
     pub error: f64,
 }
 
-/// What trials found.
+/// Result of all trials.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 pub struct Tuning {
-    /// All trials, that of the rule first.
+    /// All trials. The first one is the rule.
     pub trials: Vec<Trial>,
-    /// Efficiency of what was found relative to the rule's, on cells of which the search knew nothing, and the standard error of its
-    /// logarithm.
+    /// Efficiency of the best settings relative to the rule, on cells that the search did not use.
     pub gain: f64,
-    /// See `gain`.
+    /// Standard error of the logarithm of `gain`.
     pub error: f64,
-    /// True if that is enough to take it; otherwise the rule's settings are kept.
+    /// True if the gain suffices to adopt the settings; otherwise the rule's settings are kept.
     pub is_taken: bool,
-    /// Processor time of all trials (s).
+    /// CPU time of all trials (s).
     pub seconds: f64,
 }
 
-/// Tunes the settings of a job, which are the rule's; `open` are those from which the rule chose, by `facts`.
+/// Tunes the settings of a job. They are the choice of the rule, made from the settings `open` and from `facts`.
 pub(super) fn tune(
     job: &mut RenderJob,
     (open, facts): (&Settings, &Facts),
     how: &Preparation<'_>,
 ) -> Result<Tuning, PlanError> {
+    // Search
     let start = processor_time::of_process();
     let rule = job.settings().integrator;
     let mut search = Search::new(job, how)?;
     for changes in steps(open, facts, job) {
         search.climb(job, &changes, how)?;
     }
+
+    // Compare the result with the rule on other cells
     let found = search.best;
     let mut trials = Trials::new(job, how, (2 * TUNE_CELLS, 1), TUNE_SPP);
     let [rule_measured, found_measured] = [rule, found].map(|settings| {
@@ -62,6 +66,8 @@ pub(super) fn tune(
     });
     let (gain, error) = found_measured.gain_over(&rule_measured);
     let is_taken = gain > TUNE_GAIN.ln().max(MIN_ERRORS * error);
+
+    // Keep the better settings
     job.change(|s| s.integrator = if is_taken { found } else { rule });
     if job.settings().integrator.estimator != EstimatorKind::Contributing {
         job.lights.set_visibility_cache(None);
@@ -70,8 +76,10 @@ pub(super) fn tune(
     Ok(Tuning { trials: search.trials, gain: gain.exp(), error, is_taken, seconds })
 }
 
-/// The changes that are tried one after the other, where the settings are open: each is applied for as long as it gains.
+/// Changes to try, in steps, for settings that are open. A step applies its first change that gains, as often as it
+/// gains.
 fn steps(open: &Settings, facts: &Facts, job: &RenderJob) -> Vec<Vec<Change>> {
+    // Lights
     let i = open.integrator;
     let mut steps: Vec<Vec<Change>> = Vec::new();
     let is_possible = |estimator| features::refusal(job, &IntegratorSettings { estimator, ..i }).is_none();
@@ -81,17 +89,23 @@ fn steps(open: &Settings, facts: &Facts, job: &RenderJob) -> Vec<Vec<Change>> {
     if i.infinite_fraction.is_none() && facts.sky > 0.0 && facts.lights > 1 {
         steps.push(vec![Change::Sky(0.75), Change::Sky(0.875), Change::Sky(0.25)]);
     }
+
+    // Sample counts
     let numbers = [
         (i.samples.is_none(), vec![Change::Double, Change::Halve]),
         (i.bsdf_fraction.is_none() && !job.lights.find_glows(), vec![Change::Bsdf(0.5), Change::Bsdf(0.0)]),
         (i.later_samples.is_none() && i.depth() > 1, vec![Change::MoreLater, Change::FewerLater]),
     ];
+
+    // Shared paths
     let may_share = open.sampling.allocation == Allocation::Auto && features::allows(job, Feature::Sharing);
     let is_of = |(is_open, changes): &(bool, Vec<Change>)| is_open.then(|| changes.clone());
     steps.extend(numbers.iter().filter_map(is_of));
     if i.path_reuse.is_none() && may_share {
         steps.push(vec![Change::LargerBlocks, Change::SmallerBlocks]);
     }
+
+    // Sample counts again, then resampling
     if i.samples.is_none() {
         steps.push(vec![Change::Double, Change::Halve]);
     }
@@ -117,7 +131,7 @@ enum Change {
 }
 
 impl Change {
-    /// The changed settings, if they are others.
+    /// The changed settings; `None` if nothing changes.
     fn of(self, settings: &IntegratorSettings) -> Option<IntegratorSettings> {
         let [first, later] = [0, 1].map(|vertex| settings.sample_counts_at(vertex).samples);
         let edge = settings.path_reuse.unwrap_or(1);
@@ -140,12 +154,12 @@ impl Change {
                 s.contributing = ContributingSettings { noncontributing_samples: others, ..s.contributing };
             }
         }
-        // Paths go on by the one BSDF sample of later vertices
+        // Paths continue by the one BSDF sample of later vertices
         let goes_on = s.depth() <= 1 || bsdf_samples(s.sample_counts_at(1).samples.max(2), s.bsdf_fraction()) == 1;
         (s != *settings && goes_on).then_some(s)
     }
 
-    /// What it makes of the settings.
+    /// Name of the changed settings.
     fn name(self, s: &IntegratorSettings) -> String {
         let [first, later] = [0, 1].map(|vertex| s.sample_counts_at(vertex).samples);
         match self {
@@ -164,7 +178,7 @@ impl Change {
     }
 }
 
-/// The best settings so far.
+/// State of the search.
 struct Search {
     best: IntegratorSettings,
     measured: Measured,
@@ -179,7 +193,7 @@ impl Search {
     fn new(job: &mut RenderJob, how: &Preparation<'_>) -> Result<Self, PlanError> {
         how.goes_on()?;
         let mut pilot = Trials::new(job, how, (TUNE_CELLS, 0), TUNE_SPP);
-        // The first turn fills caches
+        // The first run only fills caches
         pilot.measure(job);
         let start = processor_time::of_process();
         let measured = pilot.measure(job);
@@ -189,17 +203,20 @@ impl Search {
         Ok(Search { best, rule: measured.clone(), measured, pilot, tried: vec![best], trials })
     }
 
-    /// Applies the first of the changes that gains, for as long as it does.
+    /// Applies the first of the changes that gains, as often as it gains.
     fn climb(&mut self, job: &mut RenderJob, changes: &[Change], how: &Preparation<'_>) -> Result<(), PlanError> {
         for change in changes {
             let mut gains = false;
             while let Some(settings) = change.of(&self.best).filter(|settings| !self.tried.contains(settings)) {
+                // Apply the change
                 how.goes_on()?;
                 self.tried.push(settings);
                 if settings.uses_visibility_cache() && job.lights.visibility_cache().is_none() {
                     job.lights.set_visibility_cache(build_visibility_cache(job).map(|(cache, _)| cache));
                 }
                 job.change(|s| s.integrator = settings);
+
+                // Measure it
                 let measured = self.pilot.measure(job);
                 self.trials.push(trial(change.name(&settings), &measured, &self.rule));
                 if !measured.is_better_than(&self.measured) {

@@ -1,8 +1,8 @@
-//! Builds the visibility cache before rendering, where the settings ask for it [Keller and Wald 2000, §3].
+//! Builds the visibility cache before rendering, if the settings need it [Keller and Wald 2000, §3].
 //!
-//! Photon paths start at the lights that matter where the camera looks: importons, which the camera emits, choose
-//! lights by the light tree, and the lights chosen get most of the photon paths. So the time of the cache, and its
-//! resolution where it is used, do not depend on the number of lights elsewhere.
+//! Photon paths start at the lights that matter for the visible part of the scene. Importons emitted by the camera
+//! choose lights by the light tree, and the chosen lights get most of the photon paths. Time and resolution of the
+//! cache are therefore independent of the number of lights elsewhere.
 
 use super::constants::{IMPORTON_DEPTH, IMPORTON_PATHS, PHOTON_PATHS, UNIFORM_FRACTION};
 use crate::lights::{LightCtx, VisibilityCache};
@@ -14,13 +14,16 @@ use lumiris_numbers::math::hash::{pcg4d, unit_f32};
 
 const IMPORTON_SEED: u32 = 0x6c69_6768;
 
-/// Traces photons straight from lights on all threads of the current pool, and builds the cache from them; returned
-/// with their number. `None` if no photon arrives at a surface: estimates then do without a cache.
+/// Traces photons from the lights to the first surface, on all threads of the current pool. Returns the cache and the
+/// number of photons. `None` if no photon hits a surface; estimators then work without a cache.
 pub fn build_visibility_cache(job: &RenderJob) -> Option<(VisibilityCache, usize)> {
+    // Choose lights at visible points
     let lights = &job.lights;
     let paths = job.settings().integrator.photons.visibility_photons.map_or(PHOTON_PATHS, u64::from);
     let seen = seen_points(job);
     let weights = weights_at(job, &seen);
+
+    // Trace photons
     let tracing = Tracing {
         seed: job.settings().sampling.seed,
         max_depth: 0,
@@ -35,13 +38,15 @@ pub fn build_visibility_cache(job: &RenderJob) -> Option<(VisibilityCache, usize
     if primary.is_empty() {
         return None;
     }
+
+    // Build the cache
     let distribution = tracing.light_distribution(lights)?;
     let paths = lights.lit.iter().map(|&light| (light, paths as f32 * distribution.pmf(light)));
     let cache = VisibilityCache::adapted_to(&seen, &primary, lights.scene_radius).with_paths(paths);
     Some((cache, primary.len()))
 }
 
-/// Points that the camera sees, directly or by way of others: positions and normals of importons.
+/// Points visible to the camera, directly or after bounces: positions and normals of importons.
 pub(super) fn seen_points(job: &RenderJob) -> Vec<(Vec3, Vec3)> {
     let settings = job.settings();
     let depth = match settings.integrator.kind {
@@ -54,7 +59,7 @@ pub(super) fn seen_points(job: &RenderJob) -> Vec<(Vec3, Vec3)> {
     importons.iter().map(|importon| (importon.p(), importon.n())).collect()
 }
 
-/// How often the light tree chooses each light at some points; `None` if it chooses none.
+/// How often the light tree chooses each light at the given points; `None` if it chooses none.
 fn weights_at(job: &RenderJob, points: &[(Vec3, Vec3)]) -> Option<Vec<f32>> {
     let lights = &job.lights;
     let tree = lights.tree_choice();

@@ -1,4 +1,4 @@
-//! Batches of camera samples as the renderer makes them in its first pass, spread over the image: for measurements.
+//! Batches of camera samples as in the first pass of the renderer, spread over the image. Used for measurements.
 
 use super::{BATCH_PATHS, RenderSettings, Run};
 use crate::film::PixelBounds;
@@ -8,23 +8,23 @@ use crate::scene::RenderJob;
 use std::ops::Range;
 use std::sync::atomic::AtomicBool;
 
-/// Its multiples modulo 1 are spread evenly.
+/// Its multiples modulo 1 are evenly distributed.
 const GOLDEN_RATIO: f64 = 0.618_033_988_749_895;
 
-/// Nothing stops what is measured.
+/// Measurements are never stopped.
 static STOP: AtomicBool = AtomicBool::new(false);
 
-/// Batches of whole pixels of a pass.
+/// Batches of whole pixels in one pass.
 pub struct Batches<'a> {
     run: Run<'a>,
-    /// The pixels of each batch: of a tile, row by row.
+    /// Tile and pixel range of each batch; pixels are numbered row by row in the tile.
     parts: Vec<(PixelBounds, Range<usize>)>,
     samples: Range<u32>,
     scratch: camera_samples::Scratch,
 }
 
 impl<'a> Batches<'a> {
-    /// About `rays` camera samples together, of a rendering by these settings.
+    /// Selects batches of a rendering with these settings, with about `rays` camera samples in total.
     pub fn new(job: &'a RenderJob, settings: &'a RenderSettings, rays: usize) -> Self {
         let run = Run::new(job, settings, &STOP, &|_| ());
         let per_pixel = settings.spp.min(run.pass_length()).max(1);
@@ -38,7 +38,7 @@ impl<'a> Batches<'a> {
             })
             .collect();
 
-        // Not every k-th one: k may divide the number in a row of tiles, and the same columns would be taken
+        // Every k-th batch would always have the same columns if k divides the number of tiles in a row
         let all: usize = parts.iter().map(|(_, pixels)| pixels.len() * per_pixel as usize).sum();
         let share = rays as f64 / all.max(1) as f64;
         let is_taken = |i: usize| (i as f64 * GOLDEN_RATIO).fract() < share;
@@ -61,7 +61,7 @@ impl<'a> Batches<'a> {
         self.samples.len()
     }
 
-    /// Makes the camera samples of a batch; their fits are numbered from 0.
+    /// Draws the camera samples of a batch. Their fits are numbered from 0.
     pub fn camera_samples(&mut self, batch: usize, out: &mut Vec<CameraSample>) {
         let (tile, pixels) = &self.parts[batch];
         self.run.camera_samples(tile, pixels.clone(), &self.samples, &mut self.scratch, out);
@@ -69,7 +69,7 @@ impl<'a> Batches<'a> {
     }
 }
 
-/// All batches of a rendering with tiles of this size, about `rays` camera samples together.
+/// Batches of a rendering with this tile size, with about `rays` camera samples in total.
 pub fn camera_batches(job: &RenderJob, tile_size: u32, rays: usize) -> Vec<Vec<CameraSample>> {
     let settings = RenderSettings { tile_size, spp: job.settings().sampling.spp, ..RenderSettings::default() };
     let mut batches = Batches::new(job, &settings, rays);

@@ -1,30 +1,34 @@
-//! How far cells are where pixels share paths: what a rendering that stops within a pass goes on from.
+//! Progress of cells where pixels share paths, so that a rendering that stopped within a pass can be resumed.
+//!
+//! Samples with the same share index (`turn`) may share paths. A group of [`TURNS`] consecutive share indices has the
+//! same cells.
 
 use crate::film::encoding::{Decoder, Encoder};
 use crate::integrators::cells::TURNS;
 use std::collections::BTreeMap;
 
-/// The next turns of cells, and of the pixels of tiles that are estimated twice, that are further than all.
+/// The next share index of every cell, and of the replicas of every tile, that is ahead of the common sample count.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct CellProgress {
-    /// By the turns that have the same cells: the next turn of each cell.
+    /// By group: the next share index of each cell.
     cells: BTreeMap<u32, Vec<u32>>,
-    /// That of the second estimates of each tile.
+    /// The next share index of the replicas of each tile.
     replicas: Vec<u32>,
 }
 
 impl CellProgress {
-    /// True if no cell is further than all.
+    /// True if no cell is ahead.
     pub(super) fn is_empty(&self) -> bool {
         self.cells.is_empty() && self.replicas.is_empty()
     }
 
-    /// The turn after the last one that a cell has.
+    /// The largest next share index.
     pub(super) fn end(&self) -> Option<u32> {
         self.cells.values().flatten().chain(&self.replicas).copied().max()
     }
 
-    /// True if it has as many cells, of turns that have the same ones, and as many tiles as an image has.
+    /// True if every group has the cells that `cells` counts, there are `tiles` tiles, and all share indices are in
+    /// their groups.
     pub(super) fn fits(&self, cells: impl Fn(u32) -> usize, tiles: usize) -> bool {
         let is_of_group = |(&group, next): (&u32, &Vec<u32>)| {
             let turns = group.checked_mul(TURNS).map(|first| first..=first.saturating_add(TURNS));
@@ -33,28 +37,28 @@ impl CellProgress {
         self.cells.iter().all(is_of_group) && [0, tiles].contains(&self.replicas.len())
     }
 
-    /// The next turn of a cell, if it is known.
+    /// The next share index of a cell; 0 if nothing is stored.
     pub(super) fn of_cell(&self, group: u32, cell: usize) -> u32 {
         self.cells.get(&group).map_or(0, |next| next[cell])
     }
 
-    /// The same of the second estimates of a tile.
+    /// The next share index of the replicas of a tile; 0 if nothing is stored.
     pub(super) fn of_replicas(&self, tile: usize) -> u32 {
         self.replicas.get(tile).copied().unwrap_or(0)
     }
 
-    /// Notes the next turn of one of so many cells.
+    /// Stores the next share index of a cell; `count` is the number of cells in the group.
     pub(super) fn set_cell(&mut self, group: u32, (cell, count): (usize, usize), next: u32) {
         self.cells.entry(group).or_insert_with(|| vec![0; count])[cell] = next;
     }
 
-    /// The same of the second estimates of one of so many tiles.
+    /// Stores the next share index of the replicas of a tile; `count` is the number of tiles.
     pub(super) fn set_replicas(&mut self, (tile, count): (usize, usize), next: u32) {
         self.replicas.resize(count, 0);
         self.replicas[tile] = next;
     }
 
-    /// Forgets where nothing is further than this turn, which is the next one of all pixels.
+    /// Drops entries that are not ahead of `turn`, the next share index of all pixels.
     pub(super) fn forget_before(&mut self, turn: u32) {
         let is_further = |next: &[u32]| next.iter().any(|n| *n > turn);
         self.cells.retain(|_, next| is_further(next));
@@ -63,7 +67,7 @@ impl CellProgress {
         }
     }
 
-    /// Appends it to bytes.
+    /// Appends the progress to an encoder.
     pub(super) fn write(&self, encoder: &mut Encoder) {
         let mut list = |values: &[u32]| {
             encoder.word(values.len() as u32);
@@ -76,7 +80,7 @@ impl CellProgress {
         });
     }
 
-    /// Reads what [`Self::write`] has written, to the end; `None` if it means nothing.
+    /// Reads the output of [`Self::write`], to the end; `None` if it is invalid.
     pub(super) fn read(decoder: &mut Decoder<'_>) -> Option<Self> {
         let list = |decoder: &mut Decoder<'_>| {
             let len = decoder.word()?;
@@ -97,6 +101,7 @@ mod tests {
 
     #[test]
     fn what_is_written_is_read_and_fits_the_same_cells_alone() {
+        // Write and read
         let mut progress = CellProgress::default();
         progress.set_cell(2, (1, 3), 10);
         progress.set_cell(3, (2, 5), 16);
@@ -109,9 +114,12 @@ mod tests {
         assert_eq!([progress.of_cell(2, 1), progress.of_cell(2, 0), progress.of_cell(4, 9)], [10, 0, 0]);
         assert_eq!([progress.of_replicas(6), progress.of_replicas(0)], [12, 0]);
 
+        // Counts of cells and tiles have to match
         let cells = |group: u32| if group == 2 { 3 } else { 5 };
         assert!(progress.fits(cells, 7) && !progress.fits(cells, 8) && !progress.fits(|_| 3, 7));
         assert_eq!(progress.end(), Some(16));
+
+        // Entries that are not ahead are dropped
         progress.forget_before(12);
         assert_eq!((progress.cells.len(), progress.replicas.len()), (1, 0));
         progress.set_cell(2, (0, 3), 13);

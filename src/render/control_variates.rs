@@ -1,11 +1,11 @@
-//! Control variates of a finished film: what the coefficients fitted to other pixels make of each pixel's own controls
-//! is subtracted from it ([`lumiris_numbers::estimators::ocv::pixels`]).
+//! Control variates of a finished film. The coefficients of a pixel are fitted to other pixels; its own control
+//! variates, multiplied by these coefficients, are subtracted ([`lumiris_numbers::estimators::ocv::pixels`]).
 //!
-//! A replica is corrected by the coefficients of its pixel, which depend on neither of both estimates: so the two remain
-//! independent but for β, and their difference gives the variance of the corrected pixel.
+//! A replica is corrected by the coefficients of its pixel, which depend on neither of the two estimates. Given β, the
+//! two stay independent, and their difference gives the variance of the corrected pixel.
 //!
-//! Rows are corrected some at a time, with the rows around that their coefficients depend on: only the corrections are kept
-//! of all of them.
+//! Rows are corrected in bands, together with the surrounding rows that determine their coefficients. Only the
+//! corrections are kept for the whole image.
 
 use super::tiles::{Tile, position};
 use crate::film::exact::FixedSum;
@@ -16,10 +16,10 @@ use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::ops::Range;
 
-/// Rows that are corrected together.
+/// Rows of a band.
 pub(super) const ROWS: u32 = 32;
 
-/// Corrects all pixels of `film`, which holds the tiles, and its replicas.
+/// Corrects all pixels and replicas of `film`, which consists of the tiles.
 pub(super) fn correct(film: &mut Film, tiles: &[Tile]) {
     let Some(m) = tiles.first().map(|t| t.fits.controls()).filter(|m| *m > 0) else { return };
     let PixelBounds { y0, y1, .. } = film.bounds;
@@ -34,20 +34,20 @@ pub(super) fn correct(film: &mut Film, tiles: &[Tile]) {
     film.correct(corrections, replicas);
 }
 
-/// Some rows of a film.
+/// A band: some rows of a film and the rows around them.
 struct Band {
     picture: Picture,
     components: usize,
-    /// Those that are corrected, by their index in the picture.
+    /// The corrected rows, by their index in the picture.
     rows: Range<usize>,
-    /// Index of their first pixel in the film.
+    /// Film index of the first pixel of these rows.
     first: usize,
-    /// c̄ of each of their replicas, by the index of its pixel in the film.
+    /// c̄ of each replica in these rows, by the film index of its pixel.
     of_replicas: BTreeMap<usize, Vec<f32>>,
 }
 
 impl Band {
-    /// Reads `rows`, and `around` them, with `m` control variates.
+    /// Reads `rows` and the rows `around` them, with `m` control variates.
     fn read(film: &Film, tiles: &[Tile], (rows, around): (Range<u32>, Range<u32>), m: usize) -> Self {
         let width = film.bounds.width() as usize;
         let mut sums = Vec::new();
@@ -55,6 +55,8 @@ impl Band {
         let mut pixels = vec![Pixel::default(); sums.len()];
         let mut controls = vec![0.0; sums.len() * m];
         let mut of_replicas = BTreeMap::new();
+
+        // Pixels and means of their control variates
         let has_rows = |t: &&Tile| t.bounds.y0 < around.end && around.start < t.bounds.y1;
         for tile in tiles.iter().filter(has_rows) {
             let exact = tile.fits.exact_sums();
@@ -69,6 +71,8 @@ impl Band {
                 let per_sample = 1.0 / sums[at].count.max(1) as f64;
                 means(fit, |sum| sum * per_sample, &mut controls[at * m..][..m]);
             }
+
+            // Means of the replicas
             for (replica, fit) in tile.replicas.iter().zip(fits) {
                 let [x, y] = position(&tile.bounds, replica.pixel);
                 if rows.contains(&y) {
@@ -90,6 +94,7 @@ impl Band {
 
     /// Appends the corrections of the rows, and corrects their replicas.
     fn correct(&self, corrections: &mut Vec<[f32; 3]>, replicas: &mut [Replica]) {
+        // Coefficients, row by row
         let beta: Vec<Vec<f32>> = self
             .rows
             .clone()
@@ -101,10 +106,14 @@ impl Band {
             })
             .collect();
         let beta = beta.concat();
+
+        // Corrections of pixels
         let of_pixel = |i: usize| &beta[i * 3 * self.components..][..3 * self.components];
         let skipped = self.rows.start * self.picture.width();
         let count = self.rows.len() * self.picture.width();
         corrections.extend((0..count).map(|i| self.picture.correction(skipped + i, of_pixel(i))));
+
+        // Replicas
         let begin = replicas.partition_point(|r| (r.pixel as usize) < self.first);
         for replica in replicas[begin..].iter_mut().take_while(|r| (r.pixel as usize) < self.first + count) {
             let Some(controls) = self.of_replicas.get(&(replica.pixel as usize)) else { continue };
@@ -115,13 +124,13 @@ impl Band {
     }
 }
 
-/// The means of control variates from the sums of a pixel, by what makes a mean of a sum.
+/// Means of control variates from the sums of a pixel. `mean_of` converts a sum to a mean.
 pub(super) fn means(sums: &[FixedSum], mean_of: impl Fn(f64) -> f64, out: &mut [f32]) {
     out.iter_mut().zip(&sums[3..]).for_each(|(mean, sum)| *mean = mean_of(sum.value()) as f32);
 }
 
-/// A pixel with `value` as the sum of its estimates of direct light. What it can be compared to depends on what camera
-/// rays have met: all of them one surface of the same material.
+/// A pixel whose estimates of direct light have the sum `value`. It is comparable to other pixels if all of its camera
+/// rays hit surfaces; the material is its class.
 pub(super) fn pixel(sums: &PixelSums, value: [f64; 3]) -> Pixel {
     let count = sums.count.max(1) as f64;
     let is_covered = sums.count > 0 && sums.hits == sums.count;

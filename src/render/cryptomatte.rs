@@ -1,12 +1,12 @@
-//! Cryptomatte: which objects and materials a pixel shows, and how much of it each covers [Friedman and Jones 2015;
-//! Cryptomatte specification 1.2].
+//! Cryptomatte: coverage of each pixel by objects and materials [Friedman and Jones 2015; Cryptomatte
+//! specification 1.2].
 //!
-//! Coverage is that of the very samples that the image consists of: their camera rays are traced once more, for the first
-//! surface alone, and count with the weights of the pixel filter. So neither integrators nor the film know of it, and an
-//! image without these layers takes no time for them.
+//! Coverage is computed from the camera samples of the image: their rays are traced again, to the first surface only,
+//! and weighted by the pixel filter. Integrators and the film are not involved, so an image without these layers takes
+//! no extra time.
 //!
-//! An id is the 32-bit MurmurHash3 of a name, as the float of the same bits. A pixel has the [`RANKS`] ids that cover
-//! most of it, two in each group of four channels.
+//! An id is the 32-bit MurmurHash3 of a name, reinterpreted as a float. A pixel stores the [`RANKS`] ids with the
+//! largest coverage, two in each group of four channels.
 
 use super::{BATCH_PATHS, RenderSettings, ThreadError, position, thread_pool};
 use crate::accel::{Coherence, Hit, RayBatch};
@@ -22,7 +22,7 @@ use strum::{EnumString, IntoStaticStr, VariantNames};
 /// Ids per pixel.
 pub const RANKS: usize = 6;
 
-/// What gets an id.
+/// Kind of a Cryptomatte.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, EnumString, IntoStaticStr, VariantNames)]
 #[strum(serialize_all = "kebab-case")]
 pub enum Cryptomatte {
@@ -32,18 +32,18 @@ pub enum Cryptomatte {
     Material,
 }
 
-/// One Cryptomatte.
+/// The image of one Cryptomatte.
 #[derive(Clone, Debug)]
 pub struct Layer {
     /// Its name, `CryptoObject` or `CryptoMaterial`.
     pub name: &'static str,
     /// Names of the channels: `CryptoObject00.R` is the first id and `.G` its coverage, `.B` and `.A` are the second.
     pub channels: Vec<String>,
-    /// The image.
+    /// The crop window.
     bounds: PixelBounds,
-    /// By rows and columns.
+    /// Sorted by rows, then columns.
     tiles: Vec<LayerTile>,
-    /// Entries `cryptomatte/…`, with the names of all ids.
+    /// Metadata entries `cryptomatte/…`, with the names of all ids.
     pub metadata: Vec<(String, String)>,
 }
 
@@ -53,14 +53,14 @@ pub fn hash(name: &str) -> u32 {
     murmur3::murmur3_32(&mut Cursor::new(name), 0).unwrap_or_default()
 }
 
-/// The float of a hash: its bits, with another exponent where they are no normal number.
+/// The float with the bits of a hash. The exponent is changed if it would not be a normal number.
 pub fn id(hash: u32) -> f32 {
     let exponent = (hash >> 23 & 0xff).clamp(1, 254);
     f32::from_bits(hash & 0x807f_ffff | exponent << 23)
 }
 
 impl Cryptomatte {
-    /// The name of its layer.
+    /// Name of the layer.
     pub fn layer(self) -> &'static str {
         match self {
             Cryptomatte::Object => "CryptoObject",
@@ -68,7 +68,7 @@ impl Cryptomatte {
         }
     }
 
-    /// What is told apart: geometry and instance, or material.
+    /// Key of a hit: geometry and instance, or material.
     fn key(self, scene: &Scene, hit: &Hit) -> Key {
         match self {
             Cryptomatte::Object => (hit.geometry, hit.instance),
@@ -76,7 +76,7 @@ impl Cryptomatte {
         }
     }
 
-    /// Names by the first part of keys.
+    /// Names, indexed by the first part of the key.
     fn names(self, scene: &Scene) -> Vec<String> {
         match self {
             Cryptomatte::Object => unique(scene.surfaces.iter().map(|s| s.name.as_str())),
@@ -92,7 +92,7 @@ impl Cryptomatte {
         Layer { name: self.layer(), channels: names.collect(), bounds, tiles, metadata: self.metadata(&hashes) }
     }
 
-    /// The entries that readers look for. The manifest is JSON, in the order of names.
+    /// The metadata entries of the specification. The manifest is JSON, ordered by name.
     fn metadata(self, hashes: &BTreeMap<String, u32>) -> Vec<(String, String)> {
         let names: Vec<String> =
             hashes.iter().map(|(name, hash)| format!("{}:\"{hash:08x}\"", json_text(name))).collect();
@@ -110,7 +110,7 @@ impl Cryptomatte {
 /// See [`Cryptomatte::key`].
 type Key = (u32, u32);
 
-/// The same names, numbered where several are equal.
+/// Makes names unique by appending numbers.
 fn unique<'a>(names: impl Iterator<Item = &'a str>) -> Vec<String> {
     let mut taken = HashSet::new();
     let mut next = BTreeMap::new();
@@ -125,7 +125,7 @@ fn unique<'a>(names: impl Iterator<Item = &'a str>) -> Vec<String> {
     names.map(number).collect()
 }
 
-/// The Cryptomattes of a rendering.
+/// Renders the Cryptomattes of a film.
 pub fn cryptomattes(
     job: &RenderJob,
     settings: &RenderSettings,
@@ -135,6 +135,8 @@ pub fn cryptomattes(
     if kinds.is_empty() {
         return Ok(Vec::new());
     }
+
+    // Trace all tiles
     let pool = thread_pool(settings.threads)?;
     let tiles = film.bounds.tiles(settings.tile_size);
     let camera = CameraSampler::new(job, settings.first_sample);
@@ -143,6 +145,7 @@ pub fn cryptomattes(
     let of_tiles: Vec<Vec<LayerTile>> =
         pool.install(|| tiles.par_iter().with_max_len(1).map(|tile| tracer.tile(tile)).collect());
 
+    // Sort the results by kind
     let mut layers: Vec<Vec<LayerTile>> = kinds.iter().map(|_| Vec::with_capacity(tiles.len())).collect();
     for of_tile in of_tiles {
         layers.iter_mut().zip(of_tile).for_each(|(layer, tile)| layer.push(tile));
@@ -150,26 +153,26 @@ pub fn cryptomattes(
     Ok(kinds.iter().zip(layers).map(|(kind, tiles)| kind.finish(film.bounds, tiles)).collect())
 }
 
-/// Channels of a Cryptomatte.
+/// Channels per Cryptomatte.
 const STRIDE: usize = 2 * RANKS;
 
-/// The keys that a pixel shows, with their coverage.
+/// Keys of a pixel with their coverage.
 type Ranked = Vec<(Key, f32)>;
 
-/// One kind in one tile.
+/// One Cryptomatte in one tile.
 #[derive(Clone, Debug)]
 struct LayerTile {
     bounds: PixelBounds,
-    /// Numbers of ids of its pixels, row by row.
+    /// Number of ids of each pixel, row by row.
     counts: Vec<u8>,
-    /// Ids with their coverage, pixel by pixel.
+    /// Ids and coverage, pixel by pixel.
     covers: Vec<[f32; 2]>,
-    /// Names and hashes of what is there.
+    /// Names and hashes of all keys in the tile.
     hashes: BTreeMap<String, u32>,
 }
 
 impl Layer {
-    /// The values of some rows, given by their coordinates, interleaved.
+    /// The values of some rows, given by their y coordinates, interleaved.
     pub fn rows(&self, rows: Range<u32>) -> Vec<f32> {
         let row = self.bounds.width() as usize * STRIDE;
         let mut data = vec![0.0; rows.len() * row];
@@ -201,10 +204,13 @@ struct Tracer<'a> {
 }
 
 impl Tracer<'_> {
-    /// All kinds in a tile.
+    /// All Cryptomattes of a tile.
     fn tile(&self, tile: &PixelBounds) -> Vec<LayerTile> {
+        // Coverage by key
         let mut pixels = vec![vec![Ranked::new(); tile.area()]; self.kinds.len()];
         self.trace(tile, &mut pixels);
+
+        // Keep the largest, and replace keys by ids
         let layers = pixels.into_iter().zip(self.names).map(|(pixels, names)| {
             let (mut counts, mut covers) = (Vec::with_capacity(pixels.len()), Vec::new());
             let mut hashes = BTreeMap::<Key, (String, u32)>::new();
@@ -226,7 +232,7 @@ impl Tracer<'_> {
         layers.collect()
     }
 
-    /// Adds what the camera samples of a tile meet to the keys of its pixels.
+    /// Adds the coverage of the camera samples of a tile to its pixels.
     fn trace(&self, tile: &PixelBounds, pixels: &mut [Vec<Ranked>]) {
         let scene = &self.job.world.scene;
         let seed = self.job.settings().sampling.seed;
@@ -241,6 +247,8 @@ impl Tracer<'_> {
         });
         let (mut scratch, mut samples) = (Scratch::default(), Vec::new());
         let (mut rays, mut hits) = (RayBatch::default(), Vec::new());
+
+        // Batches of ranges, the last one shorter
         let mut next = ranges.next();
         while next.is_some() {
             samples.clear();
@@ -269,7 +277,8 @@ fn add(ranked: &mut Ranked, key: Key, weight: f32) {
     }
 }
 
-/// Keeps what covers most. Filters with negative lobes may leave less than nothing.
+/// Keeps the keys with the largest coverage. Filters with negative lobes can give a negative coverage, which is
+/// dropped.
 fn rank(ranked: &mut Ranked) {
     ranked.retain(|(_, coverage)| *coverage > 0.0);
     ranked.sort_unstable_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
@@ -281,7 +290,7 @@ fn name_of(names: &[String], (index, instance): Key) -> String {
     if instance == Hit::NO_INSTANCE { name.clone() } else { format!("{name}@{instance}") }
 }
 
-/// A string of JSON.
+/// A JSON string.
 fn json_text(text: &str) -> String {
     let mut json = String::from("\"");
     for c in text.chars() {
@@ -298,7 +307,7 @@ fn json_text(text: &str) -> String {
 mod tests {
     use super::*;
 
-    /// Figures of the specification's reference code.
+    /// Values of the reference code of the specification.
     #[test]
     fn ids_are_those_of_the_specification() {
         for (name, expected) in [

@@ -1,10 +1,11 @@
-//! Looks: camera rays that see lights directly, more of them than paths where that is most of the noise.
+//! Emission rays: additional camera rays that measure only the emission of visible lights, at pixels where it dominates
+//! the noise.
 //!
-//! What a camera sample sees of lights without any bounce has another variance than the light that its path gathers, and a
-//! far lower cost. At the edge of a lamp nearly all of the variance is that of the former: so the sample is *split* there
-//! [Arvo and Kirk 1990] into several camera rays, of which only one becomes a path. With the emission e that its own ray
-//! sees, and that of m − 1 others, the sample f becomes f − e + (e + Σ e_i)/m, which has the same expected value. How many
-//! there are follows from a pilot ([`crate::planning::allocation`]) and not from the samples themselves.
+//! The emission that a camera ray meets has another variance than the light gathered by its path, at a far lower cost.
+//! At the edge of a lamp it causes nearly all of the variance. There the sample is *split* [Arvo and Kirk 1990] into
+//! several camera rays, one of which continues as a path. Let e be the emission met by that ray and e_i the emission
+//! met by the m − 1 others. The sample f becomes f − e + (e + Σ e_i)/m, which has the same expected value. The number m
+//! follows from a pilot ([`crate::planning::allocation`]), never from the samples themselves.
 
 use super::tiles::batches;
 use crate::film::{FeatureSet, PixelSample};
@@ -17,10 +18,10 @@ use lumiris_numbers::math::Rgb;
 use lumiris_numbers::math::hash::pcg4d;
 use std::ops::Range;
 
-/// Combined with the seed of the samples to give that of their looks.
+/// Combined with the seed of the samples to give the seed of emission rays.
 const SEED: u32 = 0x6c_6f_6f_6b;
 
-/// Traces looks; holds the buffers of one worker.
+/// Traces emission rays. Holds the buffers of one worker.
 #[derive(Default)]
 pub(super) struct Looks {
     tracer: PathTracer,
@@ -30,18 +31,18 @@ pub(super) struct Looks {
     scratch: Scratch,
 }
 
-/// A sample that has more looks than its own.
+/// A sample with more than one emission ray.
 struct Split {
-    /// Its index among those of the batch.
+    /// Index of the sample in the batch.
     of_batch: usize,
     pixel: [u32; 2],
-    /// Its index among those of the pixel.
+    /// Index of the sample in its pixel.
     sample: u32,
     looks: u32,
 }
 
 impl Split {
-    /// The indices of all looks but its own. After some 10⁷ samples they begin again.
+    /// Indices of the additional rays. They repeat after about 10⁷ samples.
     fn others(&self) -> Range<u32> {
         let first = self.sample.wrapping_mul(self.looks - 1) & (u32::MAX >> 1);
         first..first + self.looks - 1
@@ -49,16 +50,16 @@ impl Split {
 }
 
 impl Looks {
-    /// Beside a tracer that keeps so many layers by lights.
+    /// For a tracer with the given number of light-group layers.
     pub(super) fn new(light_layers: usize) -> Self {
         let mut tracer = PathTracer::new(FeatureSet::None);
         tracer.keep_light_layers(light_layers);
         Looks { tracer, ..Looks::default() }
     }
 
-    /// Replaces what the samples of a batch see of lights by the means over all of their looks, in what they found altogether
-    /// and in their layers by lights. `pixels` are those of the samples, in the order of these, with the indices of their
-    /// samples; `seed` is that of the samples.
+    /// Replaces the emission in the results of a batch by the mean over all emission rays of the sample, in the total
+    /// and in each light-group layer. `pixels` lists the pixels in the order of the samples, with the indices of their
+    /// samples. `seed` is the seed of the samples.
     pub(super) fn replace(
         &mut self,
         (job, camera): (&RenderJob, &CameraSampler<'_>),
@@ -69,6 +70,8 @@ impl Looks {
         let Some(of_pixels) = job.pixel_samples.as_ref().filter(|of_pixels| !of_pixels.looks.is_empty()) else {
             return;
         };
+
+        // List the samples with additional rays
         let settings = IntegratorSettings { max_depth: 0, ..job.settings().integrator };
         let seed = pcg4d([seed, SEED, 0, 0])[0];
         self.split.clear();
@@ -81,6 +84,8 @@ impl Looks {
             }
             first += count;
         }
+
+        // Trace their rays in batches: additional rays first, then each sample's own
         let all = std::mem::take(&mut self.split);
         for part in batches(0..all.len() as u32, |i| all[i as usize].looks as usize) {
             let part = &all[part.start as usize..part.end as usize];
@@ -89,6 +94,8 @@ impl Looks {
             camera.samples(others, seed, &mut self.scratch, &mut self.samples);
             self.samples.extend(part.iter().map(|split| samples[split.of_batch]));
             self.tracer.trace(job, &settings, &self.samples, &mut Default::default(), &mut self.results);
+
+            // Replace the emission in the results and in the layers
             let results = &self.results;
             exchange(part, |look| results[look].radiance, found, |found, i| &mut found[i].radiance);
             let seen = self.tracer.light_layers();
@@ -100,14 +107,15 @@ impl Looks {
         self.split = all;
     }
 
-    /// The counts and times since the last call.
+    /// Counts and times since the last call.
     pub(super) fn take_stats(&mut self) -> PathStats {
         Tracer::take_stats(&mut self.tracer)
     }
 }
 
-/// Replaces what samples see by the mean of what all of their looks do, where `at` finds what a sample has found in `found`. A
-/// batch of looks has all but their own first, sample by sample, then their own.
+/// Replaces the emission of samples by the mean over their emission rays. `seen` is the emission of a ray; `at`
+/// accesses the value of a sample in `found`. A batch has the additional rays first, sample by sample, then each
+/// sample's own.
 fn exchange<T: ?Sized>(
     part: &[Split],
     seen: impl Fn(usize) -> Rgb,

@@ -1,8 +1,8 @@
-//! Memory that an image takes, predicted before it is rendered.
+//! Prediction of the memory that an image takes.
 //!
-//! A packed pixel takes the bits in which it differs from its neighbours, which only its samples tell. The figures here
-//! are those of one scene at 1 sample (docs/measurements/memory.md). How they grow with samples is
-//! an estimate: a sum needs one more binary digit for twice as many.
+//! A packed pixel takes the bits in which it differs from its neighbours, which depend on its samples. The figures here
+//! were measured with one scene at 1 sample (docs/measurements/memory.md). Their growth is estimated: a sum needs one
+//! more binary digit when the number of samples doubles.
 
 use super::control_variates::ROWS;
 use super::cryptomatte::Cryptomatte;
@@ -15,70 +15,72 @@ use crate::integrators::light_layers;
 use crate::scene::RenderJob;
 use lumiris_numbers::estimators::ocv::pixels::MARGIN;
 
-/// Bytes of a pixel with one sample: radiance and its squares, counts.
+/// Bytes per pixel with one sample: radiance, squared radiance, counts.
 const IMAGE: f64 = 38.0;
-/// Bytes of albedo, normal, depth and indices.
+/// Bytes per pixel of albedo, normal, depth and indices.
 const FEATURES: f64 = 17.0;
-/// Binary digits that twice as many samples add to both.
+/// Binary digits per pixel that doubling the samples adds to the image and to the features.
 const DIGITS: [f64; 2] = [9.0, 9.0];
-/// Bytes of the replicas of a pixel, of which there are few: exact sums, and numbers.
+/// Bytes per pixel of replicas: exact sums and counts, averaged over all pixels.
 const REPLICAS: f64 = 4.0;
-/// Bytes of a tile besides its sums, by pixel.
+/// Bytes per pixel of a tile besides its sums.
 const TILE: f64 = 2.0;
-/// Bytes of a Cryptomatte where a pixel shows two ids.
+/// Bytes per pixel of a Cryptomatte, for two ids per pixel.
 const IDS: f64 = 18.0;
-/// Bytes of an image to denoise: colour, albedo, normal, what comes out, and the library's own.
+/// Bytes per pixel of denoising: colour, albedo, normal, output, and the buffers of the library.
 const DENOISED: f64 = 4.0 * (3.0 * 4.0) + 64.0;
-/// Bytes of a sum of control variates with one sample, and binary digits that twice as many samples add.
+/// Bytes of a sum of control variates with one sample, and binary digits that doubling the samples adds.
 const CONTROL: f64 = 3.5;
 const CONTROL_DIGITS: f64 = 3.0;
-/// Bytes of what a pixel is corrected by where control variates are fitted over pixels; and of a pixel of the rows that are
-/// corrected together, and by control variate.
+/// Control variates fitted over pixels: bytes of the correction of a pixel; then bytes per pixel of the rows that are
+/// corrected together, fixed and per control variate.
 const CORRECTION: f64 = 12.0;
 const FITTED: [usize; 2] = [240, 13];
-/// Bytes of a pixel that is read from the film, and of the channels of an image with all layers.
+/// Bytes of a pixel read from the film, and of the channels of an image with all layers.
 const READ: usize = 144 + 24;
 const CHANNELS: usize = 16 * 4;
-/// Bytes of OpenImageIO and the libraries it depends on, of threads with their batches.
+/// Bytes of OpenImageIO with its dependencies, and of a thread with its batches.
 const LIBRARIES: u64 = 118 << 20;
 const THREAD: u64 = 8 << 20;
 
-/// What is to be made of a job.
+/// The outputs of a job that affect its memory.
 #[derive(Clone, Copy, Debug)]
 pub struct Wanted<'a> {
     /// Samples and layers.
     pub render: &'a RenderSettings,
     /// Cryptomattes.
     pub cryptomattes: &'a [Cryptomatte],
-    /// Whether the image is denoised.
+    /// True if the image is denoised.
     pub is_denoised: bool,
 }
 
-/// Bytes that an image takes, beyond its scene.
+/// Bytes that an image takes in addition to the scene.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Prediction {
-    /// All that grows with the number of pixels.
+    /// Memory proportional to the number of pixels.
     pub film: u64,
-    /// The rows that are being written.
+    /// Rows that are being written.
     pub output: u64,
-    /// What any image takes: libraries, unless they are loaded, and the batches of threads; and tiles of textures that are not
-    /// in memory yet.
+    /// Memory of any image: libraries, unless they are loaded; batches of threads; texture tiles that are not in memory
+    /// yet.
     pub fixed: u64,
 }
 
 impl Prediction {
-    /// All together.
+    /// Total.
     pub fn bytes(&self) -> u64 {
         self.film + self.output + self.fixed
     }
 }
 
-/// Bytes that an image will take.
+/// Predicts the memory of an image.
 pub fn predict(job: &RenderJob, wanted: &Wanted<'_>) -> Prediction {
     let bounds = job.world.scene.film.bounds;
     let render = wanted.render;
     let threads = render.threads.unwrap_or_else(|| thread_pool(None).map_or(1, |pool| pool.current_num_threads()));
     let share = render.share.map_or(1.0, |share| 1.0 / f64::from(share.count.max(1)));
+
+    // Outputs of whole images, and rows that are written
     let pixels = bounds.area() as f64;
     let whole = if wanted.is_denoised { DENOISED } else { 0.0 } + wanted.cryptomattes.len() as f64 * IDS;
     let width = bounds.width() as usize;
@@ -91,7 +93,7 @@ pub fn predict(job: &RenderJob, wanted: &Wanted<'_>) -> Prediction {
     }
 }
 
-/// Bytes of a column of the rows that are corrected together, where control variates are fitted over pixels.
+/// Bytes per column of the rows that are corrected together, where control variates are fitted over pixels.
 fn of_corrected_rows(job: &RenderJob) -> usize {
     let estimator = Estimator::at_vertex(&job.settings().integrator, 0);
     if !estimator.is_over_pixels() {
@@ -100,10 +102,12 @@ fn of_corrected_rows(job: &RenderJob) -> usize {
     (ROWS as usize + 2 * MARGIN) * (FITTED[0] + FITTED[1] * job.controls())
 }
 
-/// Bytes of the sums of a pixel.
+/// Bytes per pixel of the sums.
 fn of_sums(job: &RenderJob, render: &RenderSettings) -> f64 {
     let doublings = f64::from(render.spp.max(1)).log2();
     let grown = |bytes: f64, digits: f64| bytes + digits * doublings / 8.0;
+
+    // Image, features and replicas
     let mut bytes = TILE + grown(IMAGE, DIGITS[0]);
     if render.with_features {
         bytes += grown(FEATURES, DIGITS[1]);
@@ -111,7 +115,11 @@ fn of_sums(job: &RenderJob, render: &RenderSettings) -> f64 {
     if replica_choice(job, render).is_some() {
         bytes += REPLICAS;
     }
+
+    // Layers of light groups
     bytes += light_layers::count(job) as f64 * grown(IMAGE, DIGITS[0]);
+
+    // Control variates
     let estimator = Estimator::at_vertex(&job.settings().integrator, 0);
     let fits = estimator.fits(job, 1);
     bytes += fits.memory().map(size_of_val).iter().sum::<usize>() as f64;

@@ -1,8 +1,12 @@
-//! Rendering: tiles × sample ranges on all cores, and the film that comes out.
+//! Rendering: tiles × sample ranges on all cores, accumulated in a [`Film`].
 //!
-//! The image is a function of the scene, its settings, the seed and the sample range. A pixel's samples are drawn
-//! by its coordinates and their index, traced independently of what else is in their batch, and added to exact sums; so
-//! neither threads, nor tiles, nor passes, nor [`parts`] of the image change a bit.
+//! The image is a function of the scene, its settings, the seed and the sample range. A pixel's samples are a function
+//! of its coordinates and their indices, independent of the rest of their batch, and are added to exact sums. Threads,
+//! tiles, passes and [`parts`] of the image therefore do not change a bit.
+//!
+//! Passes: `run`, `pace`, `shared_cells`, [`cell_progress`]. Tiles, threads and batches: `tiles`, `worker`,
+//! [`batches`], `looks` (emission rays). Finished film: `control_variates`, [`cryptomatte`], [`output`]. Files:
+//! [`parts`]. Costs: [`memory`], [`phases`].
 
 pub mod batches;
 pub mod cell_progress;
@@ -39,7 +43,7 @@ use std::time::Duration;
 use tiles::position;
 pub use tiles::{TileShare, Tiles};
 
-/// How to render. Only the sample range affects the image.
+/// Parameters of a rendering. Only the sample range affects the image.
 #[derive(Clone, Copy, Debug)]
 pub struct RenderSettings {
     /// Threads; all cores if `None`.
@@ -48,18 +52,19 @@ pub struct RenderSettings {
     pub tile_size: u32,
     /// First sample index.
     pub first_sample: u32,
-    /// Samples per pixel from there on.
+    /// Samples per pixel, from `first_sample` on.
     pub spp: u32,
-    /// How many of these are left out at the beginning, to be rendered elsewhere: the samples of an estimator that is fitted to
-    /// earlier ones cannot be.
+    /// Number of samples at the beginning of the range that are skipped, because another part renders them. Must be 0
+    /// for estimators that are fitted to earlier samples.
     pub skip: u32,
-    /// The pixels that are rendered; all if `None`.
+    /// Pixels to render; all if `None`.
     pub share: Option<TileShare>,
-    /// No tile is begun later than this; without a sample, half a second later, or 3 %.
+    /// No tile starts after this time. Tiles without any sample may start up to half a second later, or 3 % of the
+    /// limit if that is longer.
     pub time_limit: Option<Duration>,
-    /// Estimates some pixels twice, which gives the variance of pixel means; see [`crate::film::replicas`].
+    /// True to estimate some pixels twice, which gives the variance of pixel means; see [`crate::film::replicas`].
     pub with_replicas: bool,
-    /// Whether the film holds features of the first surfaces: albedo, normal, depth, material and object.
+    /// True if the film stores features of the first surfaces: albedo, normal, depth, material and object.
     pub with_features: bool,
 }
 
@@ -82,7 +87,8 @@ impl Default for RenderSettings {
 /// Progress reported after every tile.
 #[derive(Clone, Copy, Debug)]
 pub struct Progress {
-    /// Camera samples done, as if every pixel had the same number.
+    /// Camera samples done, summed over pixels. With adaptive sampling they count as if every pixel had the same
+    /// number.
     pub samples_done: u64,
     /// Camera samples requested.
     pub samples_total: u64,
@@ -90,13 +96,13 @@ pub struct Progress {
     pub rays: u64,
     /// Time since the start.
     pub elapsed: Duration,
-    /// Passes over the whole image that are done.
+    /// Completed passes over the whole image.
     pub passes: u32,
-    /// Median noise of the blocks ([`crate::film::noise`]) after the last pass for which it was determined, if there was one.
+    /// Median noise of the blocks ([`crate::film::noise`]) when it was last computed; `None` before.
     pub noise: Option<f64>,
 }
 
-/// A finished or stopped rendering.
+/// The result of a rendering, finished or stopped.
 #[derive(Debug)]
 pub struct Rendering {
     /// The film.
@@ -107,46 +113,47 @@ pub struct Rendering {
     pub cache: Option<CacheReport>,
     /// The photon maps, if there are any.
     pub photons: Option<MapStats>,
-    /// Light paths, if there were any.
+    /// Statistics of light paths, if any were traced.
     pub light: Option<LightPathStats>,
     /// Wall-clock time.
     pub elapsed: Duration,
-    /// Processor time of its tiles and of the noise on the way, by phases.
+    /// CPU time by phase: tiles, and the noise of the image so far.
     pub phases: Vec<Phase>,
     /// True if every pixel has all its samples.
     pub complete: bool,
     /// Threads used.
     pub threads: usize,
-    /// The exact sums, if they were to be kept.
+    /// The exact sums, if requested.
     pub sums: Option<Tiles>,
 }
 
-/// Gets the film of a tile that has new samples; called from worker threads.
+/// Receives the film of a tile that has new samples. Called from worker threads.
 pub type TileObserver<'a> = dyn Fn(&Film) + Sync + 'a;
 
-/// Called after every pass over the whole image, before the next begins; gets the progress, and may stop the rendering.
+/// Called after every pass over the whole image, before the next one starts. Receives the progress and may stop the
+/// rendering.
 pub type PassObserver<'a> = dyn Fn(&Progress) + Sync + 'a;
 
-/// What a rendering goes on from, where its sums are stored, and who watches it.
+/// Inputs of a resumed rendering, its checkpoints, and its observers.
 #[derive(Default)]
 pub struct Continuation<'a> {
-    /// The sums of an earlier rendering by the same settings. Their tiles are those of the rendering.
+    /// The sums of an earlier rendering with the same settings. The rendering uses the same tiles.
     pub stored: Option<Vec<StoredTile>>,
-    /// How far its cells are.
+    /// Progress of its cells.
     pub cells: CellProgress,
-    /// Stores the sums from time to time, and in the end.
+    /// Stores the sums at intervals and at the end.
     pub checkpoints: Option<&'a mut Checkpoints>,
-    /// Whether the exact sums are part of the result.
+    /// True to return the exact sums with the result.
     pub keeps_sums: bool,
-    /// Whether the progress has the noise even where nobody watches tiles or passes.
+    /// True to report the noise with the progress even if nobody observes tiles or passes.
     pub tells_noise: bool,
-    /// Gets tiles on the way.
+    /// Receives tiles during the rendering.
     pub watch: Option<&'a TileObserver<'a>>,
-    /// Waits between passes.
+    /// Called between passes.
     pub passes: Option<&'a PassObserver<'a>>,
 }
 
-/// Why a rendering ended without an image.
+/// Reason why a rendering ended without an image.
 #[derive(Debug, thiserror::Error)]
 pub enum RenderError {
     /// The threads could not be started.
@@ -155,16 +162,16 @@ pub enum RenderError {
     /// The integrator could not prepare its photon maps.
     #[error(transparent)]
     Photons(#[from] PhotonError),
-    /// The settings leave out something of the scene, or the image cannot be divided.
+    /// The settings exclude a feature of the scene, or the image cannot be divided.
     #[error(transparent)]
     Features(#[from] Conflict),
-    /// It was stopped before the first sample.
+    /// The rendering was stopped before the first sample.
     #[error("stopped before the first sample")]
     Stopped,
-    /// Texels could not be read while rendering.
+    /// Texels could not be read during the rendering.
     #[error("{0}")]
     Texels(String),
-    /// The sums to go on from are those of something else.
+    /// The stored sums belong to another rendering.
     #[error(transparent)]
     Stored(#[from] PartError),
 }
@@ -179,7 +186,7 @@ impl From<PlanError> for RenderError {
     }
 }
 
-/// Renders. `stop` ends it after the tiles under way; `observe` is called from worker threads.
+/// Renders a job. `stop` ends the rendering after the current tiles. `observe` is called from worker threads.
 pub fn render(
     job: &RenderJob,
     settings: &RenderSettings,
@@ -189,7 +196,7 @@ pub fn render(
     go_on(job, settings, stop, observe, Continuation::default())
 }
 
-/// The same, from what an earlier rendering has left.
+/// Like [`render`], but resumes from the sums of an earlier rendering.
 pub fn go_on(
     job: &RenderJob,
     settings: &RenderSettings,
@@ -202,12 +209,14 @@ pub fn go_on(
     if let Some(conflict) = features::refusal(job, &job.settings().integrator).or(division) {
         return Err(conflict.into());
     }
+
+    // Render in a thread pool of this rendering
     let pool = thread_pool(settings.threads)?;
     let threads = pool.current_num_threads();
     pool.install(|| Run::new(job, settings, stop, observe).run(threads, continuation))
 }
 
-/// True if the samples of a pixel depend on earlier ones: it cannot be divided into parts.
+/// True if the samples of a pixel depend on earlier ones. Such an image cannot be divided into ranges of samples.
 pub fn depends_on_earlier_samples(settings: &Settings) -> bool {
     Estimator::at_vertex(&settings.integrator, 0).is_progressive()
 }

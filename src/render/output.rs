@@ -1,4 +1,4 @@
-//! From the film to images: channels with names, and metadata.
+//! Conversion of films to images: named channels and metadata.
 
 use super::Rendering;
 use crate::film::{BAND, Film, PixelSums};
@@ -9,7 +9,7 @@ use rayon::prelude::*;
 use std::ops::Range;
 use strum::{EnumString, IntoStaticStr, VariantNames};
 
-/// A group of channels beside the image itself.
+/// A group of channels in addition to the image itself.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, EnumString, IntoStaticStr, VariantNames)]
 #[strum(serialize_all = "kebab-case")]
 pub enum Aov {
@@ -23,25 +23,25 @@ pub enum Aov {
     Normal,
     /// Mean distance to the first surface, `depth.Z`; infinity where there is none.
     Depth,
-    /// Material of the first sample's surface plus one, `material`; 0 where there is none.
+    /// Material of the first sample's surface plus one, `material`; 0 if there is none.
     Material,
-    /// Geometry of the first sample's surface plus one, `object`; 0 where there is none.
+    /// Geometry of the first sample's surface plus one, `object`; 0 if there is none.
     Object,
-    /// The best M/N of `ris`: as a colour `ratio.R/G/B`, green where more proposals and red where more samples are best
-    /// [Talbot et al. 2005, Fig. 3], and as numbers `ratio.proposals` and `ratio.samples`.
+    /// The best M/N of `ris`, as a colour and as numbers. `ratio.R/G/B` is green where more proposals are best and red
+    /// where more samples are best [Talbot et al. 2005, Fig. 3]. `ratio.proposals` and `ratio.samples` are the counts.
     Ratio,
     /// Records of the irradiance cache that were computed for the pixel, `records`.
     Records,
-    /// The light of each group of lights, `light_NAME.R/G/B`; together they are the image.
+    /// The light of each light group, `light_NAME.R/G/B`. Their sum is the image.
     LightGroups,
 }
 
 impl Aov {
-    /// All that every image has, in the order of the file.
+    /// The AOVs that are available for every image, in the order of the file.
     pub const ALL: [Aov; 7] =
         [Aov::Variance, Aov::Samples, Aov::Albedo, Aov::Normal, Aov::Depth, Aov::Material, Aov::Object];
 
-    /// True if it shows a feature of the first surfaces.
+    /// True for features of the first surfaces.
     pub fn is_feature(self) -> bool {
         match self {
             Aov::Albedo | Aov::Normal | Aov::Depth | Aov::Material | Aov::Object => true,
@@ -49,7 +49,7 @@ impl Aov {
         }
     }
 
-    /// Names of its channels in the image of a film.
+    /// Names of the channels in the image of a film.
     fn channels(self, film: &Film) -> Vec<String> {
         let names: &[&str] = match self {
             Aov::Variance => &["variance.R", "variance.G", "variance.B"],
@@ -70,7 +70,7 @@ impl Aov {
     }
 }
 
-/// Name of the layer of a group of lights.
+/// Layer name of a light group.
 fn light_layer_name(group: &str) -> String {
     format!("light_{group}")
 }
@@ -87,19 +87,19 @@ pub struct Channels {
     pub data: Vec<f32>,
 }
 
-/// Layers of a film, which are made row by row.
+/// Layers of a film, converted row by row.
 #[derive(Clone, Debug)]
 pub struct Layers<'a> {
     film: &'a Film,
-    /// Whether `R G B` come first.
+    /// True if `R G B` come first.
     has_image: bool,
     aovs: &'a [Aov],
-    /// The map that [`Aov::Ratio`] shows, and its greatest ratio; without one that layer is black.
+    /// The map shown by [`Aov::Ratio`], and its largest ratio. Without a map the layer is black.
     sample_count_map: Option<(&'a SampleCountMap, f32)>,
 }
 
 impl<'a> Layers<'a> {
-    /// The chosen AOVs, after the image `R G B` if `has_image`. `sample_count_map` is what [`Aov::Ratio`] shows.
+    /// The given AOVs, after the image `R G B` if `has_image`. `sample_count_map` is the source of [`Aov::Ratio`].
     pub fn new(film: &'a Film, has_image: bool, aovs: &'a [Aov], sample_count_map: Option<&'a SampleCountMap>) -> Self {
         let greatest = |map: &SampleCountMap| map.ratios.iter().copied().fold(1.0, f32::max).max(1.0 + f32::EPSILON);
         Layers { film, has_image, aovs, sample_count_map: sample_count_map.map(|map| (map, greatest(map))) }
@@ -112,7 +112,7 @@ impl<'a> Layers<'a> {
         image.iter().map(|&name| name.to_owned()).chain(aovs).collect()
     }
 
-    /// The values of some rows as [`Self::rows`] makes them, by several threads.
+    /// Like [`Self::rows`], computed by several threads.
     pub fn rows_in_parallel(&self, rows: Range<u32>) -> Vec<f32> {
         let bands = rows.len().div_ceil(BAND as usize) as u32;
         let band = |i: u32| rows.start + i * BAND..rows.end.min(rows.start + (i + 1) * BAND);
@@ -120,8 +120,9 @@ impl<'a> Layers<'a> {
         made.concat()
     }
 
-    /// The values of some rows, given by their coordinates, interleaved.
+    /// The values of some rows, given by their y coordinates, interleaved.
     pub fn rows(&self, rows: Range<u32>) -> Vec<f32> {
+        // Read the sums of the rows; variances only if needed
         let stride = self.names().len();
         let (mut pixels, mut variances) = (Vec::new(), Vec::new());
         if self.aovs.contains(&Aov::Variance) {
@@ -130,6 +131,8 @@ impl<'a> Layers<'a> {
             self.film.read_rows(rows.clone(), &mut pixels);
         }
         let light_layers = self.rows_of_light_layers(rows.clone());
+
+        // Append the channels of each pixel
         let first = self.film.index(self.film.bounds.x0, rows.start);
         let mut data = Vec::with_capacity(stride * pixels.len());
         for (i, pixel) in pixels.iter().enumerate() {
@@ -160,7 +163,7 @@ impl<'a> Layers<'a> {
         data
     }
 
-    /// The layers by groups of lights, if they are among the AOVs.
+    /// The light-group layers, if they are requested.
     fn rows_of_light_layers(&self, rows: Range<u32>) -> Vec<Vec<PixelSums>> {
         let layers = if self.aovs.contains(&Aov::LightGroups) { self.film.light_layers() } else { &[] };
         let pixels = |film: &Film| {
@@ -172,14 +175,15 @@ impl<'a> Layers<'a> {
     }
 }
 
-/// The image `R G B` and the chosen AOVs, linear, all rows at once. See [`Layers`] for large images.
+/// The image `R G B` and the given AOVs, linear, all rows at once. Use [`Layers`] for large images.
 pub fn channels(film: &Film, aovs: &[Aov], sample_count_map: Option<&SampleCountMap>) -> Channels {
     let layers = Layers::new(film, true, aovs, sample_count_map);
     Channels { names: layers.names(), data: layers.rows(film.bounds.y0..film.bounds.y1) }
 }
 
-/// The same values, with an image of its own for each AOV and each group of lights; by their names, the image itself first.
+/// The same values as one named image per AOV and light group, the image itself first.
 pub fn layers(film: &Film, aovs: &[Aov], sample_count_map: Option<&SampleCountMap>) -> Vec<(String, Image)> {
+    // An image of some channels
     let image = |film: &Film, has_image: bool, aovs: &[Aov]| {
         let layers = Layers::new(film, has_image, aovs, sample_count_map);
         Image {
@@ -189,6 +193,8 @@ pub fn layers(film: &Film, aovs: &[Aov], sample_count_map: Option<&SampleCountMa
             data: layers.rows_in_parallel(film.bounds.y0..film.bounds.y1),
         }
     };
+
+    // One image per AOV, or per light group
     let of_aov = |&aov: &Aov| match aov {
         Aov::LightGroups => {
             let layer = |(name, film): &(String, Film)| (light_layer_name(name), image(film, true, &[]));
@@ -196,25 +202,27 @@ pub fn layers(film: &Film, aovs: &[Aov], sample_count_map: Option<&SampleCountMa
         }
         _ => vec![(<&str>::from(aov).to_owned(), image(film, false, &[aov]))],
     };
+
+    // The image itself comes first
     let whole = (IMAGE_LAYER.to_owned(), image(film, true, &[]));
     std::iter::once(whole).chain(aovs.iter().flat_map(of_aov)).collect()
 }
 
-/// The AOVs of an image under way.
+/// The AOVs of a preview.
 pub fn live_aovs(has_features: bool) -> Vec<Aov> {
     let features = [Aov::Albedo, Aov::Normal, Aov::Depth].into_iter().filter(|_| has_features);
     features.chain([Aov::Samples]).collect()
 }
 
-/// The AOVs that the image of a film has unless others are asked for.
+/// The AOVs of an image if none are requested.
 pub fn default_aovs(film: &Film, has_ratio: bool, has_records: bool) -> Vec<Aov> {
     let has_groups = !film.light_layers().is_empty();
     let more = [(has_ratio, Aov::Ratio), (has_records, Aov::Records), (has_groups, Aov::LightGroups)];
     Aov::ALL.into_iter().chain(more.into_iter().filter_map(|(has, aov)| has.then_some(aov))).collect()
 }
 
-/// Colour and numbers of a pixel of the map: from red at the minimum ratio (1) to green at the maximum of the map,
-/// logarithmically.
+/// Colour and counts of a pixel of the map. The colour scale is logarithmic, from red at ratio 1 to green at the
+/// largest ratio of the map.
 fn ratio_values((map, max): (&SampleCountMap, f32), pixel: usize) -> [f32; 5] {
     let ratio = map.ratios[pixel];
     let green = (ratio.ln() / max.ln()).clamp(0.0, 1.0);
@@ -222,7 +230,7 @@ fn ratio_values((map, max): (&SampleCountMap, f32), pixel: usize) -> [f32; 5] {
     [1.0 - green, green, 0.0, ratio * samples, samples]
 }
 
-/// How far a rendering came, as metadata entries.
+/// Metadata entries on the progress of a rendering.
 pub fn progress_metadata(rendering: &Rendering) -> Vec<(String, String)> {
     let entries = [
         ("complete", rendering.complete.to_string()),
@@ -232,7 +240,7 @@ pub fn progress_metadata(rendering: &Rendering) -> Vec<(String, String)> {
     entries.map(|(key, value)| (format!("lumiris:{key}"), value)).to_vec()
 }
 
-/// Everything that an image depends on, as metadata entries `lumiris:…`: its settings and the film.
+/// Metadata entries `lumiris:…` of everything that the image depends on: settings and film.
 pub fn metadata(film: &FilmSettings, settings: &Settings) -> Vec<(String, String)> {
     let b = &film.bounds;
     let film = [
@@ -254,7 +262,7 @@ mod tests {
     use crate::film::{PixelBounds, PixelSample};
     use lumiris_numbers::math::Rgb;
 
-    /// Two rows of three pixels, of which some have a sample.
+    /// Two rows of three pixels, two of which have a sample.
     fn film() -> Film {
         let bounds = PixelBounds { x0: 4, x1: 7, y0: 9, y1: 11 };
         let mut pixels = vec![PixelAccumulator::default(); 6];

@@ -1,22 +1,23 @@
-//! Lengths of passes within a time.
+//! Lengths of passes within a time limit.
 //!
-//! A rendering ends by tiles when its time is over: those that were not begun lack the samples of the last pass. So that few do,
-//! passes become shorter towards the end: each takes half of the time that is left, at the speed so far.
+//! When the time is over, tiles that have not started lack the samples of the last pass. To keep their number small,
+//! passes become shorter towards the end: each takes half of the remaining time at the speed so far.
 
 use std::time::Duration;
 
-/// Part of the time that may be left over where no whole pass fits into it.
+/// Fraction of the time limit that may remain unused if no whole pass fits into it.
 const LEFT_OVER: f64 = 0.03;
 
-/// What tiles without a sample may take longer, at least: an image with holes is of little use.
+/// Minimum extra time for tiles without a sample: an image with holes is of little use.
 const GRACE: Duration = Duration::from_millis(500);
 
-/// When no tile is begun any more that has no sample.
+/// Time after which even tiles without a sample do not start.
 pub(super) fn of_first_samples(limit: Duration) -> Duration {
     limit.saturating_add(GRACE.max(limit.mul_f64(LEFT_OVER)))
 }
 
-/// Samples per pixel of the next pass, at most `longest`, after `done` of them in the time `elapsed`; 0 if there is to be none.
+/// Samples per pixel of the next pass, at most `longest`, after `done` samples in the time `elapsed`; 0 if no pass
+/// starts.
 pub(super) fn pass_in_time(done: u32, elapsed: Duration, limit: Duration, longest: u32) -> u32 {
     let left = limit.saturating_sub(elapsed).as_secs_f64();
     let fit = left * f64::from(done) / elapsed.as_secs_f64().max(1e-9);
@@ -30,8 +31,8 @@ pub(super) fn pass_in_time(done: u32, elapsed: Duration, limit: Duration, longes
 mod tests {
     use super::*;
 
-    /// Renders with a clock of its own, where a sample of all pixels takes `seconds(done)`: the samples, and the time that the last
-    /// pass would end too late.
+    /// Simulates a rendering in which the sample with index `i` takes `seconds(i)` for all pixels. Returns the number
+    /// of samples and by how many seconds the last pass ends too late.
     fn rendered(limit: f64, seconds: impl Fn(u32) -> f64) -> (u32, f64) {
         let (mut done, mut elapsed) = (1, seconds(0));
         loop {
@@ -52,7 +53,7 @@ mod tests {
             let spare = LEFT_OVER * limit;
             assert!(late <= of_sample && late >= -spare, "{limit} s by {of_sample} s: {done} samples, {late} s late");
         }
-        // A sample that takes longer than before is at most one too many
+        // If samples become slower, at most one is too many
         let (done, late) = rendered(10.0, |i| if i < 8 { 0.1 } else { 0.25 });
         assert!((-0.3..=0.25).contains(&late), "{done} samples, {late} s late");
     }
@@ -60,7 +61,7 @@ mod tests {
     #[test]
     fn a_pass_that_does_not_fit_is_begun_where_much_time_is_left() {
         let time = Duration::from_secs_f64;
-        // One more takes a second
+        // A further sample takes one second
         assert_eq!(pass_in_time(3, time(3.0), time(3.5), 3), 1);
         assert_eq!(pass_in_time(50, time(50.0), time(50.5), 16), 0);
         assert_eq!(pass_in_time(3, time(3.0), time(3.0), 3), 0);

@@ -1,42 +1,42 @@
-//! Processor time of a rendering by phases.
+//! CPU time of a rendering by phase.
 //!
-//! Stages of a batch are measured by the clock on the wall, and a whole tile by the processor time of its thread as well: what
-//! other programs took of a tile is taken off all of its stages alike.
+//! The stages of a batch are measured in wall-clock time, and a whole tile in CPU time of its thread as well. The ratio
+//! of both scales all stages of the tiles, which removes the time taken by other programs.
 
 use crate::integrators::PathStats;
 use crate::planning::processor_time;
 use std::time::{Duration, Instant};
 
-/// A phase, and its processor time.
+/// A phase and its CPU time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Phase {
-    /// Which.
+    /// Name of the phase.
     pub name: &'static str,
-    /// Processor time (user and system), summed over threads.
+    /// CPU time (user and system), summed over threads.
     pub time: Duration,
 }
 
-/// Where the time of workers goes, by the clock.
+/// Wall-clock times of workers, by stage.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct WorkerTimes {
-    /// Making camera samples.
+    /// Generation of camera samples.
     pub(super) camera_samples: Duration,
-    /// Tracing them.
+    /// Tracing.
     pub(super) tracing: Duration,
     /// Sums of pixels.
     pub(super) film: Duration,
-    /// All of it.
+    /// Total wall-clock time of tiles.
     all: Duration,
-    /// Processor time of that.
+    /// CPU time of the same tiles.
     processor: Duration,
-    /// Processor time for the noise of the image so far.
+    /// CPU time for the noise of the image so far.
     pub(super) noise: Duration,
 }
 
 impl WorkerTimes {
-    /// Times some work.
+    /// Runs `work` and measures its time.
     pub(super) fn of<R>(work: impl FnOnce() -> R) -> (R, Self) {
-        // Threads wait where the system is called, which must not be between the readings of the clock
+        // CPU times are read by system calls, in which a thread may wait: outside the wall-clock interval
         let processor = processor_time::of_thread();
         let start = Instant::now();
         let result = work();
@@ -45,7 +45,7 @@ impl WorkerTimes {
         (result, WorkerTimes { all, processor, ..WorkerTimes::default() })
     }
 
-    /// Adds other times.
+    /// Adds the times of another worker.
     pub(super) fn merge(&mut self, other: &WorkerTimes) {
         self.camera_samples += other.camera_samples;
         self.tracing += other.tracing;
@@ -55,7 +55,7 @@ impl WorkerTimes {
         self.noise += other.noise;
     }
 
-    /// The phases of workers with these statistics. What tracing takes beside its stages is the time of `paths`.
+    /// The phases of workers with these statistics. Tracing time outside the stages counts as `paths`.
     pub(super) fn phases(&self, stats: &PathStats) -> Vec<Phase> {
         let paths = stats.beside_stages(self.tracing);
         let others = [("paths", paths), ("camera_samples", self.camera_samples), ("film", self.film)];

@@ -1,4 +1,4 @@
-//! A rendering under way: passes over all tiles, which pause for checkpoints.
+//! A rendering in progress: passes over all tiles, interrupted by checkpoints.
 
 use super::cell_progress::CellProgress;
 use super::control_variates;
@@ -29,49 +29,49 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
-/// Time between two determinations of the noise for those who observe the progress: it takes as long as a few samples
+/// Minimum time between two computations of the noise for observers of the progress. One takes as long as a few samples
 /// per pixel.
 const NOISE_INTERVAL: Duration = Duration::from_secs(1);
-/// The same by the time that one of them takes.
+/// Minimum time between two computations of the noise, as a multiple of the time that one takes.
 const NOISE_REST: u32 = 50;
 
-/// Camera samples of a tile in the longest pass: 16 per pixel of a usual one. To read and write the sums of a pixel takes
-/// as long as to add several samples.
+/// Maximum camera samples of a tile in a pass. Reading and writing the sums of a pixel takes as long as adding several
+/// samples, so short passes are inefficient.
 const TILE_SAMPLES: u32 = 1 << 14;
 
-// All samples of a turn in a cell are in one batch
+// All samples of a cell with the same share index are in one batch
 const _: () = assert!(BATCH_PATHS >= cells::CELL.pow(2) as usize && BATCH_PATHS >= REPLICA_CELL.pow(2) as usize);
 
-/// Combined with the seed of the image to give that of replicas.
+/// Combined with the seed of the image to give the seed of replicas.
 const REPLICA_SEED: u32 = 0x72_65_70_73;
 
 /// A pass over all tiles.
 pub(super) struct Pass<'a> {
     pub(super) samples: Range<u32>,
-    /// What those who observe it are told of the noise.
+    /// The noise that observers of the progress receive.
     pub(super) noise: Option<f64>,
     pub(super) watch: Option<&'a TileObserver<'a>>,
-    /// Nothing is begun after that.
+    /// No tile starts after this time, when a checkpoint is due.
     pause: Option<Instant>,
 }
 
 impl Pass<'_> {
-    /// True if it pauses.
+    /// True if the pass has to pause.
     pub(super) fn is_over(&self) -> bool {
         self.pause.is_some_and(|pause| Instant::now() >= pause)
     }
 }
 
-/// A rendering under way.
+/// A rendering in progress.
 pub(super) struct Run<'a> {
     pub(super) job: &'a RenderJob,
     settings: &'a RenderSettings,
-    /// Passes are of cells, not of tiles.
+    /// True if pixels share paths. The unit of a pass is then a cell instead of a tile.
     pub(super) shares_paths: bool,
-    /// Edge of tiles: where pixels share paths, that of the cells that are estimated twice.
+    /// Edge of tiles (pixels). Where pixels share paths, the edge of the cells that are estimated twice.
     pub(super) tile_size: u32,
     stop: &'a AtomicBool,
-    /// Where texels are that did not fit into memory.
+    /// Texels that did not fit into memory.
     texels: Option<&'a TileStore>,
     observe: &'a (dyn Fn(&Progress) + Sync),
     pub(super) camera: CameraSampler<'a>,
@@ -93,6 +93,7 @@ impl<'a> Run<'a> {
             job,
             settings,
             shares_paths,
+            // Replicas share paths within a tile
             tile_size: if shares_paths { REPLICA_CELL } else { settings.tile_size },
             stop,
             texels: job.world.scene.textures.store(),
@@ -106,6 +107,7 @@ impl<'a> Run<'a> {
     }
 
     pub(super) fn run(self, threads: usize, continuation: Continuation<'_>) -> Result<Rendering, RenderError> {
+        // Prepare the integrator and the tiles
         let Continuation { stored, cells, mut checkpoints, keeps_sums, tells_noise, watch, passes } = continuation;
         let tells_noise = tells_noise || watch.is_some() || passes.is_some();
         let seed = self.job.settings().sampling.seed;
@@ -117,6 +119,8 @@ impl<'a> Run<'a> {
         let begin = tiles.tiles.iter().map(|t| t.done).min().unwrap_or(end);
         let (mut first, mut noise, mut observed) = (begin, None, self.start + NOISE_INTERVAL);
         let (mut stats, mut times) = (PathStats::default(), WorkerTimes::default());
+
+        // Trace passes. The integrator prepares for several of them at once
         while first < end && !self.stopped(first - begin) {
             let served = end.min(first.saturating_add(integrator.prepare(first)?));
             let workers = Workers::new(&*integrator, self.features(), light_layers::count(self.job));
@@ -130,6 +134,8 @@ impl<'a> Run<'a> {
                 if let (Some(passes), false) = (passes, self.stop.load(Ordering::Relaxed)) {
                     passes(&self.progress(self.samples_total(&tiles.tiles), noise));
                 }
+
+                // Compute the noise at intervals
                 let now = Instant::now();
                 if tells_noise && now >= observed && first < end && !self.is_late() {
                     let processor = processor_time::of_process();
@@ -141,10 +147,12 @@ impl<'a> Run<'a> {
             times.merge(&workers.times());
         }
 
-        // Some samples are wrong: they are neither shown nor stored
+        // With lost texels, some samples are wrong: they are neither shown nor stored
         if let Some(failure) = self.failure() {
             return Err(RenderError::Texels(failure.to_owned()));
         }
+
+        // Finish the film and the last checkpoint
         let complete = tiles.tiles.iter().all(|t| t.done >= end);
         let keeps_sums = keeps_sums || checkpoints.is_some();
         let phases = times.phases(&stats);
@@ -160,12 +168,12 @@ impl<'a> Run<'a> {
         Ok(Rendering { film, stats, cache, photons, light, elapsed, phases, complete, threads, sums })
     }
 
-    /// Camera samples of all tiles, as if every pixel had the same number.
+    /// Camera samples requested for all tiles, as if every pixel had the same number.
     pub(super) fn samples_total(&self, tiles: &[Tile]) -> u64 {
         tiles.iter().map(|t| t.bounds.area() as u64).sum::<u64>() * u64::from(self.end() - self.begin())
     }
 
-    /// What is done by now.
+    /// The progress so far.
     fn progress(&self, samples_total: u64, noise: Option<f64>) -> Progress {
         Progress {
             samples_done: self.samples_done.load(Ordering::Relaxed),
@@ -177,13 +185,14 @@ impl<'a> Run<'a> {
         }
     }
 
-    /// The index of the sample after the last one.
+    /// Index after the last sample.
     pub(super) fn end(&self) -> u32 {
         self.settings.first_sample + self.settings.spp
     }
 
-    /// The tiles, with what is stored of them.
+    /// The tiles, with their stored sums if there are any.
     fn tiles(&self, stored: Option<Vec<StoredTile>>, cells: CellProgress) -> Result<Tiles, PartError> {
+        // Restore stored tiles, or begin with empty ones
         let replicas = replica_choice(self.job, self.settings);
         let bounds = self.job.world.scene.film.bounds;
         let tiles = match stored {
@@ -193,18 +202,20 @@ impl<'a> Run<'a> {
                 Ok(bounds.into_iter().map(|b| self.tile(b, replicas)).collect::<Vec<_>>())
             }
         }?;
+
+        // Count the samples that are done already
         let done = |t: &Tile| t.bounds.area() as u64 * u64::from(t.done - self.begin());
         self.samples_done.store(tiles.iter().map(done).sum(), Ordering::Relaxed);
         let tiles = Tiles { tiles, cells };
         if self.has_cells(&tiles) { Ok(tiles) } else { Err(PartError::Sums("their cells are not the same")) }
     }
 
-    /// The index of the first sample that is not left to others.
+    /// Index of the first sample, after the skipped ones.
     fn begin(&self) -> u32 {
         self.settings.first_sample + self.settings.skip.min(self.settings.spp)
     }
 
-    /// A pass, which pauses where a checkpoint is due.
+    /// Renders a pass. Pauses it when a checkpoint is due.
     fn whole_pass(
         &self,
         workers: &Workers<'_>,
@@ -214,12 +225,15 @@ impl<'a> Run<'a> {
     ) -> PathStats {
         let mut stats = PathStats::default();
         loop {
+            // Trace until the pass is done or the next checkpoint is due
             pass.pause = checkpoints.as_ref().map(|c| c.due());
             stats.merge(&if self.shares_paths {
                 self.pass_of_cells(workers, tiles, &pass)
             } else {
                 self.pass(workers, &mut tiles.tiles, &pass)
             });
+
+            // Store the checkpoint
             match checkpoints {
                 Some(checkpoints) if checkpoints.due() <= Instant::now() && self.failure().is_none() => {
                     checkpoints.store(tiles);
@@ -232,7 +246,7 @@ impl<'a> Run<'a> {
         }
     }
 
-    /// The features that are asked for, or that tell which pixels are alike where they are fitted to others.
+    /// The features of the film. Fits over pixels need normals and materials even if no feature is requested.
     fn features(&self) -> FeatureSet {
         let is_over_pixels = Estimator::at_vertex(&self.job.settings().integrator, 0).is_over_pixels();
         match (self.settings.with_features, is_over_pixels) {
@@ -264,8 +278,9 @@ impl<'a> Run<'a> {
         Film::new(self.job.world.scene.film.resolution, tile.bounds, vec![pixels], Vec::new())
     }
 
-    /// Samples per pixel of the next pass over all tiles: 1, 1, 2, 4, …, so that there is a whole image soon. It lies
-    /// within a block of what is fitted in blocks. `done` samples per pixel are rendered, `now` of them by this run.
+    /// Samples per pixel of the next pass over all tiles: 1, 1, 2, 4, …, so that a whole image is available soon.
+    /// Progressive estimators fit in blocks of samples; a pass does not exceed the block. `done` samples per pixel are
+    /// rendered, `now` of them by this run.
     fn next_pass(&self, done: u32, now: u32) -> u32 {
         let longest = done.clamp(1, self.pass_length());
         let length = self.in_time(now, longest).unwrap_or(longest);
@@ -281,51 +296,58 @@ impl<'a> Run<'a> {
         (TILE_SAMPLES / self.tile_size.max(1).pow(2)).clamp(1, 64)
     }
 
-    /// Samples per pixel of the next pass, at most `longest`, as the time limit has it; `done` are those of this run.
+    /// Samples per pixel of the next pass within the time limit, at most `longest`. `done` samples per pixel were
+    /// rendered by this run.
     fn in_time(&self, done: u32, longest: u32) -> Option<u32> {
         let limit = self.settings.time_limit.filter(|_| done > 0)?;
         Some(pass_in_time(done, self.start.elapsed(), limit, longest))
     }
 
-    /// True if no pass is to be begun any more, after `done` samples per pixel of this run.
+    /// True if no further pass starts, after `done` samples per pixel of this run.
     fn stopped(&self, done: u32) -> bool {
         self.in_time(done, 1) == Some(0) || self.stops_at_once()
     }
 
-    /// True once the time is over.
+    /// True if the time limit is reached.
     fn is_late(&self) -> bool {
         self.settings.time_limit.is_some_and(|limit| self.start.elapsed() >= limit)
     }
 
-    /// True if pixels with this next sample get none any more for want of time; their first one is granted a little more.
+    /// True if pixels whose next sample has the index `next` get no further samples because the time is over. For their
+    /// first sample there is a grace period.
     pub(super) fn leaves(&self, next: u32) -> bool {
         let is_over = |limit| self.start.elapsed() >= of_first_samples(limit);
         self.is_late() && (next > self.begin() || self.settings.time_limit.is_some_and(is_over))
     }
 
-    /// True if no tile is to be begun any more.
+    /// True if no further tile starts.
     pub(super) fn stops_at_once(&self) -> bool {
         self.stop.load(Ordering::Relaxed) || self.failure().is_some()
     }
 
-    /// Why some samples are wrong.
+    /// Reason why some samples are wrong, if any are.
     fn failure(&self) -> Option<&str> {
         self.texels.and_then(TileStore::failure)
     }
 
-    /// Adds the samples of a pass to every tile, as far as it does not have them.
+    /// Adds the samples of a pass to every tile that does not have them yet.
     fn pass(&self, workers: &Workers<'_>, tiles: &mut [Tile], pass: &Pass<'_>) -> PathStats {
         let total = self.samples_total(tiles);
         tiles
             .par_iter_mut()
             .with_max_len(1)
             .map(|tile| {
+                // Skip the samples that the tile has
                 let samples = tile.done.max(pass.samples.start)..pass.samples.end;
                 if samples.is_empty() || pass.is_over() || self.stops_at_once() || self.leaves(tile.done) {
                     return PathStats::default();
                 }
+
+                // Trace the rest
                 let stats = workers.with_one(|worker| self.render_tile(worker, tile, samples.clone()));
                 tile.done = samples.end;
+
+                // Notify observers
                 if let Some(watch) = pass.watch {
                     watch(&self.film_of(tile));
                 }
@@ -339,7 +361,7 @@ impl<'a> Run<'a> {
             })
     }
 
-    /// Counts samples that are done, and tells those who observe it.
+    /// Counts finished samples, and notifies observers of the progress.
     pub(super) fn note(&self, stats: &PathStats, samples: u64, (total, noise): (u64, Option<f64>)) {
         let rays = stats.camera_rays + stats.bounce_rays + stats.direct.emitter_rays + stats.direct.segments;
         self.samples_done.fetch_add(samples, Ordering::Relaxed);
@@ -347,10 +369,12 @@ impl<'a> Run<'a> {
         (self.observe)(&self.progress(total, noise));
     }
 
-    /// Adds the samples of a range to one tile.
+    /// Adds a range of samples to one tile.
     fn render_tile(&self, worker: &mut AnyWorker<'_>, tile: &mut Tile, samples: Range<u32>) -> PathStats {
         let mut ill_conditioned = 0;
         let done = samples.start - self.settings.first_sample;
+
+        // Solve for the coefficients at the beginning of a block
         let start = Instant::now();
         let is_progressive = Estimator::at_vertex(&self.job.settings().integrator, 0).is_progressive();
         let begins_block = is_progressive && done > 0 && block_of(done).first == done;
@@ -358,11 +382,15 @@ impl<'a> Run<'a> {
             ill_conditioned = tile.fits.solve();
         }
         let solve = start.elapsed();
+
+        // Trace the pixels and the replicas
         worker.read(tile);
         self.trace_pixels_of(worker, &mut tile.fits, &tile.bounds, &samples);
         worker.write(tile);
         self.render_replicas(worker, (&tile.bounds, &mut tile.replicas, &mut tile.fits), &samples);
         tile.fits.pack(&mut worker.packing);
+
+        // Add the time and the number of systems to the statistics
         let mut stats = worker.take_stats();
         if begins_block {
             let direct = &mut stats.direct;
@@ -374,7 +402,8 @@ impl<'a> Run<'a> {
         stats
     }
 
-    /// Adds the samples of a pass to the sums of all pixels of some bounds, in batches of whole pixels or turns.
+    /// Adds the samples of a pass to the sums of all pixels within `bounds`, in batches: whole pixels, or whole share
+    /// indices where pixels share paths.
     pub(super) fn trace_pixels_of(
         &self,
         worker: &mut AnyWorker<'_>,
@@ -395,7 +424,7 @@ impl<'a> Run<'a> {
         }
     }
 
-    /// Batches of the samples of some pixels in a pass: parts of the pixels, or where these share paths, parts of the pass.
+    /// Splits a pass over some pixels into batches: ranges of pixels, or ranges of the pass where pixels share paths.
     fn batches(
         &self,
         pixels: usize,
@@ -411,13 +440,14 @@ impl<'a> Run<'a> {
         parts.into_iter().map(|part| (part.start as usize..part.end as usize, pass.clone())).collect()
     }
 
-    /// Adds the samples of a pass to the replicas of a tile, given with its bounds and fits.
+    /// Adds the samples of a pass to the replicas of a tile. The tile is given by its bounds, replicas and fits.
     pub(super) fn render_replicas(
         &self,
         worker: &mut AnyWorker<'_>,
         (bounds, all, fits): (&PixelBounds, &mut [ReplicaAccumulator], &mut Fits),
         pass: &Range<u32>,
     ) {
+        // Replicas have random numbers of their own
         let seed = pcg4d([self.job.settings().sampling.seed, REPLICA_SEED, 0, 0])[0];
         let pixels: Vec<[u32; 2]> = all.iter().map(|r| position(bounds, r.pixel)).collect();
         if pixels.is_empty() {
@@ -426,12 +456,15 @@ impl<'a> Run<'a> {
         let fit = |replica: usize| (bounds.area() + replica) as u32;
         for (replicas, pass) in self.batches(pixels.len(), |i| pixels[i], pass) {
             let samples_of = |i: usize| self.samples_of(pixels[i], &pass);
+            // Draw the camera samples
             let start = Instant::now();
             worker.samples.clear();
             let of_fits = replicas.clone().map(|i| (fit(i), pixels[i], samples_of(i)));
             self.camera.samples(of_fits, seed, &mut worker.scratch, &mut worker.samples);
             worker.samples.iter_mut().for_each(|sample| sample.is_replica = true);
             worker.times.camera_samples += start.elapsed();
+
+            // Trace them and add the results
             let of_pixels = replicas.clone().map(|i| (pixels[i], samples_of(i)));
             worker.trace((self.job, &self.camera), fits, (of_pixels, seed));
             let mut results = worker.results.iter();
@@ -441,7 +474,7 @@ impl<'a> Run<'a> {
         }
     }
 
-    /// The camera samples of some pixels of a tile, which are counted row by row, in a pass.
+    /// Camera samples of some pixels of a tile in a pass. Pixels are numbered row by row.
     pub(super) fn camera_samples(
         &self,
         tile: &PixelBounds,
@@ -458,7 +491,7 @@ impl<'a> Run<'a> {
         self.camera.samples(pixels, self.job.settings().sampling.seed, scratch, out);
     }
 
-    /// The samples that a pass has of a pixel.
+    /// Indices of the samples of a pixel in a pass. With adaptive sampling their number differs between pixels.
     #[inline]
     fn samples_of(&self, pixel: [u32; 2], pass: &Range<u32>) -> Range<u32> {
         let Some(of_pixels) = &self.job.pixel_samples else { return pass.clone() };
@@ -468,7 +501,7 @@ impl<'a> Run<'a> {
     }
 }
 
-/// Adds the records of a cache, given by their pixels, to the sums of these.
+/// Adds the records of a cache, given by their pixels, to the sums of the tiles.
 fn add_records(records: &[[u32; 2]], tiles: &mut [Tile]) {
     let mut of_rows = BTreeMap::<u32, Vec<u32>>::new();
     records.iter().for_each(|&[x, y]| of_rows.entry(y).or_default().push(x));
@@ -510,10 +543,12 @@ Shape "bilinearmesh" "point3 P" [ -9 -9 0  9 -9 0  -9 9 0  9 9 0 ]
 
     #[test]
     fn what_is_rendered_with_lost_texels_is_neither_an_image_nor_a_checkpoint() {
+        // A texture that exceeds the memory limit
         let folder = tempfile::tempdir().unwrap();
         let names = ["R", "G", "B"].map(str::to_owned).to_vec();
         write_image(&folder.path().join("t.png"), &[Part::display(200, 200, names, vec![0.5; 120_000])]).unwrap();
         for is_lost in [false, true] {
+            // Render with all texels, then with some lost
             let files = FileCache::default();
             files.limit_textures(1000);
             let loaded = load_text(FLOOR, "floor", folder.path(), &LoadOptions::default(), &files).unwrap();
@@ -521,6 +556,8 @@ Shape "bilinearmesh" "point3 P" [ -9 -9 0  9 -9 0  -9 9 0  9 9 0 ]
             if is_lost {
                 job.world.scene.textures.store().unwrap().lose(0);
             }
+
+            // There is an image and a checkpoint only if no texel was lost
             let settings = RenderSettings { spp: 16, ..RenderSettings::default() };
             let (path, header) =
                 (folder.path().join("c.film"), FilmHeader::new(&job, &settings, 16, 0, [Vec::new(), Vec::new()]));

@@ -1,9 +1,9 @@
 //! Passes over images whose pixels share paths.
 //!
-//! The unit of work is a cell of some turns ([`cells`]), whose pixels are traced together; then their sums are added to those of
-//! the tiles that it touches. The sums are exact, so the order does not matter. Pixels that are estimated twice share in cells of
-//! their own, which are tiles. Which units are done is kept until all pixels have the samples of the pass
-//! ([`super::cell_progress`]).
+//! The unit of work is a cell with some share indices ([`cells`], [`super::cell_progress`]). Its pixels are traced
+//! together; their sums are then added to the tiles that overlap the cell. The sums are exact, so the order does not
+//! matter. Replicas share paths in cells of their own, which are the tiles. Finished units are recorded until all
+//! pixels have the samples of the pass.
 
 use super::run::{Pass, Run};
 use super::tiles::{Tile, Tiles};
@@ -18,30 +18,30 @@ use rayon::prelude::*;
 use std::ops::Range;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-/// What is traced together.
+/// A unit of work.
 struct Unit {
     of: Of,
     turns: Range<u32>,
     is_done: bool,
 }
 
-/// Which pixels of a unit.
+/// Pixels of a unit.
 #[derive(Clone, Copy)]
 enum Of {
-    /// The cell of this index, of `count`, in the turns of a group.
+    /// A cell, by its index among the `count` cells of a group of share indices.
     Cell { bounds: PixelBounds, group: u32, index: usize, count: usize },
-    /// The second estimates of the tile of this index.
+    /// The replicas of the tile with this index.
     Replicas(usize),
 }
 
-/// Tiles that threads add samples to.
+/// Tiles that several threads add samples to.
 struct SharedTiles<'a> {
     image: PixelBounds,
     tiles: Vec<Mutex<&'a mut Tile>>,
 }
 
 impl<'a> SharedTiles<'a> {
-    /// The tiles that have pixels of some bounds.
+    /// The tiles that overlap `bounds`.
     fn touched(&self, bounds: &PixelBounds) -> impl Iterator<Item = MutexGuard<'_, &'a mut Tile>> {
         let columns = self.image.width().div_ceil(REPLICA_CELL);
         let range =
@@ -57,7 +57,7 @@ impl<'a> SharedTiles<'a> {
 }
 
 impl Run<'_> {
-    /// True if tiles, and how far their cells are, can be gone on from.
+    /// True if the tiles and the progress of their cells fit this rendering, so that it can resume from them.
     pub(super) fn has_cells(&self, Tiles { tiles, cells: progress }: &Tiles) -> bool {
         if !self.shares_paths {
             return progress.is_empty();
@@ -70,12 +70,15 @@ impl Run<'_> {
         are_alike && progress.fits(count, tiles.len()) && progress.end().is_none_or(|end| end <= self.end())
     }
 
-    /// Adds the samples of a pass to all tiles, as far as these do not have them.
+    /// Adds the samples of a pass to all tiles that do not have them yet.
     pub(super) fn pass_of_cells(&self, workers: &Workers<'_>, tiles: &mut Tiles, pass: &Pass<'_>) -> PathStats {
+        // Units, and tiles behind locks
         let total = self.samples_total(&tiles.tiles);
         let mut units = self.units(tiles, &pass.samples);
         let image = self.job.world.scene.film.bounds;
         let shared = SharedTiles { image, tiles: tiles.tiles.iter_mut().map(Mutex::new).collect() };
+
+        // Trace one unit
         let of_unit = |unit: &mut Unit| {
             if pass.is_over() || self.stops_at_once() || self.leaves(unit.turns.start) {
                 return PathStats::default();
@@ -92,11 +95,15 @@ impl Run<'_> {
                 }
                 worker.take_stats()
             });
+
+            // Record it, and notify observers
             unit.is_done = true;
             let pixels = if let Of::Cell { bounds, .. } = unit.of { bounds.area() } else { 0 };
             self.note(&stats, pixels as u64 * unit.turns.len() as u64, (total, pass.noise));
             stats
         };
+
+        // Trace all units
         let stats = units.par_iter_mut().with_max_len(1).map(of_unit).reduce(PathStats::default, |mut a, b| {
             a.merge(&b);
             a
@@ -105,8 +112,9 @@ impl Run<'_> {
         stats
     }
 
-    /// The units of a pass that are not done.
+    /// The unfinished units of a pass.
     fn units(&self, Tiles { tiles, cells: progress }: &Tiles, samples: &Range<u32>) -> Vec<Unit> {
+        // Cells of each group of share indices
         let unit = |of: Of, next: u32, end: u32| {
             let turns = next.max(samples.start)..end.min(samples.end);
             (!turns.is_empty()).then_some(Unit { of, turns, is_done: false })
@@ -121,12 +129,14 @@ impl Run<'_> {
             })
         };
         let of_cells = (samples.start / TURNS..=(samples.end - 1) / TURNS).flat_map(of_group);
+
+        // Tiles with replicas
         let twice = tiles.iter().enumerate().filter(|(_, tile)| !tile.replicas.is_empty());
         let of_replicas = twice.filter_map(|(i, _)| unit(Of::Replicas(i), progress.of_replicas(i), samples.end));
         of_cells.chain(of_replicas).collect()
     }
 
-    /// Traces a cell, and adds its samples to the tiles that have its pixels, which are passed on.
+    /// Traces a cell and adds its samples to the overlapping tiles. `seen` receives their films.
     fn render_cell(
         &self,
         worker: &mut AnyWorker<'_>,
@@ -146,21 +156,26 @@ impl Run<'_> {
         }
     }
 
-    /// Traces the second estimates of a tile.
+    /// Traces the replicas of a tile.
     fn render_replicas_of(
         &self,
         worker: &mut AnyWorker<'_>,
         tiles: &SharedTiles<'_>,
         (tile, turns): (usize, &Range<u32>),
     ) {
+        // Start empty sums for the same replicas
         let shared = &tiles.tiles[tile];
         let (bounds, mut replicas) = {
             let tile = tiles.tile(tile);
             let none = |r: &ReplicaAccumulator| ReplicaAccumulator { pixel: r.pixel, ..ReplicaAccumulator::default() };
             (tile.bounds, tile.replicas.iter().map(none).collect::<Vec<_>>())
         };
+
+        // Trace without a lock
         let mut fits = self.fits(bounds.area() + replicas.len());
         self.render_replicas(worker, (&bounds, &mut replicas, &mut fits), turns);
+
+        // Merge
         let mut tile = shared.lock().unwrap_or_else(PoisonError::into_inner);
         tile.replicas.iter_mut().zip(&replicas).for_each(|(sum, more)| sum.merge(more));
         let sums = fits.exact_sums();
@@ -180,7 +195,7 @@ impl Run<'_> {
     }
 }
 
-/// Adds the sums of the control variates of a cell to those of a tile.
+/// Adds the control-variate sums of a cell to a tile.
 fn merge_controls(tile: &mut Tile, cell: &PixelBounds, controls: &[FixedSum]) {
     let row = controls.len() / cell.area();
     if row == 0 {
@@ -194,7 +209,7 @@ fn merge_controls(tile: &mut Tile, cell: &PixelBounds, controls: &[FixedSum]) {
     }
 }
 
-/// Notes which units of a pass that ends at `end` are done.
+/// Records the finished units of a pass. `end` is the end of the pass.
 fn note_units(Tiles { tiles, cells: progress }: &mut Tiles, units: &[Unit], end: u32) {
     for unit in units.iter().filter(|unit| unit.is_done) {
         match unit.of {

@@ -1,4 +1,4 @@
-//! Tiles: the pixels that are rendered together, with their exact sums; and which of them a part of an image has.
+//! Tiles: pixels that are rendered together, with their exact sums, and the assignment of tiles to parts of an image.
 
 use super::cell_progress::CellProgress;
 use super::{BATCH_PATHS, RenderSettings};
@@ -14,26 +14,26 @@ use crate::settings::IntegratorKind;
 use std::ops::Range;
 use std::sync::Arc;
 
-/// Edge of the tiles that are dealt out to parts (pixels).
+/// Edge of the tiles that are dealt to parts (pixels).
 pub(super) const SHARE_TILE: u32 = 16;
 
-/// The pixels of one of several parts: tiles that are dealt out in turn, row by row, so that every part has some of all
+/// The pixels of one of several parts. Tiles are dealt round-robin, row by row, so that every part gets some of all
 /// regions.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct TileShare {
-    /// Which part, from 0.
+    /// Index of the part, from 0.
     pub index: u32,
     /// Number of parts.
     pub count: u32,
 }
 
 impl TileShare {
-    /// True if it has the tile of this index.
+    /// True if the part has the tile with this index.
     pub fn has(&self, tile: usize) -> bool {
         tile % self.count.max(1) as usize == self.index as usize
     }
 
-    /// Its tiles.
+    /// The tiles of the part.
     pub fn tiles(&self, image: &PixelBounds) -> impl Iterator<Item = PixelBounds> + use<> {
         let share = *self;
         image.tiles(SHARE_TILE).into_iter().enumerate().filter(move |(i, _)| share.has(*i)).map(|(_, tile)| tile)
@@ -46,29 +46,29 @@ pub(super) struct Tile {
     pub(super) bounds: PixelBounds,
     /// Index of the next sample of its pixels.
     pub(super) done: u32,
-    /// Sums of its pixels, row by row; films share them.
+    /// Sums of its pixels, row by row, shared with films.
     pub(super) sums: Arc<PackedSums>,
-    /// The same of the layers by lights.
+    /// Sums of the light-group layers.
     pub(super) layers: Vec<Arc<PackedSums>>,
     pub(super) replicas: Vec<ReplicaAccumulator>,
-    /// Those of its pixels one after the other, then those of its replicas.
+    /// Fits of its pixels, row by row, then of its replicas.
     pub(super) fits: Fits,
 }
 
 impl Tile {
-    /// Replaces the sums of its pixels; `scratch` is memory that calls share.
+    /// Replaces the sums of the pixels. `scratch` is a buffer.
     pub(super) fn set_sums(&mut self, sums: &[PixelAccumulator], scratch: &mut Vec<u8>) {
         set(&mut self.sums, sums, scratch);
     }
 
-    /// The same of a layer by lights.
+    /// Replaces the sums of a light-group layer.
     pub(super) fn set_layer(&mut self, layer: usize, sums: &[PixelAccumulator], scratch: &mut Vec<u8>) {
         set(&mut self.layers[layer], sums, scratch);
     }
 }
 
 fn set(packed: &mut Arc<PackedSums>, sums: &[PixelAccumulator], scratch: &mut Vec<u8>) {
-    // Those that a film has are left to it
+    // Sums that a film shares stay unchanged
     if Arc::get_mut(packed).is_none() {
         *packed = Arc::new(PackedSums::new(sums.len()));
     }
@@ -77,7 +77,7 @@ fn set(packed: &mut Arc<PackedSums>, sums: &[PixelAccumulator], scratch: &mut Ve
     }
 }
 
-/// Layers of a tile without samples.
+/// Light-group layers of a tile without samples.
 pub(super) fn empty_layers(count: usize, pixels: usize) -> Vec<Arc<PackedSums>> {
     (0..count).map(|_| Arc::new(PackedSums::new(pixels))).collect()
 }
@@ -86,11 +86,11 @@ pub(super) fn empty_layers(count: usize, pixels: usize) -> Vec<Arc<PackedSums>> 
 #[derive(Debug)]
 pub struct Tiles {
     pub(super) tiles: Vec<Tile>,
-    /// Samples that they have beyond those that all of their pixels have.
+    /// Samples of cells and replicas beyond the common sample count of the tiles.
     pub(super) cells: CellProgress,
 }
 
-/// Tiles of at most the given size that cover the image, or the share of it.
+/// Tiles of at most `size` pixels per edge that cover the image, or one share of it.
 pub(super) fn bounds_of_tiles(image: &PixelBounds, size: u32, share: Option<TileShare>) -> Vec<PixelBounds> {
     match share {
         None => image.tiles(size),
@@ -98,29 +98,33 @@ pub(super) fn bounds_of_tiles(image: &PixelBounds, size: u32, share: Option<Tile
     }
 }
 
-/// The pixels that are estimated twice; `None` if none are: that is not requested, or does not tell anything. Samples that share
-/// photon maps vary together. Where pixels share paths, whole cells are estimated twice, in which they share as many.
+/// The pixels that are estimated twice. `None` if they are not requested or would not be informative: samples that
+/// share photon maps are correlated. Where pixels share paths, whole cells are estimated twice.
 pub(super) fn replica_choice(job: &RenderJob, render: &RenderSettings) -> Option<ReplicaChoice> {
     let settings = job.settings();
     let shares_noise =
         settings.integrator.kind == IntegratorKind::PhotonMap && settings.integrator.photons.progressive.is_some();
     let is_over_pixels = Estimator::at_vertex(&settings.integrator, 0).is_over_pixels();
-    // Pixels with more samples than there are sets of light paths use some of these more than once
+    // Pixels with more samples than there are sets of light paths use some sets more than once
     let shares_light = job.pixel_samples.is_some() && light_paths::per_sample(job) > 0.0;
     let is_useful = !settings.sampling.sampler.has_independent_samples() || is_over_pixels || shares_light;
     let edge = if reuse::edge(job) > 1 { REPLICA_CELL } else { 1 };
     (render.with_replicas && is_useful && !shares_noise).then_some(ReplicaChoice { edge, seed: settings.sampling.seed })
 }
 
-/// The film of tiles, which shares their sums; `layers` are the names of those by lights.
+/// The film of some tiles, which shares their sums. `layers` are the names of the light-group layers.
 pub(super) fn film(resolution: [u32; 2], bounds: PixelBounds, tiles: &[Tile], layers: &[String]) -> Film {
     let width = bounds.width();
     let index = |tile: &Tile, pixel: u32| {
         let [x, y] = position(&tile.bounds, pixel);
         (y - bounds.y0) * width + (x - bounds.x0)
     };
+
+    // Replicas, with their pixel indices in the film
     let replicas = tiles.iter().flat_map(|t| t.replicas.iter().map(move |r| r.replica(index(t, r.pixel))));
     let replicas = replicas.collect();
+
+    // A film for each light-group layer
     let of_layer = |i: usize| {
         let tiles = tiles.iter().map(|t| FilmTile { bounds: t.bounds, sums: Arc::clone(&t.layers[i]) });
         Film::new(resolution, bounds, tiles.collect(), Vec::new())
@@ -130,12 +134,12 @@ pub(super) fn film(resolution: [u32; 2], bounds: PixelBounds, tiles: &[Tile], la
     Film::new(resolution, bounds, tiles.collect(), replicas).with_light_layers(layers)
 }
 
-/// Coordinates of the pixel of a tile with the given index, row by row.
+/// Coordinates of the pixel with the given index in a tile, row by row.
 pub(super) fn position(tile: &PixelBounds, index: u32) -> [u32; 2] {
     [tile.x0 + index % tile.width(), tile.y0 + index / tile.width()]
 }
 
-/// Parts of a range of at most [`BATCH_PATHS`] paths each, or of one element.
+/// Splits a range into parts of at most [`BATCH_PATHS`] paths each. A part has at least one element.
 pub(super) fn batches(range: Range<u32>, paths_of: impl Fn(u32) -> usize) -> Vec<Range<u32>> {
     let mut parts: Vec<Range<u32>> = Vec::new();
     let mut paths = 0;

@@ -1,4 +1,4 @@
-//! What the threads of a rendering hold: a tracer each, with the memory of a batch.
+//! Tracers and buffers of the threads of a rendering.
 
 use super::looks::Looks;
 use super::phases::WorkerTimes;
@@ -20,13 +20,13 @@ pub(super) struct Worker<T> {
     pub(super) samples: Vec<CameraSample>,
     pub(super) scratch: Scratch,
     pub(super) results: Vec<PixelSample>,
-    /// The sums of the pixels that are traced, while samples are added to them.
+    /// Sums of the traced pixels, while samples are added to them.
     pub(super) sums: Vec<PixelAccumulator>,
-    /// Those of a tile that they are added to, where a tile is not what is traced together.
+    /// Sums of a tile that receives the sums of a cell, where cells are traced instead of tiles.
     of_tile: Vec<PixelAccumulator>,
-    /// The same of the layers by lights.
+    /// Sums of the light-group layers.
     layers: Vec<Vec<PixelAccumulator>>,
-    /// Memory to pack them.
+    /// Buffer for packing sums.
     pub(super) packing: Vec<u8>,
     looks: Looks,
     pub(super) times: WorkerTimes,
@@ -40,7 +40,7 @@ impl<T> Worker<T> {
 }
 
 impl AnyWorker<'_> {
-    /// Takes the sums of a tile.
+    /// Reads the sums of a tile.
     pub(super) fn read(&mut self, tile: &Tile) {
         let start = Instant::now();
         let area = tile.bounds.area();
@@ -53,13 +53,13 @@ impl AnyWorker<'_> {
         self.times.film += start.elapsed();
     }
 
-    /// Begins sums of so many pixels, without layers, that [`Self::add_to`] adds to tiles.
+    /// Starts empty sums of `pixels` pixels, without layers. [`Self::add_to`] adds them to tiles.
     pub(super) fn begin(&mut self, pixels: usize) {
         self.sums.clear();
         self.sums.resize(pixels, PixelAccumulator::default());
     }
 
-    /// Adds the sums of the pixels of `bounds` to those of a tile, as far as it has them.
+    /// Adds the sums of the pixels within `bounds` to a tile, where they overlap.
     pub(super) fn add_to(&mut self, tile: &mut Tile, bounds: &PixelBounds) {
         let start = Instant::now();
         let Worker { sums, of_tile, packing, .. } = self;
@@ -72,18 +72,21 @@ impl AnyWorker<'_> {
         self.times.film += start.elapsed();
     }
 
-    /// Traces the samples, whose pixels are given in order with the indices of their samples, and their looks; the results have
-    /// the colours of the film. `seed` is that of the samples.
+    /// Traces the samples and their emission rays; the results have the colours of the film. `pixels` lists the pixels
+    /// in the order of the samples, with the indices of their samples. `seed` is the seed of the samples.
     pub(super) fn trace(
         &mut self,
         (job, camera): (&RenderJob, &CameraSampler<'_>),
         fits: &mut Fits,
         (pixels, seed): (impl Iterator<Item = ([u32; 2], Range<u32>)>, u32),
     ) {
+        // Trace paths, then the additional emission rays
         let start = Instant::now();
         let Worker { tracer, samples, results, looks, .. } = self;
         tracer.trace(job, samples, fits, results);
         looks.replace((job, camera), (samples, seed), pixels, (results, tracer.light_layers()));
+
+        // Apply the white balance
         let film = &job.world.scene.film;
         if film.balance.is_some() {
             for result in &mut self.results {
@@ -93,14 +96,15 @@ impl AnyWorker<'_> {
         self.times.tracing += start.elapsed();
     }
 
-    /// The counts and times since the last call.
+    /// Counts and times since the last call.
     pub(super) fn take_stats(&mut self) -> PathStats {
         let mut stats = self.tracer.take_stats();
         stats.merge(&self.looks.take_stats());
         stats
     }
 
-    /// Adds the results to the sums of their pixels, which are given in order with the indices of their samples.
+    /// Adds the results to the sums of their pixels. `pixels` lists the pixels in the order of the results, with the
+    /// indices of their samples.
     pub(super) fn add(&mut self, film: &FilmSettings, pixels: impl Iterator<Item = (usize, Range<u32>)>) {
         let start = Instant::now();
         let Worker { tracer, results, sums, layers, .. } = self;
@@ -121,7 +125,7 @@ impl AnyWorker<'_> {
         self.times.film += start.elapsed();
     }
 
-    /// Returns the sums of a tile.
+    /// Writes the sums back to a tile.
     pub(super) fn write(&mut self, tile: &mut Tile) {
         let start = Instant::now();
         tile.set_sums(&self.sums, &mut self.packing);
@@ -132,16 +136,16 @@ impl AnyWorker<'_> {
     }
 }
 
-/// A worker that may have any tracer.
+/// A worker with any tracer.
 pub(super) type AnyWorker<'a> = Worker<Box<dyn Tracer + 'a>>;
 
-/// The workers that use what an integrator has prepared.
+/// The workers of a prepared integrator.
 pub(super) struct Workers<'a> {
     integrator: &'a dyn Integrator,
     features: FeatureSet,
-    /// Number of layers by lights.
+    /// Number of light-group layers.
     light_layers: usize,
-    /// Those without a tile, whose buffers are large enough already.
+    /// Workers without a tile. Their buffers are kept.
     idle: Mutex<Vec<AnyWorker<'a>>>,
 }
 
@@ -150,7 +154,7 @@ impl<'a> Workers<'a> {
         Workers { integrator, features, light_layers, idle: Mutex::default() }
     }
 
-    /// Lets one of them work.
+    /// Runs `work` with an idle worker, or with a new one if all are busy.
     pub(super) fn with_one<R>(&self, work: impl FnOnce(&mut AnyWorker<'a>) -> R) -> R {
         let idle = self.idle().pop();
         let mut worker = idle.unwrap_or_else(|| {
@@ -164,7 +168,7 @@ impl<'a> Workers<'a> {
         result
     }
 
-    /// Where the time of all of them has gone.
+    /// Times of all workers.
     pub(super) fn times(&self) -> WorkerTimes {
         let mut times = WorkerTimes::default();
         self.idle().iter().for_each(|worker| times.merge(&worker.times));

@@ -5,7 +5,7 @@ use glam::Mat2;
 use lumiris_numbers::math::{DAffine3, DVec2, Vec2, Vec3, warp};
 use std::f32::consts::{FRAC_1_PI, PI, TAU};
 
-/// Map of a surface point to the plane of a texture.
+/// Mapping of a surface point to the plane of a texture.
 #[derive(Clone, Copy, Debug)]
 pub enum Mapping2d {
     /// scale·uv + delta.
@@ -15,7 +15,8 @@ pub enum Mapping2d {
         /// Offset per axis.
         delta: Vec2,
     },
-    /// matrix·uv + offset of the first or the second texture coordinates; of the latter, points are looked up.
+    /// matrix·uv + offset of the first or the second texture coordinates. With the second ones, lookups are not
+    /// filtered.
     Affine {
         /// True for the second texture coordinates.
         second: bool,
@@ -54,10 +55,12 @@ impl Default for Mapping2d {
 }
 
 impl Mapping2d {
-    /// Texture coordinates (s, t), t upwards, and the filter's width in them. The width is known for [`Mapping2d::Uv`]
-    /// only; the other mappings look up points. Those that go by places may have large coordinates.
+    /// Texture coordinates (s, t), t upwards, and the filter width in them. The width is available for
+    /// [`Mapping2d::Uv`] and [`Mapping2d::Affine`] with the first texture coordinates; other lookups are not filtered.
+    /// Coordinates computed from positions may be large.
     pub fn map(&self, ctx: &TextureContext) -> (DVec2, Vec2) {
         match self {
+            // Mappings of texture coordinates
             Mapping2d::Uv { scale, delta } => ((*scale * ctx.uv + *delta).as_dvec2(), scale.abs() * ctx.uv_width),
             Mapping2d::Affine { second: true, matrix, offset } => {
                 ((*matrix * ctx.uv1 + *offset).as_dvec2(), Vec2::ZERO)
@@ -66,6 +69,7 @@ impl Mapping2d {
                 let width = Mat2::from_cols(matrix.x_axis.abs(), matrix.y_axis.abs()) * ctx.uv_width;
                 ((*matrix * ctx.uv + *offset).as_dvec2(), width)
             }
+            // Mappings of positions
             Mapping2d::Spherical { texture_from_world } => {
                 let w = texture_from_world.transform_point3(ctx.p).as_vec3().normalize_or(Vec3::Z);
                 let st = Vec2::new(w.z.clamp(-1.0, 1.0).acos() * FRAC_1_PI, warp::azimuth(w) / TAU);
@@ -84,7 +88,7 @@ impl Mapping2d {
     }
 }
 
-/// Where the cells of a checkerboard are.
+/// Cells of a checkerboard.
 #[derive(Clone, Copy, Debug)]
 pub enum CheckerboardMapping {
     /// Unit squares of texture coordinates.
@@ -97,9 +101,9 @@ pub enum CheckerboardMapping {
 }
 
 impl CheckerboardMapping {
-    /// True in the cells of even parity, which hold the cell from the origin to (1, 1, 1).
+    /// True in cells of even parity, such as the cell from the origin to (1, 1, 1).
     pub fn is_even(&self, ctx: &TextureContext) -> bool {
-        // The remainder first: a sum of large floats would lose its parity.
+        // The parity is taken before adding, which would lose it for large floats
         let odd = |x: f64| x.floor().rem_euclid(2.0) == 1.0;
         match self {
             CheckerboardMapping::Squares(mapping) => {

@@ -1,7 +1,11 @@
 //! Textures: float and RGB functions of a surface point. All textures of a scene are stored in one [`TextureSet`].
 //!
-//! Textures are trees whose nodes refer to earlier ones by index, so that no tree can contain itself; roots that an
-//! importer reserves are copies, to which no node refers. Semantics are pbrt-v4's. Checkerboards are point sampled: the pixel integrates over their edges.
+//! Textures are trees. Their nodes refer to earlier nodes by index, so no tree can contain itself. Roots that an
+//! importer reserves are copies, to which no node refers. Semantics are pbrt-v4's. Checkerboards are point sampled: the
+//! pixel integrates over their edges.
+//!
+//! * [`mapping`]: texture coordinates; `procedural`: noise, marble, dots; [`udim`]: tiled images
+//! * [`crate::imaging::mipmap`], [`crate::imaging::face_map`]: image lookups
 
 pub mod mapping;
 mod procedural;
@@ -26,28 +30,27 @@ pub type ImageId = u32;
 /// Index into [`TextureSet::face_maps`].
 pub type FaceMapId = u32;
 
-/// Where a texture is looked up.
+/// Inputs of a texture lookup.
 #[derive(Clone, Copy, Debug)]
 pub struct TextureContext {
     /// Texture coordinates.
     pub uv: Vec2,
-    /// Width of the filter in uv, per axis: the extent on the surface of what a camera sample stands for. 0 is a point
-    /// lookup.
+    /// Filter width in uv, per axis: the extent of the texture footprint of a camera sample. 0 is a point lookup.
     pub uv_width: Vec2,
     /// Second texture coordinates.
     pub uv1: Vec2,
     /// Linear colour and opacity of the vertices.
     pub color: [f32; 4],
-    /// Number of the face of the mesh.
+    /// Index of the face in the mesh.
     pub face: u32,
-    /// World-space point. Maps to textures are f64 as well: textures may have their origin far from the scene.
+    /// World-space point. f64, as in mappings: the origin of a texture may be far from the scene.
     pub p: DVec3,
     /// World-space geometric normal.
     pub n: Vec3,
 }
 
 impl TextureContext {
-    /// A lookup that takes all of an image in.
+    /// A lookup filtered over the whole image.
     pub fn whole() -> Self {
         let (uv, p, n) = (Vec2::splat(0.5), DVec3::ZERO, Vec3::Z);
         TextureContext { uv, uv_width: Vec2::splat(1e3), uv1: uv, color: [1.0; 4], face: 0, p, n }
@@ -57,11 +60,11 @@ impl TextureContext {
 /// Lookup of an image.
 #[derive(Clone, Copy, Debug)]
 pub struct ImageTexture {
-    /// The image; of tiles, the first one.
+    /// The image. With `udim`, the first tile.
     pub image: ImageId,
-    /// Tiles in its place.
+    /// Tiles that replace the image.
     pub udim: Option<UdimId>,
-    /// Point to image coordinates; (0, 0) is the lower left.
+    /// Mapping to image coordinates; (0, 0) is the lower left.
     pub mapping: Mapping2d,
     /// Factor of the values.
     pub scale: f32,
@@ -69,7 +72,7 @@ pub struct ImageTexture {
     pub invert: bool,
 }
 
-/// Lookup of the texture of a face, by the texture coordinates.
+/// Lookup of the texture of a face by the texture coordinates.
 #[derive(Clone, Copy, Debug)]
 pub struct FaceTexture {
     /// Textures of the faces.
@@ -78,10 +81,10 @@ pub struct FaceTexture {
     pub scale: f32,
 }
 
-/// A float on surfaces.
+/// A float texture.
 #[derive(Clone, Copy, Debug)]
 pub enum FloatTexture {
-    /// The same everywhere.
+    /// A constant.
     Constant(f32),
     /// An image; the mean of its channels.
     Image(ImageTexture),
@@ -116,9 +119,9 @@ pub enum FloatTexture {
     },
     /// tex1·|n·direction| + tex2·(1 − |n·direction|).
     DirectionMix {
-        /// Value where the normal is along the direction.
+        /// Value where the normal is parallel to the direction.
         tex1: FloatTextureId,
-        /// Value where it is across.
+        /// Value where the normal is perpendicular to it.
         tex2: FloatTextureId,
         /// Unit direction in world space.
         direction: Vec3,
@@ -134,7 +137,7 @@ pub enum FloatTexture {
     },
     /// Noise.
     Noise(NoiseTexture),
-    /// tex1 inside of dots, tex2 between them.
+    /// tex1 inside dots, tex2 between them.
     Dots {
         /// Dots.
         dots: Dots,
@@ -143,16 +146,16 @@ pub enum FloatTexture {
         /// Value outside.
         tex2: FloatTextureId,
     },
-    /// Bilinear between corners.
+    /// Bilinear interpolation between corners.
     Bilerp(Bilerp<f32>),
 }
 
-/// A colour on surfaces.
+/// An RGB texture.
 #[derive(Clone, Copy, Debug)]
 pub enum RgbTexture {
-    /// The same everywhere.
+    /// A constant.
     Constant(Rgb),
-    /// An image; one of one channel is grey.
+    /// An image. One channel gives grey.
     Image(ImageTexture),
     /// The texture of the face.
     Faces(FaceTexture),
@@ -160,9 +163,9 @@ pub enum RgbTexture {
     VertexColor,
     /// tex1·tex2.
     Product {
-        /// A factor.
+        /// First factor.
         tex1: RgbTextureId,
-        /// The other one.
+        /// Second factor.
         tex2: RgbTextureId,
     },
     /// tex·scale.
@@ -183,9 +186,9 @@ pub enum RgbTexture {
     },
     /// tex1·|n·direction| + tex2·(1 − |n·direction|).
     DirectionMix {
-        /// Value where the normal is along the direction.
+        /// Value where the normal is parallel to the direction.
         tex1: RgbTextureId,
-        /// Value where it is across.
+        /// Value where the normal is perpendicular to it.
         tex2: RgbTextureId,
         /// Unit direction in world space.
         direction: Vec3,
@@ -201,7 +204,7 @@ pub enum RgbTexture {
     },
     /// Marble.
     Marble(Marble),
-    /// tex1 inside of dots, tex2 between them.
+    /// tex1 inside dots, tex2 between them.
     Dots {
         /// Dots.
         dots: Dots,
@@ -210,7 +213,7 @@ pub enum RgbTexture {
         /// Value outside.
         tex2: RgbTextureId,
     },
-    /// Bilinear between corners.
+    /// Bilinear interpolation between corners.
     Bilerp(Bilerp<Rgb>),
 }
 
@@ -223,23 +226,23 @@ pub struct TextureSet {
     pub rgbs: Vec<RgbTexture>,
     /// Images.
     pub images: Vec<Arc<MipMap>>,
-    /// Images that are tiles.
+    /// Tiled images.
     pub udims: Vec<Udim>,
-    /// Textures of faces.
+    /// Face textures.
     pub face_maps: Vec<Arc<FaceMap>>,
-    /// By float texture, how many textures refer to each other, at most, from it on.
+    /// Depth of the tree of each float texture.
     float_depths: Vec<u32>,
-    /// By RGB texture.
+    /// Depth of the tree of each RGB texture.
     rgb_depths: Vec<u32>,
 }
 
 impl TextureSet {
-    /// Adds a float texture. Panics if it refers to a texture that is not in the set yet; its image may come later,
+    /// Adds a float texture. Panics if it refers to a texture that is not in the set yet. Its image may be added later,
     /// before the first lookup.
     pub fn add_float(&mut self, texture: FloatTexture) -> FloatTextureId {
         let children: &[FloatTextureId] = match &texture {
             FloatTexture::Constant(_) | FloatTexture::VertexOpacity => &[],
-            // Images may come later: an importer reads all of them at once.
+            // Images are added later: an importer reads all of them at once
             FloatTexture::Image(_) | FloatTexture::Channel(..) | FloatTexture::Faces(_) => &[],
             FloatTexture::Noise(_) | FloatTexture::Bilerp(_) => &[],
             FloatTexture::Threshold { tex, .. } => &[*tex],
@@ -257,23 +260,24 @@ impl TextureSet {
         id
     }
 
-    /// A place for a float texture that is not known yet, and that no texture refers to; see [`Self::fill_float`].
+    /// Reserves a float texture that is defined later by [`Self::fill_float`]. No texture refers to it.
     pub fn reserve_float(&mut self) -> FloatTextureId {
-        // Whoever asks too early must not take it for a constant
+        // Not a constant, in case it is queried before it is defined
         self.floats.push(FloatTexture::VertexOpacity);
         self.float_depths.push(1);
         (self.floats.len() - 1) as FloatTextureId
     }
 
-    /// Makes a reserved place a copy of a texture.
+    /// Defines a reserved texture as a copy of another one.
     pub fn fill_float(&mut self, reserved: FloatTextureId, texture: FloatTextureId) {
         self.floats[reserved as usize] = self.floats[texture as usize];
         self.float_depths[reserved as usize] = self.float_depths[texture as usize];
     }
 
-    /// Adds an RGB texture. Panics if it refers to a texture that is not in the set yet; its image may come later,
+    /// Adds an RGB texture. Panics if it refers to a texture that is not in the set yet. Its image may be added later,
     /// before the first lookup.
     pub fn add_rgb(&mut self, texture: RgbTexture) -> RgbTextureId {
+        // References to other textures
         let (children, weight): (&[RgbTextureId], Option<FloatTextureId>) = match &texture {
             RgbTexture::Constant(_) | RgbTexture::VertexColor => (&[], None),
             RgbTexture::Image(_) | RgbTexture::Faces(_) => (&[], None),
@@ -285,9 +289,13 @@ impl TextureSet {
             | RgbTexture::Checkerboard { tex1, tex2, .. }
             | RgbTexture::Dots { tex1, tex2, .. } => (&[*tex1, *tex2], None),
         };
+
+        // All of them must be earlier
         let id = self.rgbs.len() as RgbTextureId;
         let known = children.iter().all(|&c| c < id) && weight.is_none_or(|w| (w as usize) < self.floats.len());
         assert!(known, "a texture refers to earlier ones only");
+
+        // Append the texture with its depth
         let weight = weight.map(|w| self.float_depths[w as usize]);
         let depths = children.iter().map(|&c| self.rgb_depths[c as usize]).chain(weight);
         self.rgb_depths.push(1 + depths.max().unwrap_or(0));
@@ -295,22 +303,22 @@ impl TextureSet {
         id
     }
 
-    /// How many textures refer to each other, at most, from a float texture on: its value is found by recursion.
+    /// Depth of the tree of a float texture, and of the recursion that evaluates it.
     pub fn float_depth(&self, id: FloatTextureId) -> u32 {
         self.float_depths[id as usize]
     }
 
-    /// As [`Self::float_depth`], from an RGB texture on.
+    /// Depth of the tree of an RGB texture.
     pub fn rgb_depth(&self, id: RgbTextureId) -> u32 {
         self.rgb_depths[id as usize]
     }
 
-    /// Where the texels are that do not fit into memory: all images of a scene have the same store.
+    /// The store of texels that do not fit into memory. All images of a scene share it.
     pub fn store(&self) -> Option<&TileStore> {
         self.images.iter().find_map(|image| image.store()).map(|store| &**store)
     }
 
-    /// Memory of all images and textures of faces (bytes), but for tiles.
+    /// Memory of all images and face textures without tiles (bytes).
     pub fn bytes(&self) -> u64 {
         let images: usize = self.images.iter().map(|image| image.bytes()).sum();
         let faces: usize = self.face_maps.iter().map(|map| map.bytes()).sum();
@@ -323,7 +331,7 @@ impl TextureSet {
         (self.images.len() - 1) as ImageId
     }
 
-    /// The value of a float texture that is a constant.
+    /// The value of a float texture; `None` if it is not a constant.
     pub fn constant_float(&self, id: FloatTextureId) -> Option<f32> {
         match self.floats[id as usize] {
             FloatTexture::Constant(v) => Some(v),
@@ -342,7 +350,7 @@ impl TextureSet {
         }
     }
 
-    /// The value of an RGB texture that is a constant.
+    /// The value of an RGB texture; `None` if it is not a constant.
     pub fn constant_rgb(&self, id: RgbTextureId) -> Option<Rgb> {
         match self.rgbs[id as usize] {
             RgbTexture::Constant(v) => Some(v),
@@ -363,6 +371,7 @@ impl TextureSet {
     /// Value of a float texture.
     pub fn float(&self, id: FloatTextureId, ctx: &TextureContext) -> f32 {
         match &self.floats[id as usize] {
+            // Leaves
             FloatTexture::Constant(v) => *v,
             FloatTexture::Image(image) => {
                 let v = self.image_value(image, ctx).average() * image.scale;
@@ -372,10 +381,12 @@ impl TextureSet {
             FloatTexture::Faces(faces) => self.face_value(faces, ctx).average(),
             FloatTexture::VertexOpacity => ctx.color[3],
             FloatTexture::Threshold { tex, threshold } => f32::from(u8::from(self.float(*tex, ctx) >= *threshold)),
+            // A factor of 0 skips the other texture
             FloatTexture::Scale { tex, scale } => {
                 let scale = self.float(*scale, ctx);
                 if scale == 0.0 { 0.0 } else { self.float(*tex, ctx) * scale }
             }
+            // Textures without weight are skipped
             FloatTexture::Mix { tex1, tex2, amount } => {
                 let amount = self.float(*amount, ctx);
                 blend(amount, 0.0, || self.float(*tex1, ctx), || self.float(*tex2, ctx))
@@ -387,6 +398,7 @@ impl TextureSet {
             FloatTexture::Checkerboard { mapping, tex1, tex2 } => {
                 self.float(if mapping.is_even(ctx) { *tex1 } else { *tex2 }, ctx)
             }
+            // Procedural textures
             FloatTexture::Noise(noise) => noise.value(ctx),
             FloatTexture::Dots { dots, tex1, tex2 } => self.float(if dots.is_inside(ctx) { *tex1 } else { *tex2 }, ctx),
             FloatTexture::Bilerp(bilerp) => bilerp.value(ctx),
@@ -396,6 +408,7 @@ impl TextureSet {
     /// Value of an RGB texture.
     pub fn rgb(&self, id: RgbTextureId, ctx: &TextureContext) -> Rgb {
         match &self.rgbs[id as usize] {
+            // Leaves
             RgbTexture::Constant(v) => *v,
             RgbTexture::Image(image) => {
                 let v = self.image_value(image, ctx) * image.scale;
@@ -404,10 +417,12 @@ impl TextureSet {
             RgbTexture::Faces(faces) => self.face_value(faces, ctx).map(|c| c.max(0.0)),
             RgbTexture::VertexColor => Rgb::new(ctx.color[0], ctx.color[1], ctx.color[2]),
             RgbTexture::Product { tex1, tex2 } => self.rgb(*tex1, ctx) * self.rgb(*tex2, ctx),
+            // A factor of 0 skips the other texture
             RgbTexture::Scale { tex, scale } => {
                 let scale = self.float(*scale, ctx);
                 if scale == 0.0 { Rgb::BLACK } else { self.rgb(*tex, ctx) * scale }
             }
+            // Textures without weight are skipped
             RgbTexture::Mix { tex1, tex2, amount } => {
                 let amount = self.float(*amount, ctx);
                 blend(amount, Rgb::BLACK, || self.rgb(*tex1, ctx), || self.rgb(*tex2, ctx))
@@ -419,6 +434,7 @@ impl TextureSet {
             RgbTexture::Checkerboard { mapping, tex1, tex2 } => {
                 self.rgb(if mapping.is_even(ctx) { *tex1 } else { *tex2 }, ctx)
             }
+            // Procedural textures
             RgbTexture::Marble(marble) => marble.color(ctx),
             RgbTexture::Dots { dots, tex1, tex2 } => self.rgb(if dots.is_inside(ctx) { *tex1 } else { *tex2 }, ctx),
             RgbTexture::Bilerp(bilerp) => bilerp.value(ctx).map(|c| c.max(0.0)),
@@ -435,17 +451,17 @@ impl TextureSet {
             },
             None => (texture.image, self.images[texture.image as usize].within_periods(st)),
         };
-        // Images have t downwards.
+        // Images have t downwards
         self.images[image as usize].lookup(Vec2::new(st.x, 1.0 - st.y), width)
     }
 
-    /// Value of the texture of a face at a point.
+    /// Value of the face texture at a point.
     fn face_value(&self, texture: &FaceTexture, ctx: &TextureContext) -> Rgb {
         self.face_maps[texture.map as usize].value(ctx.face, ctx.uv, ctx.uv_width) * texture.scale
     }
 }
 
-/// `a·(1 − amount) + b·amount`, where what has no weight is not evaluated.
+/// `a·(1 − amount) + b·amount`. A value without weight is not evaluated.
 fn blend<T>(amount: f32, zero: T, a: impl Fn() -> T, b: impl Fn() -> T) -> T
 where
     T: Copy + std::ops::Add<Output = T> + std::ops::Mul<f32, Output = T>,

@@ -1,14 +1,14 @@
-//! Procedural textures of pbrt-v4: sums of noise, marble, and polka dots. Points are looked up, so all octaves count whatever the
-//! size of a pixel; the samples of a pixel average them.
+//! Procedural textures of pbrt-v4: sums of noise, marble, and polka dots. They are point sampled: all octaves are
+//! evaluated at any pixel size, and the samples of a pixel average them.
 
 use super::{Mapping2d, TextureContext};
 use lumiris_numbers::math::noise::noise;
 use lumiris_numbers::math::{DAffine3, DVec3, Rgb, Vec2};
 use std::f64::consts::TAU;
 
-/// From one octave to the next: not quite 2, so that the lattices have no points in common.
+/// Ratio of frequencies of successive octaves. Slightly below 2, so that the lattices have no points in common.
 const LACUNARITY: f32 = 1.99;
-/// What an octave of |noise| is on average.
+/// Mean of an octave of |noise|.
 const MEAN_OF_NOISE: f32 = 0.2;
 
 /// Sums of noise over octaves.
@@ -20,7 +20,7 @@ pub struct Octaves {
     pub roughness: f32,
 }
 
-/// What is made of the noise at a point of texture space.
+/// Noise functions.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum NoiseKind {
     /// Fractional Brownian motion.
@@ -31,7 +31,7 @@ pub enum NoiseKind {
     Windy,
 }
 
-/// A float by noise.
+/// A float texture of noise.
 #[derive(Clone, Copy, Debug)]
 pub struct NoiseTexture {
     /// Kind.
@@ -40,7 +40,7 @@ pub struct NoiseTexture {
     pub texture_from_world: DAffine3,
 }
 
-/// Marble: bands across y that noise displaces.
+/// Marble: bands across y, displaced by noise.
 #[derive(Clone, Copy, Debug)]
 pub struct Marble {
     /// Noise.
@@ -53,19 +53,19 @@ pub struct Marble {
     pub texture_from_world: DAffine3,
 }
 
-/// Disks of random places in half of the unit cells.
+/// Disks at random positions in half of the unit cells.
 #[derive(Clone, Copy, Debug)]
 pub struct Dots {
     /// Cells.
     pub mapping: Mapping2d,
 }
 
-/// Values at the corners of the unit square, bilinear between them.
+/// Bilinear interpolation between the corners of the unit square.
 #[derive(Clone, Copy, Debug)]
 pub struct Bilerp<T> {
     /// The square.
     pub mapping: Mapping2d,
-    /// At (0, 0), (1, 0), (0, 1) and (1, 1).
+    /// Values at (0, 0), (1, 0), (0, 1) and (1, 1).
     pub corners: [T; 4],
 }
 
@@ -85,7 +85,7 @@ impl Octaves {
         self.sum(p, |noise| noise).0
     }
 
-    /// Turbulence at a point; what an octave more would add on average is part of it, as in pbrt.
+    /// Turbulence at a point. The mean of the next octave is added, as in pbrt.
     pub fn turbulence(&self, p: DVec3) -> f32 {
         let (sum, next) = self.sum(p, f32::abs);
         sum + next * MEAN_OF_NOISE
@@ -107,7 +107,7 @@ impl NoiseTexture {
     }
 }
 
-/// Control points of the spline of marble's colours, Rec.709.
+/// Control points of the colour spline of marble, Rec.709.
 const MARBLE: [[f32; 3]; 9] = [
     [0.58, 0.58, 0.6],
     [0.58, 0.58, 0.6],
@@ -119,7 +119,7 @@ const MARBLE: [[f32; 3]; 9] = [
     [0.2, 0.2, 0.33],
     [0.58, 0.58, 0.6],
 ];
-/// Factor of these colours.
+/// Factor of the spline's colours.
 const MARBLE_BRIGHTNESS: f32 = 1.5;
 
 impl Marble {
@@ -128,7 +128,7 @@ impl Marble {
         let p = self.texture_from_world.transform_point3(ctx.p) * f64::from(self.scale);
         // Without whole periods of the sine, f32 resolves the phase
         let band = ((p.y + f64::from(self.variation * self.octaves.fbm(p))) % TAU) as f32;
-        // Six cubic Bézier curves, each over four points in succession
+        // Six cubic Bézier curves, each over four successive points
         let segments = (MARBLE.len() - 3) as f32;
         let t = (0.5 + 0.5 * band.sin()) * segments;
         let first = t.floor().clamp(0.0, segments - 1.0);
@@ -144,7 +144,7 @@ impl Marble {
 const DOT_RADIUS: f32 = 0.35;
 
 impl Dots {
-    /// True inside of a dot.
+    /// True inside a dot.
     pub fn is_inside(&self, ctx: &TextureContext) -> bool {
         let (st, _) = self.mapping.map(ctx);
         let cell = (st + 0.5).floor();
@@ -204,7 +204,7 @@ mod tests {
             );
             mean += octaves(1).turbulence(p) - 0.1;
         }
-        // The mean that stands for octaves which are left out
+        // The mean that replaces omitted octaves
         assert!((mean / 20_000.0 - MEAN_OF_NOISE).abs() < 0.06, "{}", mean / 20_000.0);
     }
 
@@ -212,7 +212,7 @@ mod tests {
     fn marble_has_the_colours_of_its_spline() {
         let octaves = Octaves { count: 8, roughness: 0.5 };
         let marble = |variation| Marble { octaves, scale: 1.0, variation, texture_from_world: DAffine3::IDENTITY };
-        // Where the sine is −1 and 1, and in its middle, which is the first point of the fourth curve
+        // The sine is −1 and 1, and 0, which is the first point of the fourth curve
         let of = |y: f32| marble(0.0).color(&at(Vec3::Y * y)).to_array();
         let half = std::f32::consts::FRAC_PI_2;
         for (y, expected) in [(-half, MARBLE[0]), (half, MARBLE[8]), (0.0, MARBLE[3])] {

@@ -47,6 +47,7 @@ fn scale_comes_before_invert_and_colours_stay_positive() {
 
 #[test]
 fn trees_combine_their_leaves() {
+    // Floats
     let (mut set, _) = set();
     let [a, b, quarter] = [2.0, 6.0, 0.25].map(|v| set.add_float(FloatTexture::Constant(v)));
     let [red, blue] = [Rgb::new(1.0, 0.0, 0.0), Rgb::new(0.0, 0.0, 1.0)].map(|c| set.add_rgb(RgbTexture::Constant(c)));
@@ -57,17 +58,21 @@ fn trees_combine_their_leaves() {
     assert_eq!(set.float(scale, &at(0.0, 0.0)), 0.75);
     assert!((set.float(along, &at(0.0, 0.0)) - (0.8 * 2.0 + 0.2 * 6.0)).abs() < 1e-5);
 
+    // Checkerboards
     let mapping = CheckerboardMapping::Squares(Mapping2d::default());
     let board = set.add_rgb(RgbTexture::Checkerboard { mapping, tex1: red, tex2: blue });
     let float_board = set.add_float(FloatTexture::Checkerboard { mapping, tex1: a, tex2: b });
     assert_eq!((set.rgb(board, &at(0.5, 0.5)).r, set.rgb(board, &at(1.5, 0.5)).b), (1.0, 1.0));
     assert_eq!((set.float(float_board, &at(0.5, 0.5)), set.float(float_board, &at(0.5, 1.5))), (2.0, 6.0));
 
+    // Colours
     let rgb_mix = set.add_rgb(RgbTexture::Mix { tex1: red, tex2: board, amount: quarter });
     let rgb_scale = set.add_rgb(RgbTexture::Scale { tex: rgb_mix, scale: a });
     assert_eq!(set.rgb(rgb_scale, &at(1.5, 0.5)), Rgb::new(1.5, 0.0, 0.5));
     let rgb_along = set.add_rgb(RgbTexture::DirectionMix { tex1: red, tex2: blue, direction: Vec3::Z });
     assert!((set.rgb(rgb_along, &at(0.0, 0.0)).b - 0.2).abs() < 1e-5);
+
+    // Constants
     assert_eq!((set.constant_float(a), set.constant_float(mix)), (Some(2.0), None));
     assert_eq!((set.constant_rgb(red), set.constant_rgb(board)), (Some(Rgb::new(1.0, 0.0, 0.0)), None));
 }

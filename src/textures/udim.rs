@@ -1,5 +1,5 @@
-//! UDIM: images side by side over the plane of texture coordinates. Tile 1001 + u + 10·v covers [u, u + 1) × [v, v + 1), for
-//! u from 0 to 9.
+//! UDIM: images side by side in the plane of texture coordinates. Tile 1001 + u + 10·v covers [u, u + 1) × [v, v + 1),
+//! for u from 0 to 9.
 
 use super::ImageId;
 use lumiris_numbers::math::{DVec2, Vec2};
@@ -7,34 +7,34 @@ use lumiris_numbers::math::{DVec2, Vec2};
 /// Index into [`TextureSet::udims`](super::TextureSet::udims).
 pub type UdimId = u32;
 
-/// Tiles in a row.
+/// Tiles per row.
 const COLUMNS: usize = 10;
 /// Number of the first tile.
 const FIRST: u32 = 1001;
-/// Number of the last one.
+/// Number of the last tile.
 const LAST: u32 = 9999;
 
-/// The images of the tiles.
+/// The images of all tiles.
 #[derive(Clone, Debug, Default)]
 pub struct Udim {
-    /// By u + 10·v.
+    /// Indexed by u + 10·v.
     tiles: Vec<Option<ImageId>>,
 }
 
 impl Udim {
-    /// True if a tile can have this number.
+    /// True if this is a valid tile number.
     pub fn is_number(number: u32) -> bool {
         (FIRST..=LAST).contains(&number)
     }
 
-    /// Sets the image of a tile, whose number [is one](Self::is_number).
+    /// Sets the image of a tile. `number` must be [valid](Self::is_number).
     pub fn set(&mut self, number: u32, image: ImageId) {
         let index = (number - FIRST) as usize;
         self.tiles.resize(self.tiles.len().max(index + 1), None);
         self.tiles[index] = Some(image);
     }
 
-    /// The tile that covers a point, t upwards, and the point within it; `None` where there is none.
+    /// The tile that contains a point (t upwards), and the point relative to the tile; `None` where there is no tile.
     #[inline]
     pub fn tile(&self, st: DVec2) -> Option<(ImageId, Vec2)> {
         let corner = st.floor();

@@ -1,4 +1,4 @@
-//! Area lights that an alpha texture cuts out: they shine as much as is seen of them, whatever finds them.
+//! Area lights with alpha textures: the emitted light is in proportion to the visible part, with every technique.
 
 use lumiris::import::cache::FileCache;
 use lumiris::import::{LoadOptions, load_text};
@@ -8,7 +8,7 @@ use lumiris::settings::EstimatorKind;
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
-/// A glossy floor below a light of 1 × 1 at z = 1, of which the camera sees one point.
+/// A glossy floor below a light of 1 × 1 at z = 1. The camera sees one point of the floor.
 const FLOOR: &str = r#"
 LookAt 0.3 0.4 0.5  0.3 0.4 0  0 1 0
 Camera "orthographic" "float screenwindow" [ -0.001 0.001 -0.001 0.001 ]
@@ -23,10 +23,10 @@ AreaLightSource "diffuse" "rgb L" [ 1 2 4 ] "bool twosided" true
 "#;
 const TRIANGLES: &str = r#"Shape "trianglemesh" "point3 P" [ -0.5 -0.5 1  0.5 -0.5 1  0.5 0.5 1  -0.5 0.5 1 ]
     "point2 uv" [ 0 0  1 0  1 1  0 1 ] "integer indices" [ 0 1 2 0 2 3 ]"#;
-/// The half of it where the texture is 1.
+/// The half where the texture is 1.
 const HALF: &str = r#"Shape "trianglemesh" "point3 P" [ 0 -0.5 1  0.5 -0.5 1  0.5 0.5 1  0 0.5 1 ]
     "integer indices" [ 0 1 2 0 2 3 ]"#;
-/// Not a rectangle, so each triangle is a light, of which the first is x > 0.
+/// Not a rectangle, so each triangle is a light. The first is in x > 0.
 const KITE: &str = r#"Shape "trianglemesh" "point3 P" [ 0 -0.5 1  0.7 0 1  0 0.5 1  -0.4 0 1 ]
     "point2 uv" [ 0.5 0  1 0.5  0.5 1  0 0.5 ] "integer indices" [ 0 1 2 0 2 3 ]"#;
 const HALF_KITE: &str = r#"Shape "trianglemesh" "point3 P" [ 0 -0.5 1  0.7 0 1  0 0.5 1 ] "integer indices" [ 0 1 2 ]"#;
@@ -53,7 +53,7 @@ fn a_light_shines_as_much_as_is_seen_of_it() {
     let cases = [
         (with(TRIANGLES, "\"float alpha\" 0.3"), TRIANGLES, 0.3),
         (with(SPHERE, "\"float alpha\" 0.3"), SPHERE, 0.3),
-        // What is 0 everywhere is a light that cannot be seen, as in pbrt-v4
+        // A light with alpha 0 everywhere emits but is invisible, as in pbrt-v4
         (with(TRIANGLES, "\"float alpha\" 0"), TRIANGLES, 1.0),
         (with(TRIANGLES, cut), HALF, 1.0),
         (with(KITE, cut), HALF_KITE, 1.0),
@@ -63,7 +63,7 @@ fn a_light_shines_as_much_as_is_seen_of_it() {
         let expected = part * mean(whole, Mis);
         for estimator in [Mc, Mis, Ris, Ocv, Contributing] {
             let found = mean(&light, estimator);
-            // A tenth of the directions of 32,768 samples find the light, and half of those what is left of it
+            // With `mc`, a tenth of 32,768 samples hit the light, and half of these the opaque part
             let tolerance = if estimator == Mc { 0.08 } else { 0.02 };
             assert!((found / expected - 1.0).abs() < tolerance, "{light} {estimator:?}: {found} for {expected}");
         }

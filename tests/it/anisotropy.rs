@@ -1,4 +1,4 @@
-//! The direction of anisotropic reflection: angle and texture of `KHR_materials_anisotropy`, and Blender's rotation.
+//! Direction of anisotropic reflection: angle and texture of `KHR_materials_anisotropy`, and Blender's rotation.
 
 use lumiris::imaging::oiio::{Part, write_image};
 use lumiris::import::cache::FileCache;
@@ -10,14 +10,15 @@ use std::f32::consts::{FRAC_PI_2, FRAC_PI_4};
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
-/// Texture coordinates of the corners at (−1, −1), (2, −1) and (−1, 2), from the top as in glTF: u to the right, u to the top,
-/// and u to the left.
+/// Texture coordinates of the corners at (−1, −1), (2, −1) and (−1, 2), with v from the top as in glTF. u points to the
+/// right, to the top, and to the left.
 const RIGHT: [f32; 6] = [0.0, 1.0, 1.0, 1.0, 0.0, 0.0];
 const TOP: [f32; 6] = [0.0, 0.0, 0.0, 1.0, 1.0, 0.0];
 const LEFT: [f32; 6] = [1.0, 1.0, 0.0, 1.0, 1.0, 0.0];
 
-/// A metal triangle with an anisotropy of the given members, before a lamp.
+/// A metal triangle in front of a lamp; `anisotropy` has the members of the extension.
 fn metal(folder: &Path, uv: [f32; 6], anisotropy: &str) -> Loaded {
+    // Document
     let json = format!(
         r#"{{"asset":{{"version":"2.0"}},"scene":0,"scenes":[{{"nodes":[0,1,2]}}],
         "extensionsUsed":["KHR_lights_punctual","KHR_materials_anisotropy"],
@@ -34,6 +35,8 @@ fn metal(folder: &Path, uv: [f32; 6], anisotropy: &str) -> Loaded {
         "bufferViews":[{{"buffer":0,"byteLength":36}},{{"buffer":0,"byteOffset":36,"byteLength":24}}],
         "buffers":[{{"byteLength":60,"uri":"a.bin"}}]}}"#
     );
+
+    // Buffer
     let corners = [-1.0, -1.0, 0.0, 2.0, -1.0, 0.0, -1.0, 2.0, 0.0];
     let bytes: Vec<u8> = corners.into_iter().chain(uv).flat_map(f32::to_le_bytes).collect();
     std::fs::write(folder.join("a.bin"), bytes).unwrap();
@@ -49,7 +52,7 @@ fn pixels(loaded: Loaded) -> Vec<f32> {
     channels(&render(&job, &settings, &AtomicBool::new(false), &|_| ()).unwrap().film, &[], None).data
 }
 
-/// Greatest difference over the greatest value.
+/// Largest difference over the largest value.
 fn difference(a: &[f32], b: &[f32]) -> f32 {
     let greatest = a.iter().fold(0.0_f32, |m, v| m.max(*v));
     assert!(greatest > 0.01, "{greatest}");
@@ -78,12 +81,13 @@ fn the_direction_is_that_of_rotation_and_texture() {
         assert!(difference(a, b) > 0.05, "{}", difference(a, b));
     }
 
-    // Texture coordinates whose u goes where the rotation does; to the left, rotations go the other way round
+    // Texture coordinates with u in the direction of the rotation. With u to the left, rotations have the opposite
+    // sense
     let same = |what: &str, a: &[f32], b: &[f32]| assert!(difference(a, b) < 0.01, "{what}: {}", difference(a, b));
     same("u to the top", &turned(TOP, 0.0), &across);
     same("mirrored", &turned(LEFT, FRAC_PI_4), &beyond);
 
-    // 127.5 stands for 0, and blue is a factor of the strength
+    // 127.5 means 0, and blue scales the strength
     same("green", &textured(RIGHT, [0.5, 1.0, 1.0], 0.9), &across);
     same("red and green", &textured(RIGHT, [1.0, 1.0, 1.0], 0.9), &between);
     same("mirrored red and green", &textured(LEFT, [1.0, 1.0, 1.0], 0.9), &beyond);
@@ -93,6 +97,7 @@ fn the_direction_is_that_of_rotation_and_texture() {
 
 #[test]
 fn the_rotation_of_blender_is_in_turns() {
+    // Rotations of u and of the material by a quarter
     let of = |uv: &str, rotation: &str| {
         let text = format!(
             r#"LookAt 0 0 3  0 0 0  0 1 0

@@ -1,4 +1,4 @@
-//! The rule of `--estimator auto`: what it chooses, what it leaves as it is; and trials.
+//! `--estimator auto`: the rule's choices, unchanged settings, and trials.
 
 use lumiris::import::cache::FileCache;
 use lumiris::import::{LoadOptions, load, load_text};
@@ -20,7 +20,7 @@ fn gallery(kind: IntegratorKind, resolution: [u32; 2], change: impl FnOnce(&mut 
     loaded.job(AccelKind::Embree, None).unwrap()
 }
 
-/// Whatever the user gives, the rule chooses the rest.
+/// The rule keeps all given settings and chooses the others.
 #[test]
 fn what_is_given_stays() {
     let both = [IntegratorKind::Direct, IntegratorKind::Path];
@@ -48,14 +48,15 @@ fn what_is_given_stays() {
         prepare(&mut job, &Preparation::on(None)).unwrap();
         let mut chosen = *job.settings();
         assert_ne!(chosen.integrator.estimator, EstimatorKind::Auto);
-        // The same change once more makes no difference
+        // Applying the same change again makes no difference
         change(&mut chosen);
         assert_eq!(chosen, *job.settings(), "{kind:?}, change {i} of {given:?}");
     }
 }
 
-/// A grey box around the camera, which the light `inside` lights; without its front and ceiling if it is `open`.
+/// A grey box around the camera with the light `inside`; without front and ceiling if it is `open`.
 fn room(is_open: bool, material: &str, inside: &str, depth: u32) -> RenderJob {
+    // Scene, with walls if it is closed
     let wall = |p: &str| format!("Shape \"bilinearmesh\" \"point3 P\" [ {p} ]\n");
     let mut text = format!(
         "LookAt 0 0 0.9  0 0 0  0 1 0\nCamera \"perspective\" \"float fov\" 90\n\
@@ -71,6 +72,8 @@ fn room(is_open: bool, material: &str, inside: &str, depth: u32) -> RenderJob {
         text += &wall("1 -1 -1  1 1 -1  1 -1 1  1 1 1");
         text += &wall("-1 -1 1  1 -1 1  -1 1 1  1 1 1");
     }
+
+    // Load
     let loaded = load_text(&text, "room", Path::new("."), &LoadOptions::default(), &FileCache::default());
     let mut job = loaded.map_err(|d| d.to_string()).unwrap().job(AccelKind::Embree, None).unwrap();
     job.change(|s| s.integrator.estimator = EstimatorKind::Auto);
@@ -88,11 +91,11 @@ fn facts_are_those_of_the_scene() {
     assert!(closed.diffuse_pairs > 0.999, "{closed:?}");
     let open = Facts::of(&room(true, GREY, SKY, 5));
     assert_eq!(open.sky, 1.0);
-    // A floor and a wall at a right angle, as long as wide: each has the form factor 0.2 of the other
+    // A floor and a wall at a right angle, each as wide as it is long: the form factor between them is 0.2
     assert!((open.open - 0.8).abs() < 0.03 && (open.diffuse_pairs - 0.2).abs() < 0.03, "{open:?}");
     let metal = Facts::of(&room(false, "\"conductor\" \"float roughness\" 0.3", LAMP, 5));
     assert_eq!((metal.diffuse_pairs, metal.open), (0.0, 0.0));
-    // The irradiance of an unoccluded sky is π, and a lamp behind the floor is hidden
+    // An unoccluded sky has the irradiance π, and a lamp behind the floor is hidden
     let hidden = format!("{SKY}\nLightSource \"point\" \"rgb I\" [ 9 9 9 ] \"point3 from\" [ 0 -3 0 ]");
     let both = Facts::of(&room(true, GREY, &hidden, 5));
     assert!(both.lights == 2 && both.sky > 0.999, "{both:?}");
@@ -100,6 +103,7 @@ fn facts_are_those_of_the_scene() {
 
 #[test]
 fn the_rule_goes_by_facts() {
+    // Summaries of the choices
     let chosen = |mut job: RenderJob| {
         prepare(&mut job, &Preparation::on(Some(1))).unwrap();
         job.settings().summary()
@@ -108,6 +112,8 @@ fn the_rule_goes_by_facts() {
         job.change(|s| s.integrator = s.integrator.of_kind(IntegratorKind::Direct));
         job
     };
+
+    // Rooms that differ in light, materials and depth
     assert_eq!(chosen(direct(room(false, GREY, LAMP, 1))), "direct light: 8 samples (MIS); adaptive sampling");
     assert_eq!(
         chosen(room(false, GREY, LAMP, 5)),
@@ -139,7 +145,7 @@ fn contributing_is_taken_where_most_of_many_lights_are_hidden() {
         (job.settings().integrator.estimator, job.lights.visibility_cache().is_some())
     };
     assert_eq!(estimator(&lamps(0.5)), (EstimatorKind::Mis, false), "all are seen");
-    // Six of the eight triangles of each lamp shine at the ceiling right above
+    // Six of the eight triangles of each lamp illuminate only the ceiling right above
     let (down, up) = ("0 1 2  0 2 3", "4 6 5  4 7 6");
     let meshes: String = (0..18)
         .map(|i| {
@@ -155,7 +161,7 @@ fn contributing_is_taken_where_most_of_many_lights_are_hidden() {
     assert_eq!(estimator(&(lamps(3.0) + LAMP)), (EstimatorKind::Contributing, true), "one is seen");
 }
 
-/// What trials take is an improvement on cells that they had not seen, and a plan of its own.
+/// Trials must find an improvement in cells that were not part of the choice, and a valid plan.
 #[test]
 fn trials_change_settings_only_where_they_gain() {
     let mut job = gallery(IntegratorKind::Direct, [96, 54], |s| s.integrator.light_sampler = LightSamplerKind::Uniform);

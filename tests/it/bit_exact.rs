@@ -1,4 +1,4 @@
-//! An image depends on the scene, its settings, the seed and the sample range, and on nothing else.
+//! An image depends only on the scene, its settings, the seed and the sample range.
 
 use lumiris::film::Film;
 use lumiris::import::{LoadOptions, load};
@@ -53,7 +53,7 @@ fn the_instruction_set_of_the_lanes_does_not_change_a_bit() {
         let job = gallery(estimator, None);
         let reference = film(&job, RenderSettings::default());
         for level in lumiris_lanes::levels() {
-            // Of the whole process: what other tests render at this time has the same bits as well
+            // Applies to the whole process: concurrent tests render the same bits
             lumiris_lanes::set_level(Some(level));
             let other = film(&job, RenderSettings::default());
             lumiris_lanes::set_level(None);
@@ -73,7 +73,7 @@ fn packet_width_does_not_change_a_bit() {
     }
 }
 
-/// A floor with an image on it, seen at a grazing angle.
+/// A textured floor, at a grazing angle.
 const TEXTURED: &str = r#"
 LookAt 0 0.4 -2  0 0 0  0 1 0
 Camera "perspective" "float fov" 50

@@ -1,4 +1,4 @@
-//! Colour spaces of pbrt scenes, and what their films and lights make of them.
+//! Colour spaces of pbrt scenes, and their effect on films and lights.
 
 use lumiris::film::PixelBounds;
 use lumiris::import::cache::FileCache;
@@ -13,7 +13,7 @@ fn loaded(head: &str, world: &str) -> Result<Loaded, String> {
     load_text(&text, "colors.pbrt", Path::new("."), &options, &FileCache::default()).map_err(|d| d.to_string())
 }
 
-/// The radiance of the one light.
+/// The radiance of the only light.
 fn light(world: &str) -> Rgb {
     match loaded("", world).unwrap().scene.lights.lights[0] {
         Light::InfiniteConstant { l } | Light::Distant { l, .. } => l,
@@ -31,7 +31,7 @@ fn lights_have_the_white_of_their_space_and_reflectances_are_grey_in_any() {
     // Green of Rec.2020, and D60 [SMPTE ST 2065-1], in Rec.709
     let (green, d60) = ([-0.5876, 1.1329, -0.1006], [1.047, 0.995, 0.915]);
     assert_near(light("ColorSpace \"rec2020\" LightSource \"infinite\" \"rgb L\" [ 0 1 0 ]"), green);
-    // The space of `Attribute` stays with its parameters
+    // `Attribute` parameters keep their colour space
     let stays = "ColorSpace \"rec2020\" Attribute \"light\" \"rgb L\" [ 0 1 0 ] ColorSpace \"srgb\" LightSource";
     assert_near(light(&format!("{stays} \"infinite\"")), green);
     assert_near(light(&format!("{stays} \"distant\"")), green);
@@ -69,7 +69,7 @@ fn films_have_the_window_of_pbrt_and_say_what_they_leave_out() {
     let window = |x0, x1, y0, y1| PixelBounds { x0, x1, y0, y1 };
     let crop = "\"float cropwindow\" [ 0.1 0.5 0.2 0.4 ]";
     assert_eq!(bounds(crop).0, window(10, 50, 10, 20));
-    // Ends in any order, and cut off
+    // Ends in any order, and clipped
     assert_eq!(bounds("\"float cropwindow\" [ 0.5 -3 0.4 2 ]").0, window(0, 50, 20, 50));
     let (both, warnings) = bounds(&format!("{crop} \"integer pixelbounds\" [ 0 7 0 9 ]"));
     assert!(both == window(10, 50, 10, 20) && warnings.contains("goes before `pixelbounds`"), "{both:?} {warnings}");

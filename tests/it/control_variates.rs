@@ -1,4 +1,4 @@
-//! `ocv` over pixels: it always has its control variates.
+//! `ocv` over pixels always applies its control variates.
 
 use lumiris::import::{LoadOptions, load};
 use lumiris::lights::LightSamplerKind;
@@ -11,8 +11,9 @@ use lumiris_numbers::math::luminance;
 use lumiris_numbers::samplers::SamplerKind;
 use std::sync::atomic::AtomicBool;
 
-/// A floor under as many lamps, one of which stands close to it.
+/// A floor under `lamps` lamps, one of which is close to it.
 fn floor(lamps: u32, resolution: [u32; 2]) -> RenderJob {
+    // Scene
     let [width, height] = resolution;
     let mut text = format!(
         r#"
@@ -28,6 +29,8 @@ Shape "bilinearmesh" "point3 P" [ -9 0 -9  9 0 -9  -9 0 9  9 0 9 ]
         let (x, y) = (1.5 * f64::from(i) - 2.0, 0.7 + f64::from(i));
         text += &format!("LightSource \"point\" \"point3 from\" [ {x} {y} 0.5 ]\n");
     }
+
+    // Settings
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("floor.pbrt");
     std::fs::write(&path, text).unwrap();
@@ -41,7 +44,7 @@ Shape "bilinearmesh" "point3 P" [ -9 0 -9  9 0 -9  -9 0 9  9 0 9 ]
     loaded.job(AccelKind::Embree, None).unwrap()
 }
 
-/// One lamp, of which columns know nothing that the net does not: nothing is gained, and it is `ocv` all the same.
+/// With one lamp, control variates gain nothing, but the estimator is still `ocv`.
 #[test]
 fn an_estimator_that_is_asked_for_by_name_is_not_another_one() {
     let mut job = floor(1, [192, 128]);
@@ -49,12 +52,13 @@ fn an_estimator_that_is_asked_for_by_name_is_not_another_one() {
     assert_eq!(job.settings().integrator.estimator, EstimatorKind::Ocv);
 }
 
-/// Pixels may have different numbers of samples, of which some have looks. Their means are those of `mis`: quarters of the image,
-/// two-sided z-tests of 2 × 64 images; 4.2 standard errors have a level of 2.7·10⁻⁵, so all together 10⁻⁴. A bias of 6.6, at most
-/// 3 %, is found with a probability above 0.99. And more of the noise is gone than by chance, which it would not be if controls were
-/// divided by other numbers than those of their pixels.
+/// Pixels may have different sample counts, some with extra emission rays. Their means equal those of `mis`. Two-sided
+/// z-tests for quarters of the image, with 2 × 64 images: 4.2 standard errors have a level of 2.7·10⁻⁵, 10⁻⁴ for all
+/// four. A bias of 6.6 standard errors, at most 3 %, is detected with a probability above 0.99. The noise must be
+/// lower, too; it would not be if controls were divided by sample counts of other pixels.
 #[test]
 fn different_numbers_of_samples_change_no_mean() {
+    // Images with different sample counts
     let resolution = [32, 24];
     let images = |estimator, seeds: std::ops::Range<u32>| {
         let mut job = floor(5, resolution);
@@ -74,6 +78,8 @@ fn different_numbers_of_samples_change_no_mean() {
         };
         seeds.map(image).collect::<Vec<_>>()
     };
+
+    // Means
     let (ocv, mis) = (images(EstimatorKind::Ocv, 0..64), images(EstimatorKind::Mis, 64..128));
     let area = ocv[0].len();
     for quarter in 0..4 {
@@ -86,6 +92,8 @@ fn different_numbers_of_samples_change_no_mean() {
         let what = format!("quarter {quarter}: {} by ocv, {} by mis, ± {error}", ocv.mean(), mis.mean());
         assert!((ocv.mean() - mis.mean()).abs() < 4.2 * error && 6.6 * error < 0.03 * mis.mean(), "{what}");
     }
+
+    // Noise
     let relative_variance = |images: &[Vec<f64>]| -> f64 {
         let of_pixel = |i: usize| images.iter().map(|image| image[i]).collect::<Welford>();
         (0..area).map(of_pixel).map(|w| w.variance() / w.mean().powi(2)).sum()
@@ -94,7 +102,7 @@ fn different_numbers_of_samples_change_no_mean() {
     assert!(corrected < 0.7 * alone, "{corrected} of {alone}");
 }
 
-/// Numbers of samples follow from a pilot whose samples are not corrected.
+/// Sample counts depend on a pilot whose samples are not corrected.
 #[test]
 fn control_variates_leave_adaptive_numbers() {
     let counts = |estimator| {

@@ -1,4 +1,4 @@
-//! Cryptomattes cost rays only where they are asked for.
+//! Cryptomattes cost rays only if they are requested.
 
 use lumiris::accel::bvh::Bvh;
 use lumiris::accel::{Accel, AccelStats, Coherence, Hit, RayBatch};
@@ -11,7 +11,7 @@ use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
-/// Counts the rays whose first hit is asked for.
+/// Counts the rays of closest-hit queries.
 struct Counting {
     bvh: Bvh,
     rays: Arc<AtomicU64>,
@@ -32,9 +32,10 @@ impl Accel for Counting {
     }
 }
 
-/// Tracing the camera rays of a finished image a second time was a fifth of the time of every render of direct light.
+/// Tracing the camera rays of a finished image again used to take a fifth of the time of every render of direct light.
 #[test]
 fn camera_rays_are_traced_once_if_no_cryptomatte_is_asked_for() {
+    // A ray tracer that counts
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/fan/box.pbrt");
     let options = LoadOptions { resolution: Some([16, 12]), ..LoadOptions::default() };
     let loaded = load(&path, &options).map_err(|d| d.to_string()).unwrap();
@@ -47,6 +48,7 @@ fn camera_rays_are_traced_once_if_no_cryptomatte_is_asked_for() {
     let settings = RenderSettings { spp: 4, ..RenderSettings::default() };
     let film = render(&job, &settings, &AtomicBool::new(false), &|_| ()).unwrap().film;
 
+    // Rays with and without Cryptomattes
     let camera_rays = 16 * 12 * 4;
     assert_eq!(rays.load(Ordering::Relaxed), camera_rays);
     assert!(cryptomattes(&job, &settings, &film, &[]).unwrap().is_empty());

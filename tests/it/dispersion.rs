@@ -1,6 +1,7 @@
-//! Dispersion: known answers by integrals over the wavelength, and that estimators and tracers agree.
+//! Dispersion: known answers from integrals over the wavelength, and agreement of estimators and tracers.
 //!
-//! t-tests over 32 images of different seeds, at a level of 10⁻⁵ for each channel; the bias that they would find is given.
+//! t-tests over 32 images of different seeds, at a level of 10⁻⁵ for each channel; each test states the bias that it
+//! detects.
 
 use crate::media::{BOX, assert_answer, assert_they_agree, choose, estimators, job, means};
 use lumiris::bsdfs::fresnel::fr_dielectric;
@@ -15,10 +16,10 @@ use lumiris_formats::spectra::{Spectrum, white_responses};
 use lumiris_numbers::math::{Rgb, Vec3};
 use std::path::Path;
 
-/// Indices that differ by a third, far more than those of any glass.
+/// Indices that differ by a third, far more than any glass's.
 const ETA: &str = r#""spectrum eta" [ 380 1.8  720 1.2 ]"#;
 
-/// All rays are the same, downwards at 45°.
+/// All rays are the same: downwards at 45°.
 fn camera(depth: u32) -> String {
     format!(
         r#"LookAt -1 0 1  0 0 0  0 0 1
@@ -33,7 +34,7 @@ fn camera(depth: u32) -> String {
     )
 }
 
-/// A rectangle at a height, whose normal points up or down.
+/// A horizontal pane whose normal points up or down.
 fn pane(z: f32, is_up: bool) -> String {
     let indices = if is_up { "0 1 2 0 2 3" } else { "0 2 1 0 3 2" };
     format!(
@@ -44,7 +45,7 @@ fn pane(z: f32, is_up: bool) -> String {
 
 const SIZE: usize = 32;
 
-/// A sky whose texels are all different.
+/// A sky with different texels everywhere.
 fn sky() -> Vec<Rgb> {
     let value = |i: usize| ((i * 7919 + 13) % 101) as f32 / 50.0;
     (0..SIZE * SIZE).map(|i| Rgb::new(value(i), value(i + 5), value(3 * i + 1))).collect()
@@ -55,13 +56,13 @@ fn load(folder: &Path, text: &str) -> RenderJob {
     loaded.map_err(|d| d.to_string()).unwrap().job(AccelKind::Embree, None).unwrap()
 }
 
-/// ∫ of the responses times what `of` gives for an index of refraction.
+/// ∫ of the responses times `of` over the index of refraction.
 fn over_wavelengths(of: impl Fn(f32) -> Rgb) -> [f64; 3] {
     let eta = Dispersion::new(&Spectrum::from_pairs(&[380.0, 1.8, 720.0, 1.2]).unwrap()).unwrap();
     let (lambda, responses) = white_responses();
     let mut sum = [0.0; 3];
     for (lambda, response) in lambda.zip(responses) {
-        // A response holds for a nm about its wavelength
+        // A response is valid within half a nm of its wavelength
         for i in 0..32 {
             let value = of(eta.eta(lambda as f32 + (i as f32 + 0.5) / 32.0 - 0.5));
             (0..3).for_each(|c| sum[c] += f64::from(response[c] * value[c]) / 32.0);
@@ -80,7 +81,7 @@ fn a_path_is_bent_by_its_wavelength_and_keeps_it() {
     let sin = 0.5_f32.sqrt();
     let (up, down) = (map.le(Vec3::new(sin, 0.0, sin)), map.le(Vec3::new(sin, 0.0, -sin)));
 
-    // One surface: a wavelength is seen in the direction that it is bent to
+    // One surface: every wavelength has its direction of refraction
     let mut one = load(folder.path(), &(camera(4) + &pane(0.0, true)));
     let answer = over_wavelengths(|eta| {
         let (r, x) = (fr_dielectric(sin, eta), sin / eta);
@@ -88,7 +89,7 @@ fn a_path_is_bent_by_its_wavelength_and_keeps_it() {
     });
     assert_answer(&mut one, 1024, answer, 0.05, "a surface");
 
-    // A sheet: what comes out of it goes on as it came
+    // A sheet: transmitted light has the direction of incidence
     let mut sheet = load(folder.path(), &(camera(64) + &pane(0.0, true) + &pane(-1.0, false)));
     let answer = over_wavelengths(|eta| {
         let r = fr_dielectric(sin, eta);
@@ -97,9 +98,10 @@ fn a_path_is_bent_by_its_wavelength_and_keeps_it() {
     assert_answer(&mut sheet, 1024, answer, 0.05, "a sheet");
 }
 
-/// Rough glass in the light of a lamp and of the sky: nobody knows the answer, but all agree on it.
+/// Rough glass in the light of a lamp and of the sky: the answer is unknown, but all estimators agree on it.
 #[test]
 fn estimators_and_tracers_agree_on_rough_dispersive_glass() {
+    // Scene
     let text = format!(
         r#"LookAt 2 1.5 2.4  0 0 0  0 1 0
         Camera "orthographic" "float screenwindow" [ -0.001 0.001 -0.001 0.001 ]
@@ -111,6 +113,8 @@ fn estimators_and_tracers_agree_on_rough_dispersive_glass() {
         Material "dielectric" "spectrum eta" "glass-SF11" "float roughness" 0.3
         {BOX}"#
     );
+
+    // Estimators
     let mut glass = job(&text, AccelKind::Embree);
     assert!(!allows(&glass, Feature::Sharing));
     let mut answers = Vec::new();
@@ -119,6 +123,8 @@ fn estimators_and_tracers_agree_on_rough_dispersive_glass() {
         answers.push((estimator, means(&mut glass, 128)));
     }
     assert_they_agree(&answers, 0.25);
+
+    // Tracers
     let both = [AccelKind::Embree, AccelKind::Bvh].map(|accel| means(&mut job(&text, accel), 4));
     assert_eq!(both[0], both[1]);
 }

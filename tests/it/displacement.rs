@@ -1,4 +1,4 @@
-//! Displaced meshes: surfaces that can be written down in another way, and errors.
+//! Displaced meshes: surfaces that can also be described without displacement, and errors.
 
 use lumiris::geometry::Shape;
 use lumiris::imaging::oiio::{Part, write_image};
@@ -19,7 +19,7 @@ LightSource "distant" "point3 from" [ 1 -1 3 ]
 Texture "ramp" "float" "bilerp" "float v00" 0 "float v01" 0 "float v10" 1 "float v11" 1
 "#;
 
-/// Over −1..1, at height 0.
+/// A square of −1..1 at height 0.
 const SHEET: &str = r#""point3 P" [ -1 -1 0  1 -1 0  1 1 0  -1 1 0 ] "point2 uv" [ 0 0  1 0  1 1  0 1 ] "integer indices" [ 0 1 2  0 2 3 ]"#;
 
 fn load(folder: &Path, world: &str) -> Result<Loaded, String> {
@@ -47,7 +47,7 @@ fn mesh(option: &str, folder: &Path, world: &str) -> (Vec<[f32; 3]>, usize) {
 #[test]
 fn a_sheet_on_a_ramp_is_a_slope() {
     let flat = format!("Shape \"trianglemesh\" {SHEET}");
-    // Half a unit for each of u, and the whole is scaled by 2 along z: a height of u, of two units of x
+    // Half a unit per u, and a scale by 2 along z: the height is u, with two units of x per u
     let bent = "AttributeBegin Scale 1 1 2\nTexture \"half\" \"float\" \"scale\" \"texture tex\" \"ramp\" \"float scale\" 0.5\n";
     let bent = format!("{bent}{flat} \"texture displacement\" \"half\" \"float edgelength\" 0.25\nAttributeEnd");
     let slope = flat.replace("-1 -1 0  1 -1 0  1 1 0", "-1 -1 0  1 -1 1  1 1 1");
@@ -59,7 +59,7 @@ fn a_sheet_on_a_ramp_is_a_slope() {
     let (same, other) = (differs(&bent_image, &slope_image), differs(&bent_image, &flat_image));
     assert!(same < 0.03 && other > 0.2, "{same} {other}");
 
-    // Edges are measured where the mesh stands
+    // Edges are measured in world space
     let (vertices, triangles) = mesh("", Path::new("."), &bent);
     assert!(triangles >= 2 * 64 && vertices.iter().all(|[x, _, z]| (z - (x + 1.0) * 0.5).abs() < 1e-5), "{triangles}");
     let (_, triangles) = mesh("Option \"displacementedgescale\" 8\n", Path::new("."), &bent);
@@ -104,6 +104,7 @@ fn wrong_displacements_are_errors_with_a_place() {
 
 #[test]
 fn every_texture_of_pbrt_is_read() {
+    // Valid textures
     let world = |class: &str| format!("Texture \"t\" {class}\nShape \"sphere\" \"float radius\" 0.5");
     for class in [
         "\"float\" \"fbm\" \"integer octaves\" 4 \"float roughness\" 0.6",
@@ -117,6 +118,8 @@ fn every_texture_of_pbrt_is_read() {
         let loaded = load(Path::new("."), &world(class)).unwrap();
         assert!(loaded.warnings.is_empty(), "{class}: {}", loaded.warnings);
     }
+
+    // Errors
     for (class, expected) in [
         ("\"float\" \"fbm\" \"integer octaves\" 99", "octaves must be from 0 to 30, not 99"),
         ("\"float\" \"marbel\"", "unknown texture class `marbel`"),

@@ -1,4 +1,4 @@
-//! Materials that can only be evaluated, from the scene file to the image.
+//! Evaluation-only materials, from the scene file to the image.
 
 use lumiris::bsdfs::ProposalDensity;
 use lumiris::import::{LoadOptions, Loaded, load};
@@ -78,14 +78,14 @@ fn integrators_take_proposals_and_density() {
     assert!(with("\"string bsdfdensity\" \"cosine\"").unwrap_err().contains("lobes, uniform"));
 }
 
-/// Means of the images of 12 seeds, per channel.
+/// Means of the images of 12 seeds, by channel.
 fn image_means(mut loaded: Loaded, proposals: u32, density: ProposalDensity) -> [Welford; 3] {
     loaded.settings.integrator.bsdf_proposals = proposals;
     loaded.settings.integrator.bsdf_density = density;
     let mut job = loaded.job(AccelKind::Embree, None).unwrap();
     let mut means = [Welford::default(); 3];
     for seed in 0..12 {
-        // Other seeds for other settings, so that the images are independent.
+        // Different seeds per setting, so that the images are independent
         job.change(|s| s.sampling.seed = seed + 100 * proposals + 50 * u32::from(density == ProposalDensity::Uniform));
         let settings =
             RenderSettings { threads: Some(1), spp: job.settings().sampling.spp, ..RenderSettings::default() };
@@ -106,7 +106,7 @@ const SETTINGS: [(u32, ProposalDensity); 4] = [
 
 #[test]
 fn a_closed_furnace_has_its_radiance_for_every_number_of_proposals() {
-    // L = 0.5 Σ ρ^k over the emission and four bounces.
+    // L = 0.5 Σ ρ^k over the emission and four bounces
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/analytic/furnace-evaluated.pbrt");
     let significance = sidak(1e-3, SETTINGS.len() * 3);
     for (proposals, density) in SETTINGS {
@@ -142,6 +142,7 @@ fn images_of_all_settings_have_one_mean() {
 
 #[test]
 fn proposals_are_for_what_can_only_be_evaluated() {
+    // Images with different numbers of proposals
     let text = |material: &str| {
         format!(
             "{HEAD}WorldBegin\nLightSource \"infinite\"\n{material}\nTranslate 0 0 1 Shape \"disk\" \"float radius\" 3 Shape \"sphere\" \"float radius\" 0.4"
@@ -156,6 +157,8 @@ fn proposals_are_for_what_can_only_be_evaluated() {
         let film = render(&job, &settings, &AtomicBool::new(false), &|_| ()).unwrap().film;
         film.pixels().iter().map(|p| p.mean()).collect::<Vec<_>>()
     };
+
+    // Only evaluation-only materials use proposals
     for (material, same) in [
         ("Material \"diffuse\"", true),
         ("Material \"conductor\" \"float roughness\" 0.1", true),

@@ -1,5 +1,5 @@
-//! Scenes far from the origin of their world, as maps in metres and models of the earth are: the images are those of the same
-//! scenes at the origin, to the bit where decimals and distances are fractions of powers of two.
+//! Scenes far from the origin of their world, such as maps in metres and models of the earth. The images equal those of
+//! the same scenes at the origin; they are bit-identical if coordinates and distances are fractions of powers of two.
 
 use lumiris::import::cache::FileCache;
 use lumiris::import::{LoadOptions, Loaded, load, load_text};
@@ -14,15 +14,15 @@ type Point = [f64; 3];
 const NEAR: Point = [0.0; 3];
 /// On the grid of origins: 10⁷ is 78125 · 128.
 const FAR: Point = [1e7, -4e6, 512_000.0];
-/// Beside that grid.
+/// Off that grid.
 const ODD: Point = [9_999_987.3, -4_000_011.9, 511_987.6];
 
-/// Numbers of points that are moved by `o`.
+/// Coordinates of points, translated by `o`.
 fn points(o: Point, at: &[Point]) -> String {
     at.iter().map(|p| format!("{} {} {}  ", p[0] + o[0], p[1] + o[1], p[2] + o[2])).collect()
 }
 
-/// What stands before the world: a camera at `o`.
+/// The directives before the world: a camera at `o`.
 fn head(o: Point) -> String {
     let view = points(o, &[[0.5, -5.0, 2.0], [0.25, 0.5, 0.5]]);
     format!(
@@ -33,22 +33,23 @@ fn head(o: Point) -> String {
     )
 }
 
-/// How a world comes to its place.
+/// A way to move a world.
 #[derive(Clone, Copy)]
 struct Way<'a> {
-    /// What points are moved by where they are numbers.
+    /// Offset of points that are given as numbers.
     o: Point,
-    /// The transformation of all but the corners of the portal.
+    /// Transformation of everything except the corners of the portal.
     place: &'a str,
-    /// What these are moved by: they are always in the world.
+    /// Offset of the portal's corners, which are always in world space.
     portal: Point,
-    /// True if textures of places stay in the world: moved by whole periods, they look the same.
+    /// True if 3D textures remain in world space: offsets by whole periods do not change them.
     world_textures: bool,
 }
 
 impl Way<'_> {
-    /// Lights, textures, a medium, shapes of each kind, and one that moves.
+    /// A world with lights, textures, a medium, one shape of each kind, and a moving shape.
     fn world(&self) -> String {
+        // Points
         let Way { o, place, .. } = *self;
         let p = |at: &[Point]| points(o, at);
         let floor = p(&[[-4.0, -4.0, 0.0], [4.0, -4.0, 0.0], [4.0, 6.0, 0.0], [-4.0, 6.0, 0.0]]);
@@ -60,6 +61,8 @@ impl Way<'_> {
         let single = [[-1.0, 2.0, 0.0], [1.0, 4.0, 2.0], [2.0, -2.0, 3.0], [-3.0, -2.0, 3.0], [-1.0, 1.0, 0.5]];
         let [fog0, fog1, lamp, from, to] = single.map(|at| p(&[at]));
         let [here, ball, fog] = [NEAR, [0.75, 1.5, 0.75], [0.0, 3.0, 1.0]].map(|at| format!("Translate {}", p(&[at])));
+
+        // Text
         let tiles = if self.world_textures { "" } else { here.as_str() };
         let window = points(self.portal, &[[-4.0, 8.0, 0.0], [4.0, 8.0, 0.0], [4.0, 8.0, 4.0], [-4.0, 8.0, 4.0]]);
         format!(
@@ -116,7 +119,7 @@ fn image(text: &str) -> Vec<f32> {
     rendered(loaded(text, Path::new(".")), AccelKind::Embree)
 }
 
-/// Fraction of the numbers that differ by more than rounding can make of a hit that is not at an edge.
+/// Fraction of the values that differ by more than the rounding error of a hit away from edges.
 fn others(a: &[f32], b: &[f32]) -> f64 {
     assert!(a.len() == b.len() && b.iter().any(|x| *x > 0.0));
     let differs = a.iter().zip(b).filter(|(a, b)| (*a - *b).abs() > 1e-3 * (a.abs() + b.abs()));
@@ -137,7 +140,7 @@ fn a_scene_has_the_same_image_wherever_it_is_and_however_it_comes_there() {
     let near = image(&(head(NEAR) + &way(NEAR, "", NEAR)));
     let matrix = format!("ConcatTransform [ 1 0 0 0  0 1 0 0  0 0 1 0  {} 1 ]", points(FAR, &[NEAR]));
     let there_and_back = format!("{} Scale 4 4 4 Scale 0.25 0.25 0.25 {}", translate(FAR), translate(back(FAR)));
-    // The transformation of a camera is that of the world to the camera
+    // The transformation of a camera maps world space to camera space
     let moved_head = head(NEAR).replace("\nCamera", &format!("\n{}\nCamera", translate(FAR)));
     let system = format!("{} CoordinateSystem \"far\" Identity CoordSysTransform \"far\"", translate(FAR));
     for (name, text) in [
@@ -161,6 +164,7 @@ fn a_scene_has_the_same_image_wherever_it_is_and_however_it_comes_there() {
 
 #[test]
 fn objects_have_the_same_image_wherever_they_are_defined_and_placed() {
+    // Scene with nested objects
     let lamp = |o: Point| {
         format!("LightSource \"point\" \"point3 from\" [ {} ] \"rgb I\" [ 20 20 20 ]\n", points(o, &[[2.0, -3.0, 4.0]]))
     };
@@ -188,6 +192,8 @@ fn objects_have_the_same_image_wherever_they_are_defined_and_placed() {
             format!("{} ObjectInstance \"outer\"\nTranslate 0 0 1 ObjectInstance \"inner\"\n", translate(placed));
         head(camera) + &lamp(camera) + &object(defined) + &places
     };
+
+    // Definitions and instances here and there
     for accel in [AccelKind::Embree, AccelKind::Bvh] {
         let image = |text: String| rendered(loaded(&text, Path::new(".")), accel);
         let near = image(scene(NEAR, NEAR, NEAR));
@@ -202,12 +208,15 @@ fn objects_have_the_same_image_wherever_they_are_defined_and_placed() {
     }
 }
 
-/// A PLY file of two triangles with points of type `ty`.
+/// A PLY file of two triangles, with points of type `ty`.
 fn ply(format: &str, ty: &str, at: &[Point; 4]) -> Vec<u8> {
+    // Header
     let header = format!(
         "ply\nformat {format} 1.0\nelement vertex 4\nproperty {ty} x\nproperty {ty} y\nproperty {ty} z\n\
          element face 2\nproperty list uchar int vertex_indices\nend_header\n"
     );
+
+    // Vertices and faces
     let faces = [[0, 1, 2], [0, 2, 3_i32]];
     let mut file = header.into_bytes();
     if format == "ascii" {
@@ -226,6 +235,7 @@ fn ply(format: &str, ty: &str, at: &[Point; 4]) -> Vec<u8> {
 
 #[test]
 fn ply_files_of_doubles_keep_them() {
+    // A sheet from a file
     let folder = tempfile::tempdir().unwrap();
     let sheet = |o: Point| {
         [[-2.0, 1.0, 0.25], [0.5, 0.5, 0.0], [2.0, 2.0, 1.5], [-1.0, 3.0, 2.0]]
@@ -239,6 +249,8 @@ fn ply_files_of_doubles_keep_them() {
         );
         rendered(loaded(&(head(o) + &world), folder.path()), AccelKind::Bvh)
     };
+
+    // Near and far
     let near = image(NEAR, "ascii");
     for format in ["ascii", "binary_big_endian"] {
         let far = image(FAR, format);
@@ -246,7 +258,7 @@ fn ply_files_of_doubles_keep_them() {
     }
 }
 
-/// A glTF file whose camera, light and meshes are below a node that stands at `o`.
+/// A glTF file whose camera, light and meshes are children of a node at `o`.
 fn gltf(o: Point, has_camera: bool) -> String {
     let o = o.map(|x| x.to_string()).join(",");
     let camera = if has_camera { r#","camera":0"# } else { "" };

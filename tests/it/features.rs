@@ -1,5 +1,5 @@
-//! What goes with what: each row of the table refuses by its own sentence, and whatever the table allows has the light of plain path
-//! tracing.
+//! Table of feature conflicts: each row refuses with its own sentence, and all allowed combinations have the light of
+//! plain path tracing.
 
 use lumiris::film::{Film, PixelSums};
 use lumiris::import::cache::FileCache;
@@ -18,7 +18,7 @@ use std::collections::HashMap;
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
-/// A scene in parts, with the settings of its paths.
+/// A scene in parts, with its integrator settings.
 #[derive(Clone)]
 struct Scene {
     before: String,
@@ -29,8 +29,9 @@ struct Scene {
 }
 
 impl Scene {
-    /// A corner with a ball of metal, below a lamp and a dim sky.
+    /// A corner with a metal ball, below a lamp and a dim sky.
     fn new() -> Scene {
+        // In a form that features can change
         Scene {
             before: String::new(),
             camera: r#""perspective" "float fov" 50 "float shutterclose" 1"#,
@@ -79,12 +80,12 @@ impl Scene {
         loaded.job(AccelKind::Embree, None).unwrap()
     }
 
-    /// What distinguishes scenes by plain paths.
+    /// Everything that distinguishes scenes rendered by plain paths.
     fn key(&self) -> String {
         format!("{:?}", (&self.before, self.camera, self.lamp, &self.shapes, self.settings))
     }
 
-    /// The same without anything but paths.
+    /// The same scene with plain paths only.
     fn plain(&self) -> Scene {
         let IntegratorSettings { kind, max_depth, .. } = self.settings;
         let base = Scene::new().settings;
@@ -93,7 +94,7 @@ impl Scene {
     }
 }
 
-/// A feature, and a scene with it; two features cannot both change the same.
+/// A feature, and a change that gives it to a scene. Two features never change the same part.
 type Entry = (&'static str, Feature, fn(&mut Scene));
 
 const ALL: &[Entry] = &[
@@ -170,7 +171,7 @@ fn film(job: &RenderJob, spp: u32) -> Result<Film, String> {
     rendering.map(|rendering| rendering.film).map_err(|error| error.to_string())
 }
 
-/// The sentence is that of the row, and what is excluded is refused, or left out with a warning.
+/// The message is the row's sentence. Conflicting settings are refused, or ignored with a warning.
 #[test]
 fn each_row_of_the_table_excludes_by_its_own_sentence() {
     let entry = |feature| ALL.iter().find(|entry| entry.1 == feature);
@@ -188,7 +189,7 @@ fn each_row_of_the_table_excludes_by_its_own_sentence() {
             if OPTIONAL.iter().any(|row| row.0 == feature) {
                 let warnings = prepare(&mut job, &Preparation::on(Some(1))).unwrap().warnings;
                 let is_said = warnings.iter().any(|warning| warning.ends_with(&sentence));
-                // Options that are of no use to an integrator have a warning of their own
+                // Options without effect on an integrator have another warning
                 assert!(
                     is_said || matches!(by, Feature::Integrator(_) | Feature::Fewer(2)),
                     "{sentence}: {warnings:?}"
@@ -207,7 +208,7 @@ fn each_row_of_the_table_excludes_by_its_own_sentence() {
     assert_eq!(pairs, 43, "a row is missing, or this number");
 }
 
-/// Means of the channels over images of these seeds, of all layers by lights if there are any.
+/// Means of the channels over images of these seeds, and of all light layers if there are any.
 fn means(scene: &Scene, seeds: std::ops::Range<u32>) -> [Welford; 3] {
     let mut job = scene.job();
     prepare(&mut job, &Preparation::on(Some(1))).unwrap();
@@ -224,14 +225,14 @@ fn means(scene: &Scene, seeds: std::ops::Range<u32>) -> [Welford; 3] {
     means
 }
 
-/// Two-sided t-tests of three channels of 169 pairs, at a level of 10⁻⁷ each: right images are rejected with a probability below
-/// 10⁻⁴. A bias of 30 % (10 % in `make test-power`) is found with a probability of 0.99.
+/// Two-sided t-tests of three channels of 169 pairs, at a level of 10⁻⁷ each: correct images are rejected with a
+/// probability below 10⁻⁴. A bias of 30 % (10 % in `make test-power`) is detected with a probability of 0.99.
 #[test]
 fn features_that_the_table_allows_have_the_light_of_plain_paths() {
     let count = by_power(48, 12);
     let freedom = u64::from(2 * count - 2);
     let (limit, deviation) = (critical_t(1e-7, freedom), detectable_deviation(1e-7, 0.99, freedom));
-    // The integrators are biased, and so is `correlated`, which weights its two estimates by the same samples
+    // These integrators are biased, and so is `correlated`, which weights its two estimates with the same samples
     let is_biased = |s: &IntegratorSettings| {
         matches!(s.kind, IntegratorKind::IrradianceCache | IntegratorKind::PhotonMap)
             || s.estimator == EstimatorKind::Correlated
@@ -245,7 +246,7 @@ fn features_that_the_table_allows_have_the_light_of_plain_paths() {
         let is_allowed = refusal(&job, &scene.settings).is_none() && pair.iter().all(works);
         (is_allowed && !is_biased(&scene.settings)).then(|| (format!("{}, {}", pair[0].0, pair[1].0), scene))
     };
-    // Not numbers of bounces and samples
+    // Without features that are numbers of bounces and samples
     let is_kind = |entry: &&Entry| !matches!(entry.1, Feature::Fewer(_) | Feature::OtherContinuation);
     let all: Vec<&Entry> = ALL.iter().filter(is_kind).collect();
     let pairs: Vec<[&Entry; 2]> =

@@ -1,4 +1,4 @@
-//! The smallest numbers of samples that settings may ask for, with every estimator.
+//! The smallest sample counts, with every estimator.
 
 use crate::path_reuse::{film, mean_of};
 use lumiris::import::{LoadOptions, load};
@@ -8,7 +8,7 @@ use lumiris::settings::{EstimatorKind, OcvForm, OptimalForm};
 use std::path::Path;
 use strum::VariantNames;
 
-/// Everything has an image of the same mean with one sample at a vertex, but for 4 standard errors.
+/// The mean of the image is the same with one sample per vertex, within 4 standard errors.
 #[test]
 fn one_sample_at_a_vertex_is_enough_for_every_estimator() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/analytic/half-environment.pbrt");
@@ -16,7 +16,7 @@ fn one_sample_at_a_vertex_is_enough_for_every_estimator() {
     let loaded = load(&path, &options).map_err(|d| d.to_string()).unwrap();
     let mut job = loaded.job(AccelKind::Embree, None).unwrap();
     let mut answers = Vec::new();
-    // What is biased is left out
+    // Without biased estimators
     let is_kept = |kind: &&&str| !["ocv", "correlated"].contains(kind);
     let kinds = EstimatorKind::VARIANTS.iter().filter(is_kept).map(|kind| (*kind, OcvForm::Pixels));
     let forms = [OcvForm::Pixels, OcvForm::Progressive].map(|form| ("ocv", form));

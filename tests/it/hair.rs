@@ -1,4 +1,4 @@
-//! Curves and hair: what the parser refuses, both ray tracers, and known answers.
+//! Curves and hair: parser errors, both ray tracers, and known answers.
 
 use lumiris::accel::bvh::Bvh;
 use lumiris::film::PixelSums;
@@ -31,7 +31,7 @@ fn job(world: &str, accel: AccelKind) -> RenderJob {
     try_load(world).unwrap().job(accel, None).unwrap()
 }
 
-/// Curves that cross each other, of all kinds, alone and in an instance.
+/// Curves of all kinds that cross each other, directly and in an instance.
 fn tangle(count: u32) -> String {
     let mut text = String::new();
     for i in 0..count {
@@ -77,7 +77,7 @@ fn all_bases_and_degrees_are_the_same_curve() {
             other => panic!("{other:?}"),
         }
     };
-    // The same straight line, at the same speed
+    // The same straight line with the same parametrisation
     let cubic = curve(r#""point3 P" [ 0 0 0  1 0 0  2 0 0  3 0 0 ]"#);
     let same = [
         r#""integer degree" 2 "point3 P" [ 0 0 0  1.5 0 0  3 0 0 ]"#,
@@ -139,8 +139,8 @@ fn mean_of_images(job: &mut RenderJob, estimator: EstimatorKind, seeds: u32, spp
 
 #[test]
 fn hair_without_absorption_vanishes_in_a_furnace() {
-    // Fibres lose nothing, so every path ends in light of 1. |t| < 5.2 with 31 degrees of freedom is a level of 10⁻⁵; the
-    // tolerance of 0.1 % is for paths cut at depth 200.
+    // Fibres lose nothing, so every path ends in light of radiance 1. |t| < 5.2 with 31 degrees of freedom has a level
+    // of 10⁻⁵. The tolerance of 0.1 % covers paths cut off at depth 200.
     let world = format!("Material \"hair\" \"rgb sigma_a\" [ 0 0 0 ]\n{}", tangle(40));
     let mut job = job(&world, AccelKind::Embree);
     for estimator in [EstimatorKind::Mc, EstimatorKind::Mis, EstimatorKind::Ris] {

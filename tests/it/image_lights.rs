@@ -1,4 +1,4 @@
-//! Goniometric and projection lights: known answers, in the frames of pbrt-v4, and errors with their places.
+//! Goniometric and projection lights: known answers, in the frames of pbrt-v4, and errors with their positions.
 
 use lumiris::imaging::oiio::{Part, write_image};
 use lumiris::import::cache::FileCache;
@@ -10,7 +10,7 @@ use std::f64::consts::PI;
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
-/// A floor of reflectance 0.5 in z = 0, of which the camera sees the point (0.3, 0.4).
+/// A floor of reflectance 0.5 in z = 0. The camera sees its point (0.3, 0.4).
 const FLOOR: &str = r#"
 LookAt 0.3 0.4 1  0.3 0.4 0  0 1 0
 Camera "orthographic" "float screenwindow" [ -0.001 0.001 -0.001 0.001 ]
@@ -23,13 +23,13 @@ Shape "trianglemesh" "point3 P" [ -9 -9 0  9 -9 0  9 9 0  -9 9 0 ] "integer indi
 Translate 0 0 3
 "#;
 
-/// From the light at (0, 0, 3): E/I, and the radiance for a reflectance of 0.5.
+/// Radiance of the floor for an intensity of the light at (0, 0, 3).
 fn radiance(intensity: f64) -> f64 {
     let squared = 0.25 + 9.0;
     0.5 / PI * intensity * (3.0 / f64::sqrt(squared)) / squared
 }
 
-/// A folder with images of two and of one row.
+/// A folder with images of two rows and of one row.
 fn folder() -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     let names = || ["R", "G", "B"].map(str::to_owned).to_vec();
@@ -56,17 +56,17 @@ fn mean(job: &RenderJob) -> f64 {
 #[test]
 fn points_get_the_light_of_their_texel() {
     let folder = folder();
-    // The first row is at the greatest y of the light, which a turn about x points away from y
+    // The first row is at the largest y of the light; the rotation about x reverses y
     let slide = |rest: &str| format!("Rotate 180 1 0 0\nLightSource \"projection\" \"string filename\" {rest}");
     let tan = f64::tan(PI / 6.0);
-    // The sum of all texels over their solid angles, which are alike
+    // The sum of the intensity of all texels times their solid angles, which are equal
     let solid_angle = 4.0 * f64::atan(tan * tan / f64::sqrt(1.0 + 2.0 * tan * tan));
     let sphere = |rest: &str| format!("LightSource \"goniometric\" \"string filename\" {rest}");
     let cases = [
         (slide("\"square.exr\" \"float fov\" 60"), 32.0),
         (slide("\"square.exr\" \"float fov\" 60 \"float scale\" 0.25"), 8.0),
         (slide("\"square.exr\" \"float fov\" 60 \"float power\" 10"), 32.0 * 10.0 / (15.0 * solid_angle)),
-        // The narrower side has the angle of view: 0.4/3 is inside of it, and not of half of that
+        // The narrower side has the field of view: 0.4/3 is inside, but not inside half of it
         (slide("\"wide.exr\" \"float fov\" 20"), 8.0),
         (slide("\"wide.exr\" \"float fov\" 10"), 0.0),
         // z of the image is y of the light

@@ -1,5 +1,5 @@
-//! The irradiance cache: known answers, agreement with `path`, the same bits, gradients, walls, and scenes with nothing
-//! in them.
+//! The irradiance cache: known answers, agreement with `path`, bit-identical images, gradients, light leaks, and empty
+//! scenes.
 
 use lumiris::film::Film;
 use lumiris::import::{LoadOptions, load};
@@ -17,7 +17,7 @@ use std::sync::atomic::AtomicBool;
 
 const CACHED: [Cached; 2] = [Cached::Indirect, Cached::All];
 
-/// A closed box of diffuse walls, lit by a panel below its ceiling.
+/// A closed box with diffuse walls, lit by a panel below its ceiling.
 const BOX: &str = r#"
 Camera "perspective"
 WorldBegin
@@ -36,7 +36,7 @@ Material "diffuse" "rgb reflectance" [ 0.1 0.6 0.1 ]
 Shape "trianglemesh" "point3 P" [ 1 0 -1  1 2 -1  1 2 1  1 0 1 ] "integer indices" [ 0 1 2 0 2 3 ]
 "#;
 
-/// A room of diffuse, coated, transmitting, metal and glass things, lit by a panel below its ceiling.
+/// A room with diffuse, coated, transmitting, metal and glass objects, lit by a panel below its ceiling.
 pub(crate) const ROOM: &str = r#"
 LookAt 0 1 3.9  0 0.9 0  0 1 0
 Camera "perspective" "float fov" [ 38 ]
@@ -93,7 +93,7 @@ fn with_cache(s: &mut Settings, cached: Cached) {
     s.integrator.cache.cached = cached;
 }
 
-/// Mean luminance of squares of pixels, row by row.
+/// Mean luminance of squares of `size` × `size` pixels, row by row.
 pub(crate) fn squares(film: &Film, size: u32) -> Vec<f64> {
     let mut sums = Vec::new();
     let of_film = film.pixels();
@@ -107,8 +107,9 @@ pub(crate) fn squares(film: &Film, size: u32) -> Vec<f64> {
 
 #[test]
 fn a_room_of_all_materials_agrees_with_path_tracing() {
-    // No more than 5 % off in any square of 8 × 8 pixels and 1.5 % in the mean, of which 1 % and 0.3 % are noise; 6 % and 1.8 % in
-    // `make test`. Light counted twice or lost at a coat, in a mirror or through glass is 4 % and more.
+    // Allowed errors: 5 % in any square of 8 × 8 pixels and 1.5 % in the mean, of which 1 % and 0.3 % are noise; 6 %
+    // and 1.8 % in `make test`. Light counted twice, or lost at a coat, in a mirror or through glass, would make 4 %
+    // and more
     let path = world_of(ROOM, |s| s.integrator.samples = Some(4));
     let reference =
         squares(&rendering(&path, RenderSettings { spp: by_power(768, 512), ..Default::default() }).film, 8);
@@ -149,6 +150,7 @@ fn bits(film: &Film) -> Vec<u32> {
 
 #[test]
 fn threads_tiles_and_packets_do_not_change_a_bit() {
+    // Images for cache contents and estimators
     for (cached, estimator) in
         [(Cached::Indirect, EstimatorKind::Mis), (Cached::All, EstimatorKind::Ris), (Cached::All, EstimatorKind::Ocv)]
     {
@@ -165,6 +167,8 @@ fn threads_tiles_and_packets_do_not_change_a_bit() {
             let r = rendering(&job(width), settings);
             (bits(&r.film), r.cache.unwrap().records)
         };
+
+        // Packet widths, threads and tiles
         let reference = image(None, 1, 16);
         assert!(reference.1 > 100);
         for (width, threads, tile_size) in [
@@ -196,11 +200,11 @@ fn seeds_give_different_records() {
     assert_ne!(image(3), image(4));
 }
 
-/// A change of the settings, by name, and the relative bias that it has at most.
+/// A change of the settings, with its name and the upper bound of its relative bias.
 type Choice = (&'static str, f64, fn(&mut lumiris::settings::IntegratorSettings));
 
-/// Those that fit their coefficients to the eight samples of an estimate are biased: −6 % and −9 % were measured of
-/// those with a limit, ± 0.2 %.
+/// Estimators for records. Forms that fit their coefficients to the eight samples of an estimate are biased: those with
+/// a bound measured −6 % and −9 %, ± 0.2 %.
 const RECORD_ESTIMATORS: [Choice; 7] = [
     ("mc", 0.0, |s| s.estimator = EstimatorKind::Mc),
     ("ris", 0.0, |s| s.estimator = EstimatorKind::Ris),
@@ -251,7 +255,7 @@ fn records_take_any_estimator() {
     assert!(faults.is_empty(), "{}", faults.join("\n"));
 }
 
-/// A point of the floor of [`ROOM`], or of a scene whose floor is z = 0.
+/// A request for a record at a point with a normal.
 fn wanted(p: Vec3, n: Vec3) -> RecordRequest {
     RecordRequest {
         p,
@@ -266,9 +270,10 @@ fn wanted(p: Vec3, n: Vec3) -> RecordRequest {
     }
 }
 
-/// Gradients of the irradiance at `p` against differences of the irradiance at `p ± h t`, relative to the length of the
-/// former.
+/// Compares gradients of the irradiance at `p` with differences of the irradiance at `p ± h t`. The tolerance is
+/// relative to the length of the gradient.
 fn assert_gradients(job: &RenderJob, p: Vec3, n: Vec3, h: f32, tolerance: f32) {
+    // Central differences along both tangents
     let mut gatherer = Gatherer::default();
     let mut at = |p: Vec3, n: Vec3| gatherer.records(job, &[wanted(p, n)])[0].light;
     let here = at(p, n);
@@ -276,6 +281,8 @@ fn assert_gradients(job: &RenderJob, p: Vec3, n: Vec3, h: f32, tolerance: f32) {
     for t in [x, y] {
         let (ahead, behind) = (at(p + t * h, n), at(p - t * h, n));
         let (up, down) = (at(p, (n + t * h).normalize()), at(p, (n - t * h).normalize()));
+
+        // Translation and rotation gradients
         for c in 0..3 {
             let expected = (ahead.e[c] - behind.e[c]) / (2.0 * h);
             let (found, scale) = (here.translation[c].dot(t), here.translation[c].length());
@@ -318,8 +325,8 @@ fn gradients_of_indirect_light_are_finite_differences() {
 
 #[test]
 fn light_does_not_leak_through_a_thin_wall() {
-    // Two rooms with one floor z = 0 and a wall at x = 0 of no thickness; light in the one at x > 0 only. The camera
-    // looks down from below the ceilings.
+    // Two rooms with one floor z = 0 and an infinitely thin wall at x = 0. Only the room in x > 0 is lit. The camera
+    // looks down from below the ceilings
     const ROOMS: &str = r#"
 LookAt 0 0 0.5  0 0 0  0 1 0
 Camera "orthographic" "float screenwindow" [ -0.5 0.5 -0.5 0.5 ]
@@ -345,13 +352,13 @@ Shape "trianglemesh" "point3 P" [ -1 1 0  1 1 0  1 1 1  -1 1 1 ] "integer indice
         let film = rendering(&job, RenderSettings { spp: 4, ..Default::default() }).film;
         let pixels = film.pixels();
         let column = |x: u32| (0..40).map(|y| pixels[film.index(x, y)].mean()[1]).sum::<f64>() / 40.0;
-        // On the screen, x is to the left or to the right; the bright side tells
+        // x may point to the left or to the right on the screen; the bright side decides
         let mut columns: Vec<f64> = (0..40).map(column).collect();
         if columns[0] > columns[39] {
             columns.reverse();
         }
         assert!(columns[39] > 0.1 && columns[21] > 0.1, "{columns:?}");
-        // Two pixels, within the least reach, may see records across
+        // Two pixels, within the minimum radius, may use records across the wall
         assert!(columns[..18].iter().all(|&l| l == 0.0), "{cached:?}: {columns:?}");
         assert!(columns[18] + columns[19] < 0.2 * columns[21], "{cached:?}: {columns:?}");
     }

@@ -1,4 +1,4 @@
-//! Cameras with lenses: what they see, and what is wrong with their files.
+//! Cameras with lenses: images, and errors in their files.
 
 use lumiris::imaging::oiio::{Part, write_image};
 use lumiris::import::cache::FileCache;
@@ -24,7 +24,7 @@ fn load(folder: &Path, camera: &str, world: &str) -> Result<Loaded, String> {
     load_text(&text, "lens.pbrt", folder, &LoadOptions::default(), &FileCache::default()).map_err(|d| d.to_string())
 }
 
-/// Red of each pixel.
+/// The red channel of each pixel.
 fn image(camera: &str, world: &str) -> Vec<f64> {
     let job = load(&demo(), camera, world).unwrap().job(AccelKind::Embree, None).unwrap();
     let settings = RenderSettings { spp: 256, with_features: false, with_replicas: false, ..RenderSettings::default() };
@@ -36,13 +36,13 @@ const SKY: &str = "LightSource \"infinite\" \"rgb L\" [ 1 1 1 ]\n";
 
 #[test]
 fn a_distant_square_is_where_a_pinhole_sees_it() {
-    // Above the axis, and to the left of it
+    // Above the axis, and to its left
     let square = "AreaLightSource \"diffuse\" \"rgb L\" [ 1 1 1 ]\nMaterial \"diffuse\"\n\
                   Shape \"bilinearmesh\" \"point3 P\" [ 0 22.5 203  -40 22.5 203  0 42.5 203  -40 42.5 203 ]\n";
     let stop = "\"float aperturediameter\" 1 \"float focusdistance\" 200";
     let lens = format!("\"realistic\" \"string lensfile\" \"double-gauss.dat\" {stop}");
     let (seen, sky) = (image(&lens, square), image(&lens, SKY));
-    // The angle of 24 mm at the focal length
+    // The field of view of 24 mm at the focal length
     let fov = 2.0 * (12.0_f64 / 50.0).atan().to_degrees();
     let pinhole = image(&format!("\"perspective\" \"float fov\" {fov}"), square);
     let moments = |of: &dyn Fn(usize) -> f64| {
@@ -58,19 +58,20 @@ fn a_distant_square_is_where_a_pinhole_sees_it() {
 #[test]
 fn an_even_sky_gives_the_irradiance_of_the_stop() {
     let sky = image("\"realistic\" \"string lensfile\" \"double-gauss.dat\" \"float aperturediameter\" 8.55", SKY);
-    // f/4: half of the diameter that makes f/2
+    // f/4: half of the diameter for f/2
     let [middle, corner] = [sky[20 * 60 + 30], sky[0]];
     assert!((middle / (PI / 64.0) - 1.0).abs() < 0.1, "{middle}");
-    // Without a diameter, the stop is 1 mm wide, as in pbrt-v4
+    // Without a diameter, the aperture stop is 1 mm wide, as in pbrt-v4
     let narrow = image("\"realistic\" \"string lensfile\" \"double-gauss.dat\"", SKY)[20 * 60 + 30];
     assert!((middle / narrow / 8.55_f64.powi(2) - 1.0).abs() < 0.05, "{middle} {narrow}");
-    // Less towards the corners: cos⁴θ for 43.27/2 mm at 50 mm, and what the rims take
+    // Darker towards the corners: cos⁴θ for 43.27/2 mm at 50 mm, and vignetting
     let cos4 = (1.0 + (21.6_f64 / 50.0).powi(2)).powi(-2);
     assert!(corner / middle < cos4 * 1.1 && corner / middle > 0.3 * cos4, "{corner} {middle}");
 }
 
 #[test]
 fn wrong_lenses_are_errors_with_a_place() {
+    // Files
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("odd.dat"), "1 2 1.5 3\n4 5 # rest\n").unwrap();
     std::fs::write(folder.path().join("word.dat"), "1 2 1.5x 3\n").unwrap();
@@ -79,6 +80,8 @@ fn wrong_lenses_are_errors_with_a_place() {
     write_image(&folder.path().join("stop.exr"), &[grey]).unwrap();
     let try_load =
         |rest: &str| load(folder.path(), &format!("\"realistic\" {rest}"), SKY).map(|l| l.warnings.to_string());
+
+    // Errors
     for (rest, expected) in [
         ("", "needs `string lensfile`"),
         ("\"string lensfile\" \"gone.dat\"", "gone.dat"),
@@ -92,6 +95,8 @@ fn wrong_lenses_are_errors_with_a_place() {
         let error = try_load(rest).unwrap_err();
         assert!(error.contains(expected) && error.contains("lens.pbrt:2:"), "{rest}: {error}");
     }
+
+    // Warnings
     let wide = "\"string lensfile\" \"good.dat\" \"float aperturediameter\" 90 \"string aperture\" \"stop.exr\"";
     assert!(try_load(wide).unwrap().contains("17.1 mm at most"));
 }

@@ -1,4 +1,4 @@
-//! Layers of the image by groups of lights: they add up to the image, and each has the light of its group alone.
+//! Layers of the image by light group: they add up to the image, and each has the light of its group.
 
 use lumiris::film::{Film, PixelBounds, PixelSums};
 use lumiris::import::cache::FileCache;
@@ -15,8 +15,8 @@ use std::sync::atomic::AtomicBool;
 /// Edge of the images (pixels).
 const EDGE: u32 = 12;
 
-/// Lights of the scene by group: an area light that paths meet, deltas, and infinite lights, which overlap, one of them
-/// through a portal.
+/// Lights of the scene by group: an area light that paths can hit, delta lights, and overlapping infinite lights, one
+/// of them with a portal.
 const LIGHTS: [(&str, &str); 4] = [
     (
         "key",
@@ -42,7 +42,7 @@ const LIGHTS: [(&str, &str); 4] = [
     ),
 ];
 
-/// Surfaces of all kinds: plain ones, textured ones, a mirror, glass, and a coat.
+/// Surfaces of all kinds: plain, textured, a mirror, glass, and a coat.
 const SURFACES: &str = r#"
 LookAt 0 1.6 -5  0 0.6 0  0 1 0  Camera "perspective" "float fov" 45
 Film "rgb" "integer xresolution" 12 "integer yresolution" 12 "string filename" "groups.exr"
@@ -60,7 +60,7 @@ Material "coateddiffuse" "rgb reflectance" [0.2 0.5 0.2]
 AttributeBegin Translate 0.3 0.3 -1 Shape "sphere" "float radius" 0.3 AttributeEnd
 "#;
 
-/// With the light of all groups, or of one; all surfaces remain.
+/// The scene with the light of all groups or of one group. All surfaces remain.
 fn job(group: Option<&str>) -> RenderJob {
     let mut text = SURFACES.to_owned();
     for (name, lights) in LIGHTS {
@@ -77,7 +77,7 @@ fn film(job: &RenderJob, spp: u32) -> Film {
     render(job, &RenderSettings { spp, ..RenderSettings::default() }, &AtomicBool::new(false), &|_| ()).unwrap().film
 }
 
-/// Estimators with layers: vertices in columns and in stages, BSDF samples that are the next segment and others.
+/// Estimators with layers: vertices in columns and in stages, and BSDF samples that continue the path or do not.
 const METHODS: [(IntegratorKind, EstimatorKind, u32); 7] = [
     (IntegratorKind::Direct, EstimatorKind::Mc, 2),
     (IntegratorKind::Direct, EstimatorKind::Mis, 4),
@@ -95,7 +95,7 @@ fn choose(job: &mut RenderJob, (kind, estimator, samples): (IntegratorKind, Esti
     });
 }
 
-/// As many samples in all pixels, of which some have several looks.
+/// The same sample count in all pixels, with extra emission rays in some of them.
 fn split(spp: u32) -> PixelSamples {
     let (bounds, pixels) = (PixelBounds { x0: 0, x1: EDGE, y0: 0, y1: EDGE }, (EDGE * EDGE) as usize);
     let looks = (0..pixels).map(|i| [1, 6][i % 2]).collect();
@@ -104,6 +104,7 @@ fn split(spp: u32) -> PixelSamples {
 
 #[test]
 fn layers_add_up_to_the_image_and_leave_its_bits() {
+    // Layers of every method
     let mut job = job(None);
     job.pixel_samples = Some(split(4));
     for method in METHODS {
@@ -112,6 +113,8 @@ fn layers_add_up_to_the_image_and_leave_its_bits() {
         let with = film(&job, 4);
         let names: Vec<&str> = with.light_layers().iter().map(|(name, _)| name.as_str()).collect();
         assert_eq!(names, LIGHTS.map(|(name, _)| name), "{method:?}");
+
+        // Sums of the layers
         let mut sums = vec![[0.0; 3]; with.len()];
         for (_, layer) in with.light_layers() {
             let pixels = layer.pixels();
@@ -123,6 +126,8 @@ fn layers_add_up_to_the_image_and_leave_its_bits() {
                 assert!((sum - whole).abs() <= 1e-5 * whole + 1e-7, "{method:?}: {sum} {whole}");
             }
         }
+
+        // The image without layers
         job.change(|s| s.integrator.light_groups = false);
         let without = film(&job, 4);
         assert!(without.light_layers().is_empty());
@@ -132,11 +137,13 @@ fn layers_add_up_to_the_image_and_leave_its_bits() {
     }
 }
 
-/// A layer has the mean that the image has with its lights alone. 8 methods × 4 groups × 3 channels, two-sided t-tests over
-/// 2 × 24 images: with at least 23 degrees of freedom a t of 5.5 has a level of 1.4·10⁻⁵, so all together 1.3·10⁻³. A bias of
-/// 8.5 standard errors is found with a probability above 0.99; it is at most 55 % of the mean of the dimmest layer.
+/// The mean of a layer equals the mean of the image with only its lights. 8 methods × 4 groups × 3 channels, two-sided
+/// t-tests over 2 × 24 images: with at least 23 degrees of freedom, t = 5.5 has a level of 1.4·10⁻⁵, 1.3·10⁻³ for all
+/// tests. A bias of 8.5 standard errors is detected with a probability above 0.99; it is at most 55 % of the mean of
+/// the dimmest layer.
 #[test]
 fn a_layer_has_the_light_of_its_group_alone() {
+    // Means of images
     let images = 24;
     let mean = |pixels: &[PixelSums]| {
         [0, 1, 2].map(|c| pixels.iter().map(|p| p.mean()[c]).sum::<f64>() / f64::from(EDGE * EDGE))
@@ -150,6 +157,8 @@ fn a_layer_has_the_light_of_its_group_alone() {
         let mean = values.iter().map(|v| v[c]).sum::<f64>() / n;
         (mean, values.iter().map(|v| (v[c] - mean).powi(2)).sum::<f64>() / (n - 1.0) / n)
     };
+
+    // Layers against images with one group
     let mut all = job(None);
     all.pixel_samples = Some(split(16));
     let mut of_lights = LIGHTS.map(|(group, _)| job(Some(group)));

@@ -1,4 +1,4 @@
-//! Light paths that bring caustics: the light of every pixel, its noise, and bits.
+//! Light paths for caustics: light of every pixel, noise, and bit-identical images.
 
 use crate::path_reuse::{film, image_of_seed, mean_of, pixel_means};
 use crate::same_light::assert_same_light;
@@ -12,8 +12,8 @@ use lumiris::scene::{AccelKind, PixelSamples, RenderJob};
 use lumiris::settings::{EstimatorKind, IntegratorKind};
 use std::path::Path;
 
-/// A ball of glass, a ball of metal that is a little rough, and a sheet of glass, on a floor, before a wall; lamps, one of
-/// which is a rectangle with two sides, and a dim sky. The lamps are so large that camera paths find them.
+/// A ball of glass, a ball of slightly rough metal, and a sheet of glass, on a floor in front of a wall. Lamps, one of
+/// which is a two-sided rectangle, and a dim sky. The lamps are large enough for camera paths to find them.
 const BALLS: &str = r#"
 LookAt 0 2 -5  0 0.6 0  0 1 0
 Camera "perspective" "float fov" 40 LENS
@@ -79,7 +79,7 @@ impl Scene {
     }
 }
 
-/// A wall that has all its light from metal, and so many light paths for each camera sample.
+/// A wall lit only via metal, with `light_paths` light paths per camera sample.
 pub(crate) fn caustics(light_paths: f32) -> RenderJob {
     let text = BOUNCED.replace("FLOOR", r#""conductor" "float roughness" 0.02"#).replace("WALL", r#""diffuse""#);
     let kept: Vec<&str> = text.lines().filter(|line| !line.starts_with("Texture")).collect();
@@ -93,7 +93,7 @@ pub(crate) fn caustics(light_paths: f32) -> RenderJob {
     job
 }
 
-/// Samples beyond 2²⁰ have the light of light paths as well, which is most of the light here.
+/// Samples beyond 2²⁰ have the light of light paths, too, which is most of the light here.
 #[test]
 fn samples_of_any_number_have_their_light_paths() {
     let mut job = caustics(4.0);
@@ -110,18 +110,19 @@ fn samples_of_any_number_have_their_light_paths() {
     assert!((first - later).abs() < 4.0 * error && 8.0 * error < 0.2 * first, "{first} {later} ± {error}");
 }
 
-/// From half of the mean number of samples to four times as many, in no order.
+/// Sample counts from half of the mean to four times the mean, in no order.
 fn different_numbers(job: &RenderJob, spp: u32) -> PixelSamples {
     let bounds = job.world.scene.film.bounds;
     let counts = (0..bounds.area() as u32).map(|i| (spp / 2) << (i * 7 / 3 % 4)).collect();
     PixelSamples { bounds, spp, counts, looks: Vec::new() }
 }
 
-/// Light paths and camera paths share the light; light over metal and glass would be there twice or not at all. Few and many
-/// light paths, coats that are rough and smooth, rough metal, a lens, a filter with negative lobes, other numbers of samples, and
-/// paths that pixels share.
+/// Light paths and camera paths divide the light between them: light via metal and glass must be neither lost nor
+/// counted twice. Few and many light paths, rough and smooth coats, rough metal, a lens, a filter with negative lobes,
+/// different sample counts, and shared paths.
 #[test]
 fn images_have_the_light_that_they_have_without_light_paths() {
+    // Scenes
     let lanczos = r#""sinc" "float xradius" 2 "float yradius" 2"#;
     let lens = r#""float lensradius" 0.15 "float focaldistance" 4"#;
     for (name, scene, per_sample, edge, differ) in [
@@ -131,6 +132,7 @@ fn images_have_the_light_that_they_have_without_light_paths() {
         ("metal, a filter with negative lobes", Scene { floor: METAL, filter: lanczos, ..SCENE }, 2.0, 1, false),
         ("shared paths", SCENE, 4.0, 3, true),
     ] {
+        // With and without light paths
         let image = |light_paths: f32| {
             let mut job = scene.job(light_paths, [16, 12]);
             job.change(|s| (s.integrator.samples, s.integrator.path_reuse) = (Some(3), Some(edge)));
@@ -142,7 +144,7 @@ fn images_have_the_light_that_they_have_without_light_paths() {
     }
 }
 
-/// A wall that has all its light from a lamp over metal below both: the camera sees the wall alone.
+/// A wall lit only by a lamp via the metal below both. The camera sees only the wall.
 const BOUNCED: &str = r#"
 LookAt 0 2 -4  0 2 0  0 1 0
 Camera "perspective" "float fov" 30
@@ -164,12 +166,13 @@ Material WALL
 Shape "bilinearmesh" "point3 P" [ -4 0.8 1.6  4 0.8 1.6  -4 4 1.6  4 4 1.6 ]
 "#;
 
-/// Materials that vary from point to point, by textures that are filtered over whole pixels, by bumps, and by mixtures that
-/// both draw anew for each direction: light paths and camera paths agree on what makes caustics, and on the directions and
-/// weights of its scattering, so all light is there once. The mean of the image is the same but for noise, which is 6 % at
-/// most at 4 standard errors (10⁻⁴).
+/// Materials that vary from point to point: textures filtered over whole pixels, bumps, and mixtures that are drawn
+/// anew for each direction. Light paths and camera paths must agree on which materials make caustics, and on the
+/// directions and weights of their scattering, so that all light is counted once. The mean of the image must be the
+/// same within 4 standard errors (10⁻⁴), at most 6 %.
 #[test]
 fn materials_that_vary_send_all_light_on_once() {
+    // Materials
     const METAL: &str = r#""conductor" "float roughness" 0.02"#;
     const PAINT: &str = r#""diffuse" "rgb reflectance" [ 0.6 0.5 0.4 ]"#;
     const CHIPPED: &str = r#""mix" "string materials" [ "paint" "metal" ] "float amount" 0.6"#;
@@ -181,6 +184,8 @@ fn materials_that_vary_send_all_light_on_once() {
     let worn = (0..64 * 64).map(|i| if (i / 64 + i) % 2 == 0 { 0.001 } else { 0.2 }).collect();
     let worn = Part::display(64, 64, vec!["Y".to_owned()], worn);
     write_image(&folder.path().join("worn.exr"), &[worn]).unwrap();
+
+    // With and without light paths
     for (floor, wall) in [(BUMPED, PAINT), (METAL, CHIPPED), (WORN, PAINT), (CHIPPED, CHIPPED), (COPPER, PAINT)] {
         let text = BOUNCED.replace("FLOOR", floor).replace("WALL", wall);
         let [without, with] = [(0.0, 0..48), (4.0, 1000..1048)].map(|(light_paths, seeds)| {
@@ -194,6 +199,8 @@ fn materials_that_vary_send_all_light_on_once() {
             let images = pixel_means(&mut job, seeds, 64);
             mean_of(images.iter().map(|image| image.iter().sum::<f64>()))
         });
+
+        // Means
         let ((a, v_a), (b, v_b)) = (without, with);
         let error = (v_a + v_b).sqrt();
         let what = format!("{floor}, {wall}: {b} with and {a} without, ± {error}");
@@ -201,7 +208,7 @@ fn materials_that_vary_send_all_light_on_once() {
     }
 }
 
-/// With a small lamp the relative variance of the whole image, of which caustics are a part, is less than 1/1.3.
+/// With a small lamp, the relative variance of the whole image, including its caustics, falls below 1/1.3.
 #[test]
 fn light_paths_leave_little_of_the_noise_of_a_small_lamp() {
     let pairs = |light_paths| {

@@ -1,5 +1,5 @@
-//! Looks: samples that see lights by more camera rays than their own. They change no mean, and lower the noise at the edges of
-//! lights.
+//! Extra emission rays (looks): camera rays that measure only the emission. They change no mean, and lower the noise at
+//! the edges of lights.
 
 use crate::path_reuse::image_of_seed;
 use crate::same_light::assert_same_light;
@@ -19,7 +19,7 @@ use std::sync::atomic::AtomicBool;
 /// Edge of the images (pixels).
 const EDGE: u32 = 12;
 
-/// A camera that sees a lamp, through glass and in a mirror too, before a sky of two lights.
+/// The camera sees a lamp directly, through glass and in a mirror, in front of a sky of two lights.
 const CAMERA: &str = r#"
 LookAt 0 1 -5  0 0.8 0  0 1 0  Camera "perspective" "float fov" 40
 Film "rgb" "integer xresolution" 12 "integer yresolution" 12
@@ -41,12 +41,12 @@ const GLASS: &str = r#"
 Material "dielectric"
 AttributeBegin Translate -0.6 0.9 -0.6 Shape "sphere" "float radius" 0.5 AttributeEnd
 "#;
-/// The camera is in mist.
+/// Mist around the camera.
 const MIST: &str = r#"
 MakeNamedMedium "mist" "string type" "homogeneous" "rgb sigma_a" [0.02 0.03 0.04] "rgb sigma_s" [0.08 0.08 0.08]
 MediumInterface "" "mist"
 "#;
-/// A cloud that glows.
+/// A glowing cloud.
 const CLOUD: &str = r#"
 MakeNamedMedium "glow" "string type" "uniformgrid" "integer nx" 2 "integer ny" 2 "integer nz" 2
   "float density" [1 0 2 1 0.5 1 1 3] "rgb sigma_a" [0.6 0.6 0.6] "rgb sigma_s" [0.5 0.5 0.5]
@@ -71,7 +71,7 @@ fn film(job: &RenderJob, spp: u32) -> Film {
     render(job, &settings, &AtomicBool::new(false), &|_| ()).unwrap().film
 }
 
-/// As many samples everywhere, with other numbers of looks in each pixel.
+/// The same sample count everywhere, with different numbers of looks per pixel.
 fn split(spp: u32, looks: &[u8]) -> PixelSamples {
     let bounds = lumiris::film::PixelBounds { x0: 0, x1: EDGE, y0: 0, y1: EDGE };
     let pixels = (EDGE * EDGE) as usize;
@@ -83,8 +83,8 @@ fn split(spp: u32, looks: &[u8]) -> PixelSamples {
     }
 }
 
-/// Looks whose numbers differ from pixel to pixel, beside none: in air and mist, with a lens and motion, by every estimator that has
-/// them, in direct light, in paths of their own and shared ones, and beside light paths.
+/// Compares different numbers of looks per pixel with none: in air and mist, with a lens and motion, for every
+/// estimator that supports them, in direct light, with separate and shared paths, and with light paths.
 #[test]
 fn looks_change_no_mean() {
     const SPP: u32 = 16;
@@ -99,7 +99,7 @@ fn looks_change_no_mean() {
     };
     let direct: Change = |job| job.change(|s| s.integrator.kind = IntegratorKind::Direct);
     let in_air = || job(&[CAMERA, LAMP, SURFACES, GLASS]);
-    // A lens, motion, and the colours of the film
+    // A lens, motion, and film colours
     let moving = || {
         let camera = CAMERA
             .replace(
@@ -144,7 +144,7 @@ fn looks_change_no_mean() {
 fn looks_lower_the_noise_of_visible_lights_and_images_state_what_is_left() {
     let mut job = job(&[CAMERA, LAMP]);
     job.change(|s| (s.integrator.kind, s.integrator.estimator) = (IntegratorKind::Direct, EstimatorKind::Mis));
-    // Between images, and as these state it
+    // The variance between images, and the stated variance
     let mut variances = |looks: u8| {
         job.pixel_samples = Some(split(16, &[looks]));
         let mut of_pixels = vec![Welford::default(); (EDGE * EDGE) as usize];
@@ -173,7 +173,7 @@ fn adaptive_images_look_more_often_at_the_edges_of_lights() {
     });
     prepare(&mut job, &Preparation::on(Some(2))).unwrap();
     let looks = job.pixel_samples.clone().expect("numbers that differ").looks;
-    // Where the lamp is seen in a part of the pixel, without what it lights
+    // Pixels partly covered by the lamp, without the light of other surfaces
     job.change(|s| s.integrator.max_depth = 0);
     job.pixel_samples = None;
     let seen: Vec<f64> = film(&job, 1024).pixels().iter().map(|p| luminance(p.mean())).collect();

@@ -1,4 +1,4 @@
-//! Whole-program tests; one binary, a module per subject.
+//! Whole-program tests; one binary, one module per subject.
 #![allow(clippy::unwrap_used)]
 
 mod alpha_lights;

@@ -1,4 +1,4 @@
-//! `Material "measured"`: its files, and a surface of it under even light.
+//! `Material "measured"`: its files, and a plane of it under uniform light.
 
 use lumiris::bsdfs::{Bsdf, Measured, MeasuredTables};
 use lumiris::film::PixelSums;
@@ -17,7 +17,7 @@ fn demo() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/demo")
 }
 
-/// A plane z = 0 of the material, seen from a direction in the plane of y, under even white light.
+/// A plane z = 0 of the material, from a direction with x = 0, under uniform white light.
 fn load(folder: &Path, material: &str) -> Result<Loaded, String> {
     let text = format!(
         r#"LookAt 0 1.5 2  0 0 0  0 0 1
@@ -52,7 +52,7 @@ fn a_plane_under_even_light_shows_the_albedo() {
     let tables = MeasuredTables::new(read_bsdf(&demo().join("measured.bsdf")).unwrap()).unwrap();
     let expected = albedo(&Bsdf::Measured(Measured { tables: &tables }), Vec3::new(0.0, 0.6, 0.8));
     assert!(expected.max_component() < 1.0 && expected.r > 1.3 * expected.b, "{expected:?}");
-    // `mc` samples the light alone, which is everywhere
+    // `mc` samples only the light, which is everywhere
     for (kind, estimator, bound) in [
         (IntegratorKind::Direct, EstimatorKind::Mis, 0.01),
         (IntegratorKind::Direct, EstimatorKind::Ris, 0.01),

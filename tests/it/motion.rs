@@ -1,4 +1,5 @@
-//! Cameras that move, motion within objects, and objects within objects: images of scenes that are the same in other words.
+//! Moving cameras, motion within instances, and nested instances: different descriptions of the same scene give the
+//! same image.
 
 use lumiris::import::cache::FileCache;
 use lumiris::import::{LoadOptions, Loaded, load_text};
@@ -9,7 +10,7 @@ use std::fmt::Write;
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
-/// Light that does not depend on the place.
+/// Light that does not depend on the position.
 const WORLD: &str = "WorldBegin\nLightSource \"distant\" \"point3 from\" [ 0 0 -1 ] \"point3 to\" [ 0 0 0 ]\n";
 
 fn load(text: &str) -> Result<Loaded, String> {
@@ -17,7 +18,7 @@ fn load(text: &str) -> Result<Loaded, String> {
         .map_err(|d| d.to_string())
 }
 
-/// Radiance of 24 × 24 pixels; `camera` stands before the camera, which looks along z.
+/// Radiance of 24 × 24 pixels. The text `camera` precedes the camera, which faces along z.
 fn image(camera: &str, world: &str, accel: AccelKind) -> Vec<f32> {
     let text = format!(
         "{camera}\nLookAt 0 0 -4  0 0 0  0 1 0\nCamera \"perspective\" \"float fov\" 40\n\
@@ -31,7 +32,7 @@ fn image(camera: &str, world: &str, accel: AccelKind) -> Vec<f32> {
     channels(&rendering.film, &[], None).data
 }
 
-/// Fraction of the numbers that differ by more than rounding can make of a hit that is not at an edge.
+/// The fraction of values that differ by more than rounding can cause away from edges.
 fn fraction_of_others(a: &[f32], b: &[f32]) -> f64 {
     assert_eq!(a.len(), b.len());
     let differs = a.iter().zip(b).filter(|(a, b)| (*a - *b).abs() > 1e-3 * (a.abs() + b.abs()));
@@ -45,7 +46,7 @@ const SHAPE: &str = "Shape \"trianglemesh\" \"point3 P\" [ -0.7 -0.5 0  0.8 -0.4
 fn a_camera_that_moves_sees_what_one_at_rest_sees_of_a_world_that_moves() {
     for motion in ["Translate 0.4 0.2 0", "Translate 0 0 1", "Rotate 70 0 0 1"] {
         for accel in TRACERS {
-            // The transformation of a camera is that of the world to the camera
+            // The transformation of a camera maps the world to the camera
             let moving = format!("ActiveTransform EndTime {motion} ActiveTransform All");
             let of_camera = image(&moving, SHAPE, accel);
             let of_world = image("", &format!("{moving}\n{SHAPE}"), accel);
@@ -76,6 +77,7 @@ fn the_shutter_opens_for_cameras_as_for_shapes() {
 
 #[test]
 fn objects_within_objects_are_the_shapes_that_they_hold() {
+    // The same shapes: instanced, and listed one by one
     let moving = "ActiveTransform EndTime Translate 0 0.3 0 Rotate 40 0 0 1 ActiveTransform All";
     let places = ["Translate 0.4 0 0", "Translate -0.5 0.2 0.3 Rotate 30 0 0 1"];
     let outer = ["Scale 0.5 0.5 0.5", "Translate 0 0.5 0 Rotate -20 0 1 0"];
@@ -93,6 +95,8 @@ fn objects_within_objects_are_the_shapes_that_they_hold() {
     let world = format!(
         "ObjectBegin \"one\" {SHAPE} ObjectEnd\nObjectBegin \"pair\" {pair} {moving} {SHAPE} ObjectEnd\n{nested}"
     );
+
+    // Both images agree with either ray tracer
     for accel in TRACERS {
         let others = fraction_of_others(&image("", &world, accel), &image("", &flat, accel));
         assert!(others < 0.02, "{accel:?}: {others}");

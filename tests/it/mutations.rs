@@ -6,11 +6,11 @@ use lumiris_test_support::random::{Pcg32, RngExt, pcg32};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 
-/// Mutated inputs altogether.
+/// The number of mutated inputs.
 fn mutations() -> usize {
     by_power(10_000, 2_000)
 }
-/// Scenes that take longest to read (`docs/measurements/build.md`), whose turn comes once in [`SLOW_TURNS`] rounds.
+/// Scenes that take longest to read (`docs/measurements/build.md`): only every [`SLOW_TURNS`]th round includes them.
 const SLOW: [&str; 8] =
     ["relief.pbrt", "lens.pbrt", "gallery.pbrt", "fog.pbrt", "room.pbrt", "checkers.pbrt", "fire.pbrt", "window.pbrt"];
 const SLOW_TURNS: usize = 8;
@@ -27,7 +27,7 @@ fn scene_files(folder: &Path, out: &mut Vec<PathBuf>) {
     out.sort();
 }
 
-/// A number below n, 0 where n is 0.
+/// A random number below `n`, or 0 if `n` is 0.
 fn below(random: &mut Pcg32, n: usize) -> usize {
     random.random_range(0..n.max(1))
 }
@@ -55,7 +55,7 @@ fn mutate(bytes: &mut Vec<u8>, random: &mut Pcg32) {
             bytes.splice(at..at, piece);
         }
         _ => {
-            // A digit becomes another number: sizes, counts and indices.
+            // A digit is replaced by another number: sizes, counts and indices
             let digits: Vec<usize> = (0..bytes.len()).filter(|&i| bytes[i].is_ascii_digit()).collect();
             if !digits.is_empty() {
                 let texts: [&[u8]; 6] = [b"-1", b"99999999999", b"1e38", b"nan", b"0", b"2147483647"];
@@ -98,6 +98,6 @@ fn mutated_scenes_never_panic_and_always_say_what_is_wrong() {
             }
         }
     }
-    // Both happen often: the mutations are neither harmless nor all fatal.
+    // Both outcomes are frequent: the mutations are neither harmless nor all fatal
     assert!(accepted > mutations() / 20 && refused > mutations() / 20, "{accepted} accepted, {refused} refused");
 }

@@ -1,4 +1,4 @@
-//! Paths that pixels share: known answers, the light of every region, and bits.
+//! Path reuse between pixels: known answers, the light of every region, and bit-identical images.
 
 use crate::analytic_scenes::answer;
 use crate::same_light::assert_same_light;
@@ -31,7 +31,7 @@ pub(crate) fn film(job: &RenderJob, settings: RenderSettings) -> Film {
     render(job, &settings, &AtomicBool::new(false), &|_| ()).unwrap().film
 }
 
-/// The image by its seed, with these numbers of samples.
+/// The image as a function of its seed, with the given sample counts.
 pub(crate) fn image_of_seed(mut job: RenderJob, numbers: Option<PixelSamples>, spp: u32) -> impl FnMut(u32) -> Film {
     move |seed| {
         job.change(|s| s.sampling.seed = seed);
@@ -40,7 +40,7 @@ pub(crate) fn image_of_seed(mut job: RenderJob, numbers: Option<PixelSamples>, s
     }
 }
 
-/// Images of different seeds, which are independent: channels of the means of all pixels.
+/// Images of independent seeds: the channels of all pixel means.
 pub(crate) fn pixel_means(job: &mut RenderJob, seeds: std::ops::Range<u32>, spp: u32) -> Vec<Vec<f64>> {
     let image = |seed| {
         job.change(|s| s.sampling.seed = seed);
@@ -50,23 +50,23 @@ pub(crate) fn pixel_means(job: &mut RenderJob, seeds: std::ops::Range<u32>, spp:
     seeds.map(image).collect()
 }
 
-/// From a quarter of the mean number of samples to twice as many, in no order.
+/// Sample counts from a quarter to twice the mean, in no order.
 fn different_numbers(job: &RenderJob, spp: u32) -> PixelSamples {
     let bounds = job.world.scene.film.bounds;
     let counts = (0..bounds.area() as u32).map(|i| (spp / 4) << (i * 7 / 3 % 4)).collect();
     PixelSamples { bounds, spp, counts, looks: Vec::new() }
 }
 
-/// Mean and the variance of it.
+/// The mean and its variance.
 pub(crate) fn mean_of(values: impl Iterator<Item = f64> + Clone) -> (f64, f64) {
     let n = values.clone().count() as f64;
     let mean = values.clone().sum::<f64>() / n;
     (mean, values.map(|v| (v - mean).powi(2)).sum::<f64>() / (n - 1.0) / n)
 }
 
-/// No light is lost, and none is counted twice, in columns and in stages: where all surfaces reflect the same, a block keeps
-/// its sum whatever the weights. 2 scenes × 3 edges × 3 estimators × 3 channels, at a level of 10⁻⁵ each. A bias of 2 % is found
-/// with a probability of 0.99 (3.4 % in `make test`).
+/// No light is lost or counted twice, in columns and in stages. Where all surfaces have the same reflectance, a block
+/// keeps its sum for any weights. 2 scenes × 3 edges × 3 estimators × 3 channels, at a level of 10⁻⁵ each. A bias of
+/// 2 % (3.4 % in `make test`) is detected with a probability of 0.99.
 #[test]
 fn known_answers_remain_where_pixels_share_paths() {
     let count = by_power(32, 16);
@@ -83,7 +83,7 @@ fn known_answers_remain_where_pixels_share_paths() {
                 for c in 0..3 {
                     let channel = |image: &Vec<f64>| image.iter().skip(c).step_by(3).sum::<f64>() / (20.0 * 18.0);
                     let (mean, variance) = mean_of(images.iter().map(channel));
-                    // Rounding, where there is no noise
+                    // Allows for rounding where there is no noise
                     let error = variance.sqrt() + 1e-6 * answer[c];
                     let what = format!("{name}, blocks of {edge}, {estimator:?}: {mean} ± {error}, not {}", answer[c]);
                     assert!((mean - answer[c]).abs() < limit * error, "{what}");
@@ -94,10 +94,10 @@ fn known_answers_remain_where_pixels_share_paths() {
     }
 }
 
-/// Weights are right: images of few pixels, where a block has first vertices far apart, that face each other, reflect
-/// differently, and hide from each other. A wrong weight moves light from block to block there, though the sum of all may
-/// stay. The gallery has textures, normals of their own, glass and metal. The same where pixels that share have different numbers of
-/// samples.
+/// The weights are right. In images of few pixels, the first vertices of a block are far apart, face each other,
+/// reflect differently, and are hidden from each other. There a wrong weight moves light from block to block, even if
+/// the total stays the same. The gallery has textures, shading normals, glass and metal. The same holds with different
+/// sample counts within a block.
 #[test]
 fn images_have_the_light_that_they_have_without_sharing() {
     const SPP: u32 = 48;
@@ -119,8 +119,9 @@ fn images_have_the_light_that_they_have_without_sharing() {
     }
 }
 
-/// Blocks of 2 × 2 and 4 × 4 pixels leave less than 1/1.5 and 1/2.5 of the variance: the error is relative to brightness, which
-/// pixels at the edge of the light do not dominate, and the gains of independent pairs of images tell their standard error.
+/// Blocks of 2 × 2 and 4 × 4 pixels leave less than 1/1.5 and 1/2.5 of the variance. The error is relative to the
+/// brightness, so pixels at the edge of the light do not dominate. Independent pairs of images give the standard error
+/// of the gains.
 #[test]
 fn shared_paths_leave_a_part_of_the_variance() {
     let pairs = |edge| {
@@ -143,6 +144,7 @@ fn shared_paths_leave_a_part_of_the_variance() {
 
 #[test]
 fn threads_tiles_packets_and_passes_do_not_change_a_bit() {
+    // Bits of the image with equal and with different sample counts
     let image = |packet_width, settings: RenderSettings| {
         let options = LoadOptions { resolution: Some([70, 45]), ..LoadOptions::default() };
         let mut loaded = load(&scene("demo/gallery"), &options).map_err(|d| d.to_string()).unwrap();
@@ -156,6 +158,8 @@ fn threads_tiles_packets_and_passes_do_not_change_a_bit() {
         }
         images
     };
+
+    // Every other partition of the work gives the same bits
     let settings = RenderSettings { threads: Some(1), ..RenderSettings::default() };
     let reference = image(None, settings);
     for (threads, tile_size, packet_width) in [(2, 16, Some(1)), (3, 1, Some(8)), (1, 64, Some(16)), (2, 200, None)] {
@@ -177,7 +181,7 @@ fn images_whose_pixels_cannot_share_paths_are_those_without() {
     assert!(direct.pixels().iter().zip(&alone.pixels()).all(|(a, b)| a.mean() == b.mean()));
 }
 
-/// A floor that is lit by the ceiling alone, all of it alike, but for noise.
+/// A floor lit only by the ceiling: uniform except for noise.
 const FLOOR: &str = r#"
 LookAt 0 0 5  0 0 0  0 1 0
 Camera "perspective" "float fov" 5
@@ -192,7 +196,7 @@ Shape "bilinearmesh" "point3 P" [ -9 -9 6  9 -9 6  -9 9 6  9 9 6 ]
 "#;
 const WIDTH: usize = 96;
 
-/// Powers by frequency, averaged over rows and columns.
+/// The power spectrum, averaged over rows and columns.
 fn spectrum(image: &[f64]) -> Vec<f64> {
     let mean = image.iter().sum::<f64>() / image.len() as f64;
     let waves: Vec<[f64; 2]> =
@@ -208,11 +212,13 @@ fn spectrum(image: &[f64]) -> Vec<f64> {
     (0..WIDTH / 2).map(of).collect()
 }
 
-/// Noise e, |e| and e² have no more power at periods of blocks (4 pixels), cells (32), cells that are estimated twice (16), and at
-/// their harmonics, than beside them. The standard error is 2.5 %. Cells at the same place in all turns, of 16 × 16 pixels, which
-/// end at an edge as blocks do, have 1.17 and 1.18 times as much of |e| at periods of 16 and 8 pixels.
+/// Noise e, |e| and e² have no more power at the periods of blocks (4 pixels), cells (32) and twice-estimated cells
+/// (16), and at their harmonics, than at neighbouring frequencies. The standard error is 2.5 %. Cells of 16 × 16 pixels
+/// at the same position in all rounds, ending at an edge as blocks do, have 1.17 and 1.18 times the power of |e| at
+/// periods of 16 and 8 pixels.
 #[test]
 fn neither_blocks_nor_cells_are_seen_in_the_noise() {
+    // Mean spectra of e, |e| and e² over seeds
     let loaded = load_text(FLOOR, "floor", Path::new("."), &LoadOptions::default(), &FileCache::default());
     let mut job = loaded.map_err(|d| d.to_string()).unwrap().job(AccelKind::Embree, None).unwrap();
     job.change(|s| {
@@ -229,6 +235,8 @@ fn neither_blocks_nor_cells_are_seen_in_the_noise() {
             powers.iter_mut().zip(spectrum(&values)).for_each(|(sum, power)| *sum += power);
         }
     }
+
+    // Power at the suspect frequencies against the neighbouring ones
     let is_suspect = |k: usize| k.is_multiple_of(6) || k == 3 || k == 9;
     for (name, power) in ["e", "|e|", "e²"].iter().zip(&powers) {
         for k in (2..WIDTH / 2 - 2).filter(|&k| is_suspect(k)) {

@@ -1,5 +1,5 @@
-//! The photon-map integrator: known answers, agreement with `path`, convergence of the progressive form, the same bits,
-//! and scenes without light.
+//! The photon-map integrator: known answers, agreement with `path`, convergence of the progressive form, bit-identical
+//! images, and scenes without light.
 
 use super::irradiance_cache::{ROOM, rendering, squares, world_of};
 use lumiris::render::output::{Aov, channels};
@@ -10,7 +10,7 @@ use lumiris_numbers::estimators::stats::{Welford, sidak, t_test};
 use lumiris_test_support::power::by_power;
 use std::sync::atomic::AtomicBool;
 
-/// The inside of a sphere that emits and reflects: radiance is L/(1 − ρ) everywhere.
+/// The inside of a sphere that emits and reflects: the radiance is L/(1 − ρ) everywhere.
 const FURNACE: &str = r#"
 Camera "perspective" "float fov" [ 60 ]
 Film "rgb" "integer xresolution" [ 8 ] "integer yresolution" [ 8 ]
@@ -35,8 +35,8 @@ fn mean(values: &[f64]) -> f64 {
 
 #[test]
 fn a_furnace_has_its_known_radiance() {
-    // Where irradiance is the same everywhere and surfaces are nearly flat, a density estimate is without bias. Means
-    // over seeds; 0.2 % is left to the curvature of what a disk of photons covers.
+    // Under uniform irradiance on nearly flat surfaces, a density estimate is unbiased. Means over seeds; the tolerance
+    // of 0.2 % covers the curvature within the disk of the photons.
     let forms: [fn(&mut PhotonMapSettings); 5] = [
         |_| (),
         |p| p.gather = 0,
@@ -65,8 +65,8 @@ fn a_furnace_has_its_known_radiance() {
 
 #[test]
 fn a_room_of_all_materials_agrees_with_path_tracing() {
-    // Light counted twice or lost at a coat, in a mirror or through glass is 4 % and more; the density of photons in
-    // corners and below the glass sphere is off by less.
+    // Light counted twice or lost at a coat, in a mirror or through glass amounts to 4 % and more. The density of
+    // photons in corners and below the glass sphere deviates by less.
     let path = world_of(ROOM, |s| s.integrator.samples = Some(4));
     let reference =
         squares(&rendering(&path, RenderSettings { spp: by_power(512, 192), ..Default::default() }).film, 8);
@@ -97,15 +97,15 @@ fn more_passes_bring_a_progressive_map_nearer_to_the_truth() {
         let square = |(a, b): (&f64, &f64)| (a - b) * (a - b);
         (image.iter().zip(&reference).map(square).sum::<f64>() / image.len() as f64).sqrt()
     };
-    // Slope −1/2 would be a factor 5.7 at 32 times the photons; −1/4 is the least that is accepted
+    // Slope −1/2 would be a factor of 5.7 at 32 times the photons; −1/4 is the minimum accepted
     let (few, many) = (error(4), error(128));
     assert!(many < few / 2.4, "{few} with 4 passes, {many} with 128");
 }
 
 #[test]
 fn maps_without_photons_are_no_light_and_no_error() {
-    // A sixth of the light falls on the only wall, so that many a map of one photon is empty; a wall alone has direct
-    // light only
+    // A sixth of the light falls on the only wall, so many maps of one photon are empty. A single wall has direct light
+    // only
     const WALL: &str = "Camera \"perspective\" \"float fov\" [ 60 ]\n\
         Film \"rgb\" \"integer xresolution\" [ 8 ] \"integer yresolution\" [ 8 ]\nWorldBegin\n\
         LightSource \"point\" \"rgb I\" [ 3 3 3 ]\nShape \"trianglemesh\"\n\

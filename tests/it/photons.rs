@@ -1,4 +1,4 @@
-//! Photons: energy, known and path-traced irradiance, caustics, importance, the same bits, and scenes without any.
+//! Photons: energy, known and path-traced irradiance, caustics, importance, bit-identical maps, and scenes without any.
 
 use super::irradiance_cache::{ROOM, world_of};
 use lumiris::integrators::irradiance_cache::gather::{Gatherer, RecordRequest};
@@ -16,10 +16,10 @@ use std::f64::consts::PI;
 
 /// Probability that a test fails by chance.
 const SIGNIFICANCE: f64 = 1e-4;
-/// What rounding may be off where there is no noise, relative.
+/// Relative rounding error where there is no noise.
 const ROUNDING: f64 = 5e-4;
 
-/// A closed box of side 4 about the origin, whose walls of albedo 0.5, 0.25, 0.75 emit 0.5 inwards, with things in it.
+/// A closed box of side 4 about the origin. Its walls of albedo 0.5, 0.25, 0.75 emit 0.5 inwards. It contains `things`.
 fn furnace(things: &str) -> String {
     let mut text = "Camera \"perspective\"\nWorldBegin\nMaterial \"diffuse\" \"rgb reflectance\" [ 0.5 0.25 0.75 ]\nAttributeBegin\n\
         AreaLightSource \"diffuse\" \"rgb L\" [ 0.5 0.5 0.5 ]\n"
@@ -59,7 +59,7 @@ fn channels(rgb: Rgb) -> [f64; 3] {
     rgb.to_array().map(f64::from)
 }
 
-/// Irradiance at a place over seeds, by channel.
+/// Irradiance at a point over seeds, by channel.
 fn irradiances(runs: u32, place: &Place, search: Search, photons: impl Fn(u32) -> Vec<Photon>) -> [Welford; 3] {
     let mut e = [Welford::default(); 3];
     for seed in 0..runs {
@@ -125,7 +125,7 @@ fn a_furnace_has_its_irradiance_whatever_lossless_things_stand_in_it() {
     }
 }
 
-/// A place whose irradiance path tracing tells.
+/// A request for the path-traced irradiance at a point.
 fn wanted(p: Vec3, n: Vec3) -> RecordRequest {
     RecordRequest {
         p,
@@ -140,7 +140,7 @@ fn wanted(p: Vec3, n: Vec3) -> RecordRequest {
     }
 }
 
-/// The mean over seeds of the irradiance by path tracing, over the kernel of a density estimate of radius `radius`.
+/// The mean over seeds of the path-traced irradiance, weighted by the density-estimation kernel of radius `radius`.
 fn path_traced(job: &RenderJob, (p, n): (Vec3, Vec3), radius: f32, key: u32) -> [Welford; 3] {
     // Each group is a grid of strata over the kernel
     const GROUPS: u32 = 24;
@@ -167,7 +167,7 @@ fn path_traced(job: &RenderJob, (p, n): (Vec3, Vec3), radius: f32, key: u32) -> 
 
 #[test]
 fn photons_agree_with_path_tracing_among_many_materials() {
-    // Both have the same expectation, the mean over the kernel, and errors that are measured
+    // Both have the same expectation, the mean over the kernel, and measured standard errors
     let depth = 8;
     let job = world_of(ROOM, |s| {
         s.integrator.kind = IntegratorKind::IrradianceCache;
@@ -176,7 +176,7 @@ fn photons_agree_with_path_tracing_among_many_materials() {
         s.integrator.cache.passes = 4;
         s.integrator.max_depth = depth;
     });
-    // Where, the radius of the kernel, which ends at edges, and the difference that is found
+    // Name, point, normal, radius of the kernel (which ends at edges), and detectable difference
     let places = [
         ("the floor", Vec3::new(-0.1, 0.0, 0.5), Vec3::Y, 0.3, 0.04),
         ("the red wall", Vec3::new(-1.0, 1.3, -0.3), Vec3::X, 0.3, 0.04),
@@ -200,7 +200,7 @@ fn photons_agree_with_path_tracing_among_many_materials() {
         for (c, (e, expected)) in e.iter().zip(&expected).enumerate() {
             let error = e.standard_error().hypot(expected.standard_error());
             let what = format!("{name}, channel {c}: {} by photons, {} by paths, ± {error}", e.mean(), expected.mean());
-            // The level is at 3.9 standard errors, so that 6.3 are found 99 times of 100
+            // The level is at 3.9 standard errors, so differences of 6.3 are detected with a probability of 0.99
             assert!(6.3 * error < found * expected.mean(), "a difference of {found} might be missed: {what}");
             assert!(two_sample_z_test(e, expected).p_value > level, "{what}");
         }
@@ -209,7 +209,7 @@ fn photons_agree_with_path_tracing_among_many_materials() {
 
 #[test]
 fn inside_glass_light_is_denser_by_the_square_of_the_index() {
-    // A white ball in a glass one takes no light away: L = 1.5² · 0.5/(1 − ρ) around it
+    // A white ball inside a glass ball absorbs no light: L = 1.5² · 0.5/(1 − ρ) around it
     let things = "Translate 0.2 -0.9 0.1\nMaterial \"dielectric\"\nShape \"sphere\" \"float radius\" [ 0.9 ]\n\
         Material \"diffuse\" \"rgb reflectance\" [ 1 1 1 ]\nShape \"sphere\" \"float radius\" [ 0.6 ]\n";
     let job = world_of(&furnace(things), |_| ());
@@ -224,7 +224,7 @@ fn inside_glass_light_is_denser_by_the_square_of_the_index() {
 
 #[test]
 fn shading_normals_reflect_photons_as_they_reflect_light() {
-    // A spot lights a part of an upright wall whose shading normals look up; the floor gets light from there only
+    // A spot lights a part of an upright wall whose shading normals tilt up. The floor gets light only from there
     const WALL: &str = r#"
 Camera "perspective"
 WorldBegin
@@ -251,7 +251,7 @@ Shape "trianglemesh" "point3 P" [ 0 0 -1  0 2 -1  0 2 1  0 0 1 ] "integer indice
     assert!((e[1].mean() - expected).abs() < bound, "{}, not {expected} ± {bound}", e[1].mean());
 }
 
-/// A floor below a glass ball. The light looks up or down.
+/// A floor below a glass ball, with a light that shines up or down.
 fn ball(light: &str) -> String {
     "Camera \"perspective\"\nWorldBegin\n".to_owned()
         + light
@@ -269,16 +269,16 @@ fn caustics_come_from_direct_and_from_indirect_light() {
     let mut scratch = GatherScratch::default();
     let tracing = Tracing { max_depth: 6, ..Tracing::default() };
 
-    // A light above the ball: brighter below it than it would be without
+    // A light above the ball: the floor below is brighter than without the ball
     let lit = ball("LightSource \"point\" \"rgb I\" [ 10 10 10 ] \"point3 from\" [ 0 3.5 0 ]\n");
     let direct = trace(&world_of(&lit, |_| ()), &tracing, 100_000);
     let e = PhotonMap::new(direct.caustic).irradiance(&below, Search::Radius(0.1), &mut scratch).g;
     assert!(e > 2.0 * 10.0 / (3.5 * 3.5), "{e}");
-    // No light of the global map passes the ball
+    // No light of the global map passes through the ball
     let shadow = PhotonMap::new(direct.global.iter().filter(|p| p.is_primary()).copied().collect());
     assert_eq!(shadow.irradiance(&below, Search::Radius(0.1), &mut scratch), Rgb::BLACK);
 
-    // A spot that lights the ceiling only
+    // A spot that lights only the ceiling
     let up = ball(
         "LightSource \"spot\" \"rgb I\" [ 100 100 100 ] \"point3 from\" [ 0 2.5 0 ] \"point3 to\" [ 0 4 0 ] \"float coneangle\" [ 20 ]\n",
     );
@@ -309,14 +309,13 @@ fn a_global_map_of_some_of_the_photon_paths_is_the_same_on_average() {
             assert!(test.p_value > SIGNIFICANCE, "{c}: {} {}", a[c].mean(), b[c].mean());
         }
     }
-    // The caustic map is that of all photon paths, the global one is as much smaller as q says
+    // The caustic map stores all photon paths, the global map a fraction q of them
     assert_eq!(thinned.2.caustic.len(), reference.2.caustic.len());
     let share = thinned.2.global.len() as f64 / reference.2.global.len() as f64;
     assert!((share / f64::from(q) - 1.0).abs() < 0.03, "{share}");
 }
 
-/// Two rooms and a slit between them; the camera looks at the floor of the left one, the light is in the right one or
-/// in both.
+/// Two rooms connected by a slit. The camera sees the floor of the left one; the light is in the right one or in both.
 const ROOMS: &str = r#"
 LookAt -1 1.9 0  -1 0 0  0 0 1
 Camera "perspective" "float fov" [ 60 ]
@@ -350,7 +349,7 @@ fn importance_moves_photons_to_what_is_seen_and_keeps_their_light() {
     let floor = importance(&job, LowImportance::Floor(0.02));
     assert!(floor.is_unbiased() && !importance(&job, LowImportance::CutOff(0.02)).is_unbiased());
 
-    // The same light in expectation, whether the place is seen or not
+    // The same expected light at visible and hidden points
     let seen = Place::flat(Vec3::new(-1.0, 0.0, 0.2), Vec3::Y);
     let hidden = Place::flat(Vec3::new(1.2, 0.0, -0.3), Vec3::Y);
     for place in [seen, hidden] {
@@ -362,7 +361,7 @@ fn importance_moves_photons_to_what_is_seen_and_keeps_their_light() {
         }
     }
 
-    // Where the camera looks photons are as many and as strong as before, elsewhere few
+    // Visible points keep the number and power of their photons, hidden points have few
     let mut scratch = GatherScratch::default();
     assert!(floor.probability(seen.p, seen.n, &mut scratch) > 0.9);
     assert!(floor.probability(hidden.p, hidden.n, &mut scratch) < 0.2);
@@ -371,16 +370,17 @@ fn importance_moves_photons_to_what_is_seen_and_keeps_their_light() {
     let kept = |side| count(&thinned, side) / count(&plain, side);
     assert!(kept(-1.0) > 0.5 && kept(1.0) < 0.4 * kept(-1.0), "{} {}", kept(-1.0), kept(1.0));
 
-    // Cut off, photons are missing and none is strong
+    // With a cutoff, photons are missing and none is strong
     let cut = by(Some(&importance(&job, LowImportance::CutOff(0.2))), 0);
     assert!(cut.stored() < plain.stored());
     let strongest = |traced: &Traced| traced.global.iter().map(|p| p.power().r).fold(0.0, f32::max);
     assert!(strongest(&cut) < 5.1 * strongest(&plain));
 }
 
-/// Light that maps of about `k` photons hold, over that which they should: the powers of their photons over `power`.
-/// One pilot for every 32 maps, as for the passes of an image. With the number of maps that are empty.
+/// The light of maps of about `k` photons relative to the expected `power`, and the number of empty maps. Each group of
+/// 32 maps has one pilot, like the passes of an image.
 fn relative_light(job: &RenderJob, k: u64, maps: u32, power: f64) -> (Welford, u32) {
+    // Relative light of 32 maps with one pilot
     let group = |pilot: u32| {
         let (mut light, mut empty) = (Welford::new(), 0);
         let tracing = |seed| Tracing { seed, max_depth: 60, max_global_depth: 60, ..Tracing::default() };
@@ -394,6 +394,8 @@ fn relative_light(job: &RenderJob, k: u64, maps: u32, power: f64) -> (Welford, u
         }
         (light, empty)
     };
+
+    // Merge the groups
     let groups: Vec<(Welford, u32)> = (0..maps.div_ceil(32)).into_par_iter().map(group).collect();
     groups.into_iter().fold((Welford::new(), 0), |(mut all, empty), (light, more)| {
         all.merge(&light);
@@ -403,11 +405,11 @@ fn relative_light(job: &RenderJob, k: u64, maps: u32, power: f64) -> (Welford, u
 
 #[test]
 fn maps_of_few_photons_have_all_the_light_and_no_more() {
-    // Tracing that ends where photon k falls has 17 % too much with k = 4, and 1 % with k = 100
+    // Tracing that ends at photon k has 17 % too much light with k = 4, and 1 % with k = 100
     let grey = furnace("").replace("[ 0.5 0.25 0.75 ]", "[ 0.5 0.5 0.5 ]");
     let job = world_of(&grey, |_| ());
     for k in [4, 16, 100, 1000] {
-        // A path stores two photons on average with a variance of 2, so that the relative variance of a map is 1/k
+        // A path stores two photons on average with a variance of 2, so the relative variance of a map is 1/k
         let maps = (1.2 / (k as f64 * 0.003 * 0.003)) as u32;
         let (light, _) = relative_light(&job, k, maps, PI * 0.5 * 96.0 / (1.0 - 0.5));
         let sigma = light.standard_error();
@@ -423,7 +425,7 @@ fn an_empty_map_counts_as_no_light() {
         Shape \"trianglemesh\" \"point3 P\" [ -1 -1 1  1 -1 1  1 1 1  -1 1 1 ] \"integer indices\" [ 0 1 2 0 2 3 ]\n";
     let job = world_of(WALL, |_| ());
     let (light, empty) = relative_light(&job, 1, 12_000, 3.0 * 4.0 * PI / 6.0);
-    // 28 % were they independent; the strata of a sequence leave fewer
+    // 28 % for independent paths; the strata of a sequence leave fewer
     assert!(empty > 1_000, "{empty} maps are empty");
     let sigma = light.standard_error();
     assert!(sigma <= 0.01 && (light.mean() - 1.0).abs() <= 3.0 * sigma, "{} ± {sigma}", light.mean());
@@ -437,8 +439,8 @@ fn a_pilot_says_how_many_paths_store_as_many_photons_as_requested() {
     let traced = trace_photons(&job, &tracing, None, budget).unwrap();
     assert_eq!(path_count(&job, &tracing, None, budget), Ok(traced.paths));
 
-    // The pilot stores 2500 photons. A path of 1 to 5 photons at albedos of 0.4 to 0.8 makes their number vary as
-    // that of 2500/5 independent ones at most: 5 standard deviations
+    // The pilot stores 2500 photons. Paths of 1 to 5 photons at albedos of 0.4 to 0.8 give their number at most the
+    // variance of 2500/5 independent ones: 5 standard deviations
     let off = traced.global.len() as f64 / 20_000.0 - 1.0;
     assert!(off.abs() < 5.0 * (5.0_f64 / 2500.0 + 5.0 / 20_000.0).sqrt(), "{off}");
     let again = trace(&job, &tracing, traced.paths);
@@ -490,7 +492,7 @@ fn what_cannot_be_traced_is_said() {
         assert!(matches!(error(&lit, &Tracing { q, ..tracing }, some), PhotonError::InvalidRatio(_)));
     }
 
-    // Nothing is hit, or nothing that is diffuse: a map without photons, and never a hang where photons are counted
+    // No hits, or none on diffuse surfaces: a map without photons, and no endless loop where photons are counted
     let mirror = format!("Material \"conductor\"\n{FLOOR}");
     for things in ["", &mirror] {
         let empty = trace_photons(&scene(lamp, things), &tracing, None, some).unwrap();
@@ -503,7 +505,7 @@ fn what_cannot_be_traced_is_said() {
     let tight = Tracing { memory: Some(100_000), ..tracing };
     assert!(matches!(error(&lit, &tight, PhotonBudget::Paths(1_000_000)), PhotonError::OutOfMemory { .. }));
 
-    // A camera that sees nothing: the floor is behind it
+    // A camera without any hit: the floor is behind it
     let blind = trace_importons(&scene("Scale 1 1 1\n", "Translate 0 -1 -5 \n"), &ImportanceSettings::default());
     assert_eq!(blind.unwrap_err(), PhotonError::CameraSeesNothing);
 }

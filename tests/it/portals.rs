@@ -1,6 +1,7 @@
-//! Portals of infinite lights: known answers, the same light as without them where nothing else lets it in, and errors.
+//! Portals of infinite lights: known answers, the same light as without portals if there are no other openings, and
+//! errors.
 //!
-//! t-tests over 32 images of different seeds, at a level of 10⁻⁵ for each channel; the bias that they would find is given.
+//! t-tests over 32 images of different seeds, at a level of 10⁻⁵ for each channel; the detectable bias is given.
 
 use crate::media::{assert_answer, assert_they_agree, choose, estimators, means};
 use lumiris::imaging::oiio::{Part, write_image};
@@ -12,7 +13,7 @@ use lumiris_numbers::math::{Rgb, Vec3};
 use std::f64::consts::PI;
 use std::path::Path;
 
-/// A camera at a point of the room that sees one direction.
+/// A camera at a point of the room, with a single direction.
 fn camera(look: &str, depth: u32) -> String {
     format!(
         r#"LookAt {look} 0 1 0
@@ -25,13 +26,13 @@ fn camera(look: &str, depth: u32) -> String {
     )
 }
 
-/// To the floor, and out of the window.
+/// Towards the floor, and out of the window.
 const LOOKS: [&str; 2] = ["0.3 0.2 0.5  0.3 0.2 0 ", "0.3 0.2 0  0.4 0.1 1 "];
 
-/// The window of the room, by its corners: what is beyond it is at greater z.
+/// The window of the room, by its corners; the outside is at greater z.
 const WINDOW: &str = r#""point3 portal" [-0.4 -0.3 1  -0.4 0.6 1  0.5 0.6 1  0.5 -0.3 1]"#;
 
-/// A closed room with a window in its ceiling, and a black lintel outside that hides a part of the sky.
+/// A closed room with a window in its ceiling, and a black lintel outside that covers a part of the sky.
 const ROOM: &str = r#"
 Material "diffuse" "rgb reflectance" [ 0.7 0.5 0.3 ]
 Shape "trianglemesh" "point3 P" [-1 -1 -1  1 -1 -1  1 1 -1  -1 1 -1  -1 -1 1  1 -1 1  1 1 1  -1 1 1]
@@ -59,7 +60,7 @@ fn job(folder: &Path, text: &str, accel: AccelKind) -> Result<RenderJob, String>
     Ok(loaded.map_err(|d| d.to_string())?.job(accel, None).unwrap())
 }
 
-/// The current transformation turns the sky, and not the portal.
+/// The current transformation rotates the sky, but not the portal.
 fn sky(portal: &str) -> String {
     format!(
         "AttributeBegin Rotate 40 1 2 3 LightSource \"infinite\" \"string filename\" \"sky.exr\" \"float scale\" 2 {portal} AttributeEnd\n"
@@ -81,7 +82,7 @@ fn a_room_has_the_light_that_it_has_without_a_portal() {
     }
     assert_they_agree(&answers, 0.1);
 
-    // What is seen through it is the sky itself
+    // Through the portal, the camera sees the sky itself
     let seen = ["", WINDOW].map(|portal| {
         let mut job = job(folder.path(), &text(portal, LOOKS[1]), AccelKind::Embree).unwrap();
         means(&mut job, 1).0
@@ -112,26 +113,27 @@ fn an_even_sky_lights_a_floor_by_the_form_factor_of_its_portal() {
     }
 }
 
-/// Edge of the sky with a bright horizon (texels).
+/// Resolution of the sky with a bright horizon (texels per side).
 const SIZE: usize = 64;
-/// Half the edge of the portal of the tests below (m).
+/// Half the side of the portal in the tests below (m).
 const HALF: f64 = 1.0;
 
 /// Radiances of a sky of 1 with a band around its horizon.
 fn horizon(contrast: f32) -> Vec<f32> {
     let distance = |i: usize| ((i as f32 + 0.5) * 2.0 / SIZE as f32 - 1.0).abs();
-    // The horizon is |x| + |y| = 1 of an equal-area map
+    // The horizon is |x| + |y| = 1 in an equal-area map
     let is_band = |i: usize| (distance(i % SIZE) + distance(i / SIZE) - 1.0).abs() < 0.06;
     (0..SIZE * SIZE).map(|i| if is_band(i) { contrast } else { 1.0 }).collect()
 }
 
-/// Irradiance over π at the point (x, 0, 0) of a floor, by the sky beyond a hole in an opaque plane at z = `height`.
+/// Irradiance over π at the point (x, 0, 0) of a floor, lit by the sky through a hole in an opaque plane at z =
+/// `height`.
 fn oracle(sky: &[f32], x: f64, height: f64) -> f64 {
     const N: usize = 600;
     let texels = sky.iter().map(|&l| Rgb::splat(l)).collect();
     let map = EnvironmentMap::new(texels, [SIZE; 2], EnvironmentMapping::EqualArea, EnvironmentFilter::Nearest);
     let map = map.unwrap();
-    // Points of the hole over the height, denser near the point: sinh t, and their lengths
+    // Points of the hole in units of the height, denser near the point: sinh t, with their spacings
     let places = |centre: f64| {
         let [begin, end] = [-HALF, HALF].map(|edge| ((edge - centre) / height).asinh());
         let step = (end - begin) / N as f64;
@@ -147,8 +149,8 @@ fn oracle(sky: &[f32], x: f64, height: f64) -> f64 {
     sum / PI
 }
 
-/// The light of a point of the floor is the sky's through a hole, however near the hole is, however much brighter the horizon is, and
-/// whatever draws the samples. A bias of 10 % is found with a probability above 0.99.
+/// A portal lights a point of the floor like the sky through a hole, for every distance of the hole, every brightness
+/// of the horizon, and every sampling technique. A bias of 10 % is detected with a probability above 0.99.
 #[test]
 fn a_bright_horizon_lights_a_floor_as_through_a_hole() {
     let folder = tempfile::tempdir().unwrap();

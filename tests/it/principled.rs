@@ -4,7 +4,7 @@ use lumiris::import::cache::FileCache;
 use lumiris::import::{LoadOptions, load_text};
 use std::path::Path;
 
-/// What is said of a scene with a principled material of these parameters.
+/// Errors or warnings of a scene with a principled material of these parameters.
 fn said_of_principled(parameters: &str) -> String {
     let text = format!("WorldBegin\nMaterial \"principled\" {parameters}\nShape \"sphere\"\n");
     let loaded = load_text(&text, "a.pbrt", Path::new(""), &LoadOptions::default(), &FileCache::default());
@@ -13,6 +13,7 @@ fn said_of_principled(parameters: &str) -> String {
 
 #[test]
 fn numbers_of_principled_materials_outside_of_their_ranges_are_errors_with_places() {
+    // Values outside of their ranges
     let wrong = [
         ("\"float base_metalness\" 2", "base_metalness must be from 0 to 1, not 2"),
         ("\"float specular_roughness\" -1", "specular_roughness must be from 0 to 1, not -1"),
@@ -28,6 +29,8 @@ fn numbers_of_principled_materials_outside_of_their_ranges_are_errors_with_place
         let said = said_of_principled(parameters);
         assert!(said.contains(message) && said.contains("a.pbrt:2:23"), "{said}");
     }
+
+    // Values at the limits are valid
     let right =
         "\"float coat_weight\" 1 \"rgb specular_color\" [3 1 0] \"rgb base_color\" [0 1 1] \"float coat_roughness\" 0";
     assert!(!said_of_principled(right).contains("must be"), "{}", said_of_principled(right));
@@ -35,6 +38,7 @@ fn numbers_of_principled_materials_outside_of_their_ranges_are_errors_with_place
 
 #[test]
 fn names_of_blender_and_disney_mean_those_of_openpbr() {
+    // The material and its textures, as text
     let material = |parameters: &str| {
         let text =
             format!("WorldBegin\nLightSource \"infinite\"\nMaterial \"principled\" {parameters}\nShape \"sphere\"\n");
@@ -43,6 +47,8 @@ fn names_of_blender_and_disney_mean_those_of_openpbr() {
         assert_eq!(loaded.warnings.to_string(), "");
         format!("{:?} {:?}", loaded.scene.materials, loaded.scene.textures)
     };
+
+    // Both vocabularies give the same material
     let openpbr = "\"rgb base_color\" [.2 .4 .6] \"float base_metalness\" .1 \"float specular_roughness\" .4 \"float specular_ior\" 1.4
         \"rgb specular_color\" [1 .5 1] \"float transmission_weight\" .2 \"float fuzz_weight\" .3 \"rgb fuzz_color\" [1 .9 .8]
         \"float fuzz_roughness\" .6 \"float coat_weight\" .7 \"bool geometry_thin_walled\" true";
@@ -50,9 +56,12 @@ fn names_of_blender_and_disney_mean_those_of_openpbr() {
         \"rgb specular_tint\" [1 .5 1] \"float spectrans\" .2 \"float sheen_weight\" .3 \"rgb sheen_tint\" [1 .9 .8]
         \"float sheen_roughness\" .6 \"float clearcoat\" .7 \"bool thin\" true";
     assert_eq!(material(openpbr), material(others));
+    // The anisotropy of Disney keeps its own definition
     assert!(
         material("\"float specular\" 1 \"float anisotropic\" .5 \"float clearcoatgloss\" 1").contains("Disney(0.5)")
     );
+
+    // Two names of the same parameter are an error
     let said = said_of_principled("\"float metallic\" 0.5 \"float base_metalness\" 0.5");
     assert!(said.contains("metallic is base_metalness, which is given as well"), "{said}");
 }

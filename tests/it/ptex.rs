@@ -9,7 +9,7 @@ use lumiris_test_support::ptex::{PtexEncoding, PtexFaceSpec, PtexSpec, ptex_file
 use std::fs;
 use std::path::Path;
 
-/// Three faces of one colour each, and two quads and a triangle that have them in the reverse order.
+/// Three faces of one colour each, for two quads and a triangle that use them in reverse order.
 fn folder() -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     let face =
@@ -40,7 +40,7 @@ fn load(folder: &Path, texture: &str, shape: &str) -> Result<Loaded, String> {
 
 const PLY: &str = r#"Shape "plymesh" "string filename" "wall.ply""#;
 
-/// Places on all primitives, with the reflectance there.
+/// Points on all primitives, with the reflectances there.
 fn seen(loaded: &Loaded) -> Vec<(Vec3, Rgb)> {
     let textures = &loaded.scene.textures;
     let wall = textures.rgbs.iter().position(|t| matches!(t, RgbTexture::Faces(_))).unwrap();
@@ -60,7 +60,7 @@ fn seen(loaded: &Loaded) -> Vec<(Vec3, Rgb)> {
     shapes.flat_map(|shape| (0..primitives(shape)).map(move |i| at(shape, i as u32))).collect()
 }
 
-/// Asserts that each place has the colour that its column of the wall should have.
+/// Asserts that each point has the colour of its column of the wall.
 fn assert_columns(seen: &[(Vec3, Rgb)], columns: [f32; 3], scale: f32) {
     for (p, color) in seen {
         let v = columns[p.x as usize] * scale;
@@ -87,7 +87,7 @@ fn faces_have_their_textures_by_number_in_all_kinds_of_meshes() {
         assert_columns(&seen(&load(folder.path(), texture, &shape).unwrap()), [0.5; 3], 0.5);
     }
 
-    // Without numbers, the first face, as in pbrt-v4; and its usual encoding
+    // Without face numbers, the first face is used, as in pbrt-v4, and the default encoding
     let shape = format!("Shape \"bilinearmesh\" {corners}");
     let usual = seen(&load(folder.path(), r#""string filename" "wall.ptx""#, &shape).unwrap());
     assert!((usual[0].1.r - 0.25_f32.powf(2.2)).abs() < 1e-5, "{usual:?}");

@@ -1,7 +1,7 @@
-//! One scene rendered in two ways that must have the same light: the means of the image and of its blocks.
+//! Scenes rendered in two ways that must agree in the means of the image and of its blocks.
 //!
-//! Images have seeds of their own, so their means are independent. As many are rendered as notice the biases of [`effort`] with
-//! a power of 0.99; what each comparison notices is printed (`docs/measurements/power`).
+//! Images have different seeds, so their means are independent. Their number is chosen to detect the biases of
+//! [`effort`] with a power of 0.99. The detectable bias of each comparison is printed (`docs/measurements/power`).
 
 use lumiris::film::Film;
 use lumiris_numbers::estimators::stats::{Welford, median};
@@ -9,7 +9,7 @@ use lumiris_test_support::power::by_power;
 use lumiris_test_support::significance::{critical_t, detectable_deviation};
 use std::io::Write;
 
-/// Relative biases that a comparison has to notice.
+/// Relative biases that a comparison has to detect.
 #[derive(Clone, Copy)]
 struct Effort {
     /// In the mean of the image, in every channel.
@@ -24,22 +24,23 @@ fn effort() -> Effort {
 
 /// Blocks along each side of an image.
 const BLOCKS: usize = 4;
-/// Level of the test of each mean: some 30 comparisons of 51 means together reject right images with a probability of 0.0015.
+/// Level of the test of each mean: about 30 comparisons of 51 means together reject right images with a probability of
+/// 0.0015.
 const LEVEL: f64 = 1e-6;
-/// Probability that a bias of the size stated is noticed.
+/// Probability of detecting a bias of the stated size.
 const POWER: f64 = 0.99;
-/// Images of each side that tell how many are needed, and are not compared.
+/// Pilot images of each side: they determine the number of images, and are not compared.
 const PILOT: u32 = 8;
-/// Factor of the number that the pilot asks for: more images have a lower critical value.
+/// Factor on the number from the pilot: more images have a lower critical value.
 const MARGIN: f64 = 0.8;
-/// Relative difference that rounding makes where there is no noise.
+/// Relative difference due to rounding where there is no noise.
 const ROUNDING: f64 = 1e-6;
-/// Fewest images of each side.
+/// Minimum number of images of each side.
 const LEAST: u32 = 12;
-/// How often the number of images is doubled where the pilot saw too little noise.
+/// Maximum number of doublings of the number of images, for pilots that underestimate the noise.
 const ATTEMPTS: u32 = 3;
 
-/// The channels of the image, then of its blocks: means of their pixels.
+/// Mean pixel values of the image, then of its blocks, by channel.
 fn means(film: &Film) -> Vec<f64> {
     let (width, height) = (film.bounds.width() as usize, film.bounds.area() / film.bounds.width() as usize);
     let mut sums = vec![[0.0; 4]; 1 + BLOCKS * BLOCKS];
@@ -66,19 +67,19 @@ impl Side {
     }
 }
 
-/// The relative biases that a test notices.
+/// The relative biases that a test detects.
 struct Noticed {
-    /// In the channel of the image that has the most noise.
+    /// In the noisiest channel of the image.
     image: f64,
     /// In half of the blocks and channels.
     block: f64,
 }
 
-/// Two-sided t-tests of two sides with as many images each.
+/// Two-sided t-tests between two sides with equal numbers of images.
 struct Comparison([Side; 2]);
 
 impl Comparison {
-    /// Mean without, difference, and standard error of the difference, by means.
+    /// For each mean: its value without, the difference, and the standard error of the difference.
     fn differences(&self) -> Vec<(f64, f64, f64)> {
         let [without, with] = &self.0;
         let difference = |(a, b): (&Welford, &Welford)| {
@@ -106,14 +107,14 @@ impl Comparison {
         noticed.image <= effort.image && noticed.block <= effort.block
     }
 
-    /// How many times as many images notice what they have to.
+    /// The factor on the number of images that would give the required power.
     fn missing(&self, effort: Effort) -> f64 {
         let noticed = self.noticed();
         (noticed.image / effort.image).max(noticed.block / effort.block).powi(2)
     }
 }
 
-/// Asserts that images by both functions of the seed have the same means.
+/// Asserts that the images of both functions of the seed have the same means.
 #[track_caller]
 pub(crate) fn assert_same_light(name: &str, mut without: impl FnMut(u32) -> Film, mut with: impl FnMut(u32) -> Film) {
     let effort = effort();
@@ -148,7 +149,7 @@ pub(crate) fn assert_same_light(name: &str, mut without: impl FnMut(u32) -> Film
         .collect();
     assert!(wrong.is_empty(), "{name}, which notices {found}: {}", wrong.join("\n"));
     assert!(comparison.is_enough(effort), "too much noise: {name} notices {found} by {count} images");
-    // Standard output itself, which is shown though the test passes
+    // Standard output itself: it is shown even if the test passes
     writeln!(
         std::io::stdout().lock(),
         "| {name} | {count} | {:.2} | {:.1} |",

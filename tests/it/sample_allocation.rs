@@ -1,4 +1,4 @@
-//! Camera samples where they are needed: the numbers are independent of the samples that they count, and of threads.
+//! Adaptive sample counts: they are independent of the samples that they count, and of threads.
 
 use crate::path_reuse::image_of_seed;
 use crate::same_light::assert_same_light;
@@ -28,7 +28,7 @@ fn gallery(change: impl FnOnce(&mut Settings)) -> RenderJob {
     loaded.job(AccelKind::Embree, None).unwrap()
 }
 
-/// The film, with the numbers of samples that were decided on.
+/// The film, with the sample counts of its plan.
 fn rendered(job: &mut RenderJob, threads: usize, tile_size: u32) -> (Film, PixelSamples) {
     prepare(job, &Preparation::on(Some(threads))).unwrap();
     let samples = job.pixel_samples.clone().expect("numbers that differ");
@@ -47,6 +47,7 @@ fn rendered(job: &mut RenderJob, threads: usize, tile_size: u32) -> (Film, Pixel
 #[test]
 fn adaptive_images_have_the_samples_they_ask_for_and_do_not_depend_on_threads_or_tiles() {
     for noise in [None, Some(0.2)] {
+        // An adaptive job, with a target time or a noise threshold
         let job = || {
             let mut job = lottery_beside(LAMP, 48, ("spot\" \"float coneangle\" 8", 4.0), 4);
             job.change(|s| {
@@ -57,17 +58,22 @@ fn adaptive_images_have_the_samples_they_ask_for_and_do_not_depend_on_threads_or
             });
             job
         };
+
+        // The film has the planned sample counts
         let (film, samples) = rendered(&mut job(), 1, 16);
         let (min, max) = (samples.counts.iter().min().unwrap(), samples.counts.iter().max().unwrap());
         assert!(max > &(2 * min), "{min} to {max}");
         assert!(film.pixels().iter().zip(&samples.counts).all(|(p, &n)| p.count == u64::from(n)));
         let pixels = film.pixels();
         assert!(film.replicas().iter().all(|r| r.count == pixels[r.pixel as usize].count));
+        // Edges of the lamp have extra emission rays
         assert!(samples.looks.iter().any(|looks| *looks > 2));
         if noise.is_none() {
             let mean = samples.total() as f64 / film.len() as f64;
             assert!((32.0..128.0).contains(&mean), "the time is that of 64: {mean}");
         }
+
+        // The same bits for any threads and tiles
         let bits = |film: &Film| film.pixels().iter().map(|p| p.radiance.map(f64::to_bits)).collect::<Vec<_>>();
         for (threads, tile_size) in [(3, 16), (2, 7)] {
             let (other, again) = rendered(&mut job(), threads, tile_size);
@@ -77,7 +83,7 @@ fn adaptive_images_have_the_samples_they_ask_for_and_do_not_depend_on_threads_or
     }
 }
 
-/// Numbers of samples, and of rays at the edges of lights, that follow from a pilot for each image, beside equal numbers.
+/// Sample counts and extra emission rays from a new pilot for each image, against uniform counts.
 #[test]
 #[ignore = "of `make test-power` only"]
 fn adaptive_numbers_leave_the_light_of_equal_ones() {
@@ -107,20 +113,21 @@ fn integrators_that_share_noise_and_estimators_that_fit_blocks_have_uniform_numb
     }
 }
 
-/// A floor below some lights, of which one has a kind and a power of its own: chosen uniformly, it is rare. An image of
-/// `size` × `size` pixels.
+/// A floor below some lights. One of them has a different kind and power, so uniform light selection chooses it rarely.
+/// The image has `size` × `size` pixels.
 fn lottery(size: u32, other: (&str, f64), lights: u32) -> RenderJob {
     lottery_beside("", size, other, lights)
 }
 
-/// A lamp that is seen.
+/// A visible lamp.
 const LAMP: &str = r#"
 AttributeBegin AreaLightSource "diffuse" "bool twosided" true "rgb L" [ 30 30 30 ]
 Shape "bilinearmesh" "point3 P" [ 0.1 0.1 0.1  0.4 0.1 0.2  0.1 0.1 0.5  0.4 0.1 0.6 ] AttributeEnd
 "#;
 
-/// The same beside other things.
+/// [`lottery`] with other things in the scene.
 fn lottery_beside(things: &str, size: u32, other: (&str, f64), lights: u32) -> RenderJob {
+    // The text of the scene
     let mut text = r#"
 LookAt 0 2 0  0 0 0  0 0 1
 Camera "perspective" "float fov" 40
@@ -142,6 +149,8 @@ Shape "bilinearmesh" "point3 P" [ -2 0 -2  2 0 -2  -2 0 2  2 0 2 ]
             if kind.starts_with("spot") { " \"point3 to\" [ 0 0 0 ]" } else { "" }
         );
     }
+
+    // Load it with uniform light selection
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("lottery.pbrt");
     std::fs::write(&path, text).unwrap();
@@ -154,13 +163,13 @@ fn mean(pixels: &[PixelSums]) -> f64 {
     pixels.iter().map(|p| luminance(p.mean())).sum::<f64>() / pixels.len() as f64
 }
 
-/// Samples from `first` on of the whole image.
+/// Samples from `first_sample` on of the whole image.
 fn part(job: &RenderJob, first_sample: u32, spp: u32) -> Film {
     let settings = RenderSettings { threads: Some(1), first_sample, spp, ..Default::default() };
     render(job, &settings, &AtomicBool::new(false), &|_| ()).unwrap().film
 }
 
-/// What must not be done: samples until their own noise is below the threshold.
+/// The biased method: sampling until the samples' own noise is below the threshold.
 fn stopped_by_its_own_samples(job: &RenderJob, threshold: f64, limit: u32) -> f64 {
     let mut pixels = part(job, 0, 2).pixels();
     loop {
@@ -185,12 +194,12 @@ fn numbers_of_samples_add_no_bias() {
     const THRESHOLD: f32 = 0.9;
     let mut job = lottery(4, ("point\"", 400.0), 64);
     job.change(|s| s.sampling.spp = 256);
-    // The truth: the same lights by their power, which has hardly any variance
+    // The reference: the same lights selected by power, with hardly any variance
     let mut exact = lottery(4, ("point\"", 400.0), 64);
     exact.change(|s| s.integrator.light_sampler = LightSamplerKind::Power);
     let truth = mean(&part(&exact, 0, 4096).pixels());
 
-    // The same with a lamp that is seen, whose edges have looks
+    // The same with a visible lamp, whose edges have extra emission rays
     let beside_lamp = || lottery_beside(LAMP, 4, ("point\"", 400.0), 64);
     let (mut lamp, mut exact) = (beside_lamp(), beside_lamp());
     exact.change(|s| s.integrator.light_sampler = LightSamplerKind::Power);
@@ -228,7 +237,7 @@ fn numbers_of_samples_add_no_bias() {
     assert!(of_lamp.abs() < 3.0, "--noise, a lamp: {} instead of {truth_of_lamp}, z = {of_lamp}", seen.mean());
     assert!(with_looks > RUNS / 4, "{with_looks}");
     assert!(z(&adaptive).abs() < 3.0, "adaptive: {} instead of {truth}, z = {}", adaptive.mean(), z(&adaptive));
-    // A quarter of the runs suffices to find the bias of samples that decide on their own number
+    // A quarter of the runs suffices to detect the bias of samples that determine their own number
     assert!(z(&wrong) < -5.0, "{} instead of {truth}, z = {}", wrong.mean(), z(&wrong));
 }
 
@@ -251,7 +260,7 @@ fn pilots_end_when_they_are_stopped_and_are_given_up_at_their_deadline() {
         let settings = job.settings();
         assert_eq!((plan.warnings.len(), job.pixel_samples.is_none()), (1, true));
         assert_eq!((settings.sampling.allocation, settings.sampling.noise), (Allocation::Uniform, None));
-        // It becomes a setting, on which the image depends
+        // The allocation becomes a setting, since the image depends on it
         let chosen = |key: &str| plan.chosen.iter().find(|(k, _)| *k == key).map(|(_, value)| value.as_str());
         assert_eq!((chosen("estimator"), chosen("allocation")), (Some("mis"), Some("uniform")));
     }

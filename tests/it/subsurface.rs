@@ -1,6 +1,6 @@
-//! `Material "subsurface"`: known answers of walks through interiors, and what is refused.
+//! `Material "subsurface"`: known answers of random walks through interiors, and refusals.
 //!
-//! t-tests over images of different seeds, at a level of 10⁻⁵ for each channel; the bias that they would find is given.
+//! t-tests over images of different seeds, at a level of 10⁻⁵ for each channel; the detectable bias is given.
 
 use crate::media::{BOX, assert_answer, assert_they_agree, camera, choose, estimators, has_power, job, limit, means};
 use lumiris::import::cache::FileCache;
@@ -10,18 +10,18 @@ use lumiris::scene::AccelKind;
 use lumiris::settings::EstimatorKind;
 use std::path::Path;
 
-/// A shape of the material in even light of radiance 1; `depth` bounces.
+/// A shape with the material under uniform light of radiance 1; `depth` bounces.
 fn in_even_light(material: &str, shape: &str, depth: u32) -> String {
     camera("0.3 0.2 3", "", depth)
         + &format!(r#"LightSource "infinite" "rgb L" [1 1 1] Material "subsurface" {material} {shape}"#)
 }
 
-/// A slab so deep and wide that it is a half-space.
+/// A slab deep and wide enough to be a half-space.
 const SLAB: &str = r#"Translate 0 0 -100 Scale 100 100 100 Shape "trianglemesh" "point3 P" [-1 -1 -1  1 -1 -1  1 1 -1  -1 1 -1  -1 -1 1  1 -1 1  1 1 1  -1 1 1]
     "integer indices" [0 2 1 0 3 2  4 5 6 4 6 7  0 1 5 0 5 4  3 7 6 3 6 2  0 4 7 0 7 3  1 2 6 1 6 5]"#;
 
-/// What only scatters gives back what it gets, whatever its boundary and phase function. Two bounces, one inwards and one
-/// outwards, are all that there are: the shapes are convex.
+/// A purely scattering interior returns all incident light, for every boundary and phase function. The shapes are
+/// convex, so there are only two bounces: one inwards and one outwards.
 #[test]
 fn an_interior_that_only_scatters_is_invisible_in_even_light() {
     let ball = r#"Shape "sphere" "float radius" 1"#;
@@ -42,7 +42,8 @@ fn an_interior_that_only_scatters_is_invisible_in_even_light() {
     }
 }
 
-/// A rough boundary, lit from one direction, by a lamp and from everywhere: nobody knows the answer, but all agree on it.
+/// A rough boundary, lit from one direction, by a lamp and from everywhere: there is no analytic answer, but all
+/// estimators agree.
 #[test]
 fn a_rough_boundary_has_light_samples_that_agree_with_those_of_its_bsdf() {
     let text = |accel| {
@@ -66,8 +67,8 @@ fn a_rough_boundary_has_light_samples_that_agree_with_those_of_its_bsdf() {
     assert_eq!(both[0], both[1]);
 }
 
-/// The radiance of a half-space with an index-matched boundary in even light, seen along the normal:
-/// 1 − √(1 − α) H(1) by [Chandrasekhar 1960].
+/// The radiance of a half-space with an index-matched boundary under uniform light, viewed along the normal: 1 − √(1 −
+/// α) H(1) by [Chandrasekhar 1960].
 #[test]
 fn an_index_matched_half_space_has_the_radiance_of_chandrasekhar() {
     let albedo = [0.3_f64, 0.7, 0.95];
@@ -93,8 +94,8 @@ fn h_of_normal(albedo: f64) -> f64 {
     next(1.0, &h)
 }
 
-/// A half-space of the interior that `reflectance` asks for is a ceiling in even light; what it gives back in all directions
-/// lights a white floor, which is too small to cast a shadow.
+/// A half-space with the requested `reflectance` is a ceiling under uniform light. Its diffuse reflection lights a
+/// white floor, which is too small to cast a shadow.
 #[test]
 fn a_half_space_gives_back_the_reflectance_that_is_asked_for() {
     let reflectance = [0.2_f64, 0.5, 0.8];
@@ -108,7 +109,7 @@ fn a_half_space_gives_back_the_reflectance_that_is_asked_for() {
             );
         let mut job = job(&text, AccelKind::Embree);
         job.change(|s| s.integrator.estimator = EstimatorKind::Mis);
-        // Of what comes evenly, the boundary reflects the mean of F
+        // The boundary reflects the mean of F of uniform light
         let n = 100_000;
         let fresnel = (0..n)
             .map(|i| {
@@ -118,7 +119,7 @@ fn a_half_space_gives_back_the_reflectance_that_is_asked_for() {
             .sum::<f64>()
             / f64::from(n);
         let answer = reflectance.map(|r| fresnel + (1.0 - fresnel) * r);
-        // Similarity is no identity: what is asked for is kept to 0.02
+        // Similarity is an approximation: the requested reflectance is met within 0.02
         let detects = if g == 0.0 { 0.03 } else { 0.1 };
         let (mean, error) = means(&mut job, 256);
         for c in 0..3 {
@@ -131,7 +132,7 @@ fn a_half_space_gives_back_the_reflectance_that_is_asked_for() {
     assert!((HalfSpace::new(1.33).reflectance(HalfSpace::new(1.33).albedo(0.5, 0.0)) - 0.5).abs() < 1e-6);
 }
 
-/// A ball, instanced and mirrored, is the ball itself; what glows inside of it is found.
+/// A ball, instanced and mirrored, equals the ball itself; an emitter inside of it is sampled.
 #[test]
 fn interiors_are_those_of_instances_too_and_hold_other_things() {
     let ball = r#"AttributeBegin Material "subsurface" "rgb sigma_s" [3 3 3] "rgb sigma_a" [0.1 0.3 0.9] Shape "sphere" "float radius" 1 AttributeEnd"#;
@@ -154,11 +155,14 @@ fn interiors_are_those_of_instances_too_and_hold_other_things() {
 
 #[test]
 fn what_cannot_be_an_interior_is_refused_with_its_place() {
+    // The error message for a box with the material
     let message = |material: &str| {
         let text = camera("0 0 3", "", 3) + "\n" + material + "\n" + BOX;
         let loaded = load_text(&text, "jade", Path::new("."), &LoadOptions::default(), &FileCache::default());
         loaded.err().map(|d| d.to_string()).unwrap_or_default()
     };
+
+    // Wrong materials and their messages
     for (material, expected) in [
         (r#"Material "subsurface" "rgb sigma_a" [1 1 1]"#, "needs `sigma_s`"),
         (r#"Material "subsurface" "rgb sigma_a" [1 -1 1] "rgb sigma_s" [1 1 1]"#, "must not be negative"),

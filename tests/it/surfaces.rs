@@ -1,4 +1,4 @@
-//! Surfaces that must not meet themselves or each other: flat emitters, surfaces in the same place, and cut-outs that a
+//! Self-intersections and intersections of coincident surfaces: flat emitters, coincident surfaces, and cut-outs that a
 //! ray crosses twice.
 
 use crate::media::job;
@@ -22,7 +22,7 @@ fn mean(job: &RenderJob) -> f64 {
     pixels.iter().sum::<f64>() / pixels.len() as f64
 }
 
-/// At the origin, off it, turned, and turned at other scales.
+/// At the origin, off it, rotated, and rotated at other scales.
 fn placements() -> [Affine3A; 5] {
     let turn = Quat::from_axis_angle(Vec3::new(1.0, 2.0, 3.0).normalize(), 0.7);
     let scaled = |s: f32, p: Vec3| Affine3A::from_scale_rotation_translation(Vec3::splat(s), turn, p);
@@ -35,7 +35,7 @@ fn placements() -> [Affine3A; 5] {
     ]
 }
 
-/// A scene of 4 × 4 pixels, seen from (0.4, 0.3, 5) of a placement along −z about.
+/// A scene of 4 × 4 pixels, viewed from (0.4, 0.3, 5) of a placement, roughly along −z.
 fn header(at: &Affine3A, spp: u32, depth: u32) -> String {
     let [eye, target] = [Vec3::new(0.4, 0.3, 5.0), Vec3::ZERO].map(|p| at.transform_point3(p));
     let up = at.transform_vector3(Vec3::Y).normalize();
@@ -75,7 +75,7 @@ fn disk(at: &Affine3A, radius: f32) -> String {
 const SQUARE: [[f32; 2]; 4] = [[-2.0, -2.0], [2.0, -2.0], [2.0, 2.0], [-2.0, 2.0]];
 const TWO: &str = "0 1 2 0 2 3";
 
-/// Flat surfaces in z = 0 of a placement that fill the image.
+/// Flat surfaces in the plane z = 0 of a placement that fill the image.
 fn flat_shapes(at: &Affine3A) -> Vec<(&'static str, String)> {
     let trapezoid = [[-2.0, -2.0], [2.0, -2.1], [2.5, 2.0], [-1.9, 2.0]];
     let [a, b, c, d] = trapezoid;
@@ -95,8 +95,9 @@ fn flat_shapes(at: &Affine3A) -> Vec<(&'static str, String)> {
 
 type Change = Box<dyn Fn(&mut Settings)>;
 
-/// Every way to estimate direct light.
+/// All estimators of direct light.
 fn estimators() -> Vec<(String, Change)> {
+    // Estimators with direct and with indirect light
     let mut all: Vec<(String, Change)> = Vec::new();
     for (kind, samples) in [
         (EstimatorKind::Auto, None),
@@ -120,6 +121,8 @@ fn estimators() -> Vec<(String, Change)> {
             all.push((format!("{kind:?} {samples:?}, depth {depth}"), Box::new(change)));
         }
     }
+
+    // Irradiance caches
     for cached in [Cached::Indirect, Cached::All] {
         let change = move |s: &mut Settings| {
             s.integrator.kind = IntegratorKind::IrradianceCache;
@@ -134,11 +137,13 @@ fn estimators() -> Vec<(String, Change)> {
 fn a_flat_emitter_does_not_light_itself() {
     for (k, at) in placements().into_iter().enumerate() {
         for (name, shape) in flat_shapes(&at) {
+            // A white emitter of radiance 1
             let emitter = r#"Material "diffuse" "rgb reflectance" [1 1 1]
                 AreaLightSource "diffuse" "rgb L" [1 1 1] "bool twosided" true "#;
             let mut scene = job(&format!("{}{emitter}{shape}", header(&at, 4, 1)), AccelKind::Embree);
             let start = *scene.settings();
             let all = k == 0 || k == 2;
+            // No estimator adds light to its own emission
             for (estimator, change) in estimators().into_iter().filter(|(name, _)| all || name.starts_with("Mis")) {
                 scene.change(|s| {
                     *s = start;
@@ -154,7 +159,7 @@ fn a_flat_emitter_does_not_light_itself() {
 
 #[test]
 fn a_flat_emitter_does_not_hide_other_light_from_itself() {
-    // A sky of 0.5 adds as much; the emitter would hide a sixth of it
+    // A sky of 0.5 adds the same amount; the emitter would occlude a sixth of it
     for at in placements().into_iter().step_by(2) {
         for (name, shape) in flat_shapes(&at) {
             let lights = r#"LightSource "infinite" "rgb L" [0.5 0.5 0.5] Material "diffuse" "rgb reflectance" [1 1 1]
@@ -172,7 +177,7 @@ fn a_flat_emitter_does_not_hide_other_light_from_itself() {
 
 #[test]
 fn surfaces_of_two_kinds_in_the_same_place_do_not_shadow_each_other() {
-    // Both reflect half of a sky of 1; each hides from the other what it shadows
+    // Both reflect half of a sky of 1; any shadow on the other one darkens it
     for at in placements() {
         let placed = |p: Vec3| Affine3A::from_translation(at.matrix3 * p) * at;
         let off = placed(Vec3::new(1.5, -0.5, 0.0));
@@ -238,7 +243,7 @@ fn a_lamp_in_the_plane_of_a_ceiling_of_another_kind_is_seen_whole() {
     }
 }
 
-/// Cut-outs about the origin that rays along z, or nearly so, cross twice.
+/// Cut-outs about the origin that rays roughly along z cross twice.
 const CROSSED_TWICE: [(&str, &str); 6] = [
     ("sphere", r#"Shape "sphere" "float radius" 2 "float alpha" 0.5"#),
     (
@@ -291,7 +296,7 @@ fn an_alpha_of_half_lets_a_quarter_through_where_it_is_crossed_twice() {
             let found = [AccelKind::Embree, AccelKind::Bvh].map(|accel| mean(&job(&text, accel)));
             // Five standard deviations of 4096 decisions
             assert!((found[0] - 0.25).abs() < 0.034, "{name}, {rays}: {found:?}");
-            // Rays at edges of triangles may decide otherwise
+            // Rays at edges of triangles may decide differently
             assert!((found[0] - found[1]).abs() < 1e-3, "{name}, {rays}: {found:?}");
         }
     }

@@ -1,4 +1,4 @@
-//! Textures in files that hold their own pyramids, as texture converters write them: tiled TIFF files with all levels.
+//! Texture files with their own pyramids, as texture converters write them: tiled TIFF files with all levels.
 
 use lumiris::imaging::tiles::TileStore;
 use lumiris::imaging::{ColorEncoding, Filter, MipMap, Wrap};
@@ -12,7 +12,7 @@ use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-/// Not of whole tiles, and of a side that rounds down.
+/// Not a multiple of the tile size, and with a side that rounds down.
 const SIZE: [usize; 2] = [300, 201];
 
 /// Sizes of all levels.
@@ -21,7 +21,7 @@ fn sizes() -> Vec<[usize; 2]> {
     std::iter::successors(Some(SIZE), next).collect()
 }
 
-/// What a level stores at a pixel: no mean of the level before.
+/// The stored value of a pixel: no mean of the level before.
 fn byte(level: usize, x: usize, y: usize, c: usize) -> u8 {
     ((x * 3 + y * 7 + c * 50 + level * 37) % 256) as u8
 }
@@ -29,7 +29,7 @@ fn byte(level: usize, x: usize, y: usize, c: usize) -> u8 {
 /// Type, number and bytes of the values of a tag.
 type Values = (u16, usize, Vec<u8>);
 
-/// A TIFF file of so many levels, with tiles of this edge, of bytes or of floats.
+/// A TIFF file of `levels` levels, with tiles of `tile` × `tile` pixels, of bytes or of floats.
 fn tiff(levels: usize, tile: usize, is_float: bool) -> Vec<u8> {
     let mut file = b"II*\0\0\0\0\0".to_vec();
     let mut link = 4;
@@ -66,7 +66,7 @@ fn tiff(levels: usize, tile: usize, is_float: bool) -> Vec<u8> {
             (324, longs(offsets.clone())),
             (325, longs(vec![tile_bytes; offsets.len()])),
             (339, shorts(if is_float { 3 } else { 1 })),
-            // Of a texture: what follows the image are its levels
+            // A texture: the images after the first are its levels
             (33302, (ascii, name.len(), name)),
         ];
         let mut directory = (tags.len() as u16).to_le_bytes().to_vec();
@@ -96,7 +96,7 @@ fn request(path: &Path, encoding: ImageEncoding) -> ImageRequest {
     ImageRequest { path, channels: ImageChannels::Color, encoding, wrap: Wrap::Repeat, filter: Filter::Trilinear }
 }
 
-/// Asserts that all texels of all levels are those of the file.
+/// Asserts that all texels of all levels equal those in the file.
 fn assert_texels(map: &MipMap, is_float: bool, encoding: ColorEncoding) {
     assert_eq!((map.levels(), map.resolution(), map.channels()), (sizes().len(), SIZE, 3));
     let table = encoding.byte_table();
@@ -150,7 +150,7 @@ fn what_lacks_a_level_has_those_of_its_image() {
     assert!((map.texel(1, 5, 0).to_array()[0] - mean(5)).abs() < 0.01);
 }
 
-/// A square with the texture, so far away that a part of it has coarser levels.
+/// A square with the texture, far enough away to use coarser levels in part of the image.
 const SCENE: &str = "LookAt 0 0.3 -2  0 0 0  0 1 0\nCamera \"perspective\" \"float fov\" 50\n\
     Film \"rgb\" \"integer xresolution\" 48 \"integer yresolution\" 32\nIntegrator \"direct\"\nWorldBegin\n\
     LightSource \"infinite\"\nTexture \"t\" \"spectrum\" \"imagemap\" \"string filename\" \"a.tx\" \
@@ -159,6 +159,7 @@ const SCENE: &str = "LookAt 0 0.3 -2  0 0 0  0 1 0\nCamera \"perspective\" \"flo
 
 #[test]
 fn images_are_the_same_to_the_bit_by_tiles_of_the_file_and_end_where_it_is_cut() {
+    // A scene with its texture
     let folder = tempfile::tempdir().unwrap();
     let (scene, path) = (folder.path().join("s.pbrt"), folder.path().join("a.tx"));
     std::fs::write(&scene, SCENE).unwrap();
@@ -175,9 +176,12 @@ fn images_are_the_same_to_the_bit_by_tiles_of_the_file_and_end_where_it_is_cut()
         rendering
             .map(|rendering| (channels(&rendering.film, &[], None).data, job.world.scene.textures.store().is_some()))
     };
+
+    // With tiles and without: the same bits
     let (whole, by_tiles) = (image(None).unwrap(), image(Some(50_000)).unwrap());
     assert!(!whole.1 && by_tiles.1 && whole.0 == by_tiles.0);
 
+    // A truncated file is an error of the rendering
     let job = job(Some(50_000));
     std::fs::write(&path, tiff(1, 64, false).split_at(40_000).0).unwrap();
     let error = render(&job, &RenderSettings::default(), &AtomicBool::new(false), &|_| ()).unwrap_err().to_string();

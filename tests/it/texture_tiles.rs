@@ -1,4 +1,4 @@
-//! Textures that do not fit into the memory they may take: the same image to the bit.
+//! Textures beyond the memory limit: bit-identical images.
 
 use lumiris::imaging::oiio::{Part, write_image};
 use lumiris::import::cache::FileCache;
@@ -10,10 +10,10 @@ use std::fmt::Write;
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
-/// Edge of the square images, of which a half is 8-bit and the other half floats.
+/// Side of the square images. One half of them is 8-bit, the other half floats.
 const EDGE: usize = 300;
 const IMAGES: usize = 6;
-/// Bytes of all pyramids, but for rounding.
+/// Bytes of all pyramids, except for rounding.
 const BYTES: u64 = (EDGE * EDGE * 3 * (1 + 4) * IMAGES / 2 * 4 / 3) as u64;
 
 /// A wall of squares, each with an image on it, near and far.
@@ -25,11 +25,14 @@ fn write_scene(folder: &Path) {
         .to_owned();
     for i in 0..IMAGES {
         let name = format!("{i}.{}", if i % 2 == 0 { "png" } else { "exr" });
+        // The image
         let value = |x: usize, y: usize, c: usize| ((x * (i + 3) + y * 7 + c * 50) % 256) as f32 / 255.0;
         let pixels = (0..EDGE * EDGE * 3).map(|k| value(k / 3 % EDGE, k / 3 / EDGE, k % 3)).collect();
         let names = ["R", "G", "B"].map(str::to_owned).to_vec();
         let part = if i % 2 == 0 { Part::display } else { Part::linear };
         write_image(&folder.join(&name), &[part(EDGE, EDGE, names, pixels)]).unwrap();
+
+        // The square
         let filter = ["point", "bilinear", "trilinear"][i % 3];
         let (x, z) = ((i % 3) as f32 - 1.5, (i / 3) as f32 * 4.0 - 1.0);
         write!(
@@ -75,7 +78,7 @@ fn images_are_the_same_to_the_bit_with_a_quarter_of_the_memory_and_less() {
         let counts = store.counts();
         assert!(counts.read > 0 && store.failure().is_none(), "{counts:?}");
         let (tiled, whole): (Vec<_>, Vec<_>) = textures.images.iter().partition(|image| image.store().is_some());
-        // Levels of a tile and less stay in memory: from 37 × 37 texels on, 5.5 kB of bytes and 22 kB of floats
+        // Levels no larger than a tile stay in memory: from 37 × 37 texels on, 5.5 kB of bytes and 22 kB of floats
         assert!(!tiled.is_empty() && tiled.iter().all(|image| image.bytes() < 22_500), "{:?}", tiled[0].bytes());
         let whole: u64 = whole.iter().map(|image| image.bytes() as u64).sum();
         assert!(whole + counts.held <= limit && counts.held > 0, "{whole} + {counts:?}, limit {limit}");
@@ -87,7 +90,7 @@ fn what_fits_stays_in_memory() {
     let folder = tempfile::tempdir().unwrap();
     write_scene(folder.path());
     assert!(job(folder.path(), Some(2 * BYTES)).world.scene.textures.store().is_none());
-    // Half of it: the largest go
+    // Half of it: the largest images move to tiles
     let job = job(folder.path(), Some(BYTES / 2));
     let images = &job.world.scene.textures.images;
     let is_tiled: Vec<bool> = images.iter().map(|image| image.store().is_some()).collect();

@@ -1,4 +1,4 @@
-//! Image textures of tiles, `<UDIM>` in the name of a file.
+//! Image textures of tiles: `<UDIM>` in the file name.
 
 use lumiris::imaging::oiio::{Part, write_image};
 use lumiris::import::cache::FileCache;
@@ -7,7 +7,7 @@ use lumiris::textures::{RgbTexture, TextureContext};
 use lumiris_numbers::math::{DVec3, Rgb, Vec2, Vec3};
 use std::path::Path;
 
-/// Tiles 1001, 1002 and 1011 of one colour each, and files that are none.
+/// Tiles 1001, 1002 and 1011 of one colour each, and files that are no tiles.
 fn folder() -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     for (name, value) in [("1001", 0.25), ("1002", 0.5), ("1011", 0.75), ("0999", 9.0), ("10021", 9.0), ("1o01", 9.0)] {
@@ -33,6 +33,7 @@ fn load(folder: &Path, name: &str) -> Result<Loaded, String> {
 
 #[test]
 fn each_tile_has_its_image_and_the_rest_is_black() {
+    // The texture has three images
     let folder = folder();
     let textures = load(folder.path(), "wall.<UDIM>.exr").unwrap().scene.textures;
     assert_eq!(textures.images.len(), 3);
@@ -43,6 +44,8 @@ fn each_tile_has_its_image_and_the_rest_is_black() {
             TextureContext { uv, uv_width: Vec2::ZERO, uv1, color: [1.0; 4], face: 0, p: DVec3::ZERO, n: Vec3::Z };
         textures.image_value(wall.unwrap(), &ctx)
     };
+
+    // Texture coordinates and the values there
     for (u, v, value) in [
         (0.3, 0.7, 0.25),
         (0.3, 0.2, 0.5),

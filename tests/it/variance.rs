@@ -1,4 +1,4 @@
-//! The variances that an image states, against those that many seeds show.
+//! Stated variances of images, compared with the variances between many seeds.
 
 use lumiris::film::Film;
 use lumiris::import::cache::FileCache;
@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 use strum::IntoEnumIterator;
 
-/// A scene, its size, and whether indirect light is computed.
+/// A scene, its size, and whether it has indirect light.
 struct Case {
     scene: &'static str,
     size: [u32; 2],
@@ -25,13 +25,13 @@ const QUIET: [Case; 2] = [
     Case { scene: "scenes/analytic/half-environment.pbrt", size: [12, 12], kind: IntegratorKind::Direct },
 ];
 
-/// A way to render.
+/// A rendering mode.
 struct Mode {
     name: &'static str,
     change: fn(&mut Settings),
 }
 
-/// Those in which a variance is more or less than s²/N.
+/// Modes with a variance above or below s²/N.
 const MODES: [Mode; 7] = [
     Mode { name: "mis", change: |_| () },
     Mode { name: "sobol", change: |s| s.sampling.sampler = SamplerKind::Sobol },
@@ -52,7 +52,7 @@ fn all_together(s: &mut Settings) {
     (s.integrator.path_reuse, s.integrator.light_paths) = (Some(4), Some(1.0));
 }
 
-/// Paths by `mis`, which share nothing and are as many in each pixel, and then what the mode changes.
+/// Independent paths by `mis`, the same number in each pixel, then the changes of the mode.
 fn set(job: &mut RenderJob, mode: &Mode) {
     job.change(|s| {
         s.integrator.estimator = EstimatorKind::Mis;
@@ -74,7 +74,7 @@ const SCENES: [&str; 8] = [
     "talbot/spheres",
 ];
 
-/// Others instead of them: files, divided by colons.
+/// Environment variable with other scenes instead: files, separated by colons.
 const OTHER_SCENES: &str = "VARIANCE_SCENES";
 
 fn job(case: &Case, sampler: SamplerKind) -> RenderJob {
@@ -100,16 +100,16 @@ fn mean(values: &[f64]) -> (f64, f64) {
     (mean, (values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / (n - 1.0) / n).sqrt())
 }
 
-/// What images of many seeds show; ratios are to the variance between seeds, summed over channels and over the pixels of the image
-/// or of a block of 8 × 8.
+/// Statistics of images of many seeds. Ratios are relative to the variance between seeds, summed over channels and over
+/// the pixels of the image or of a block of 8 × 8.
 struct Study {
-    /// The variance stated.
+    /// The stated variance.
     stated: f64,
-    /// Its standard error: those of both terms of the ratio.
+    /// Its standard error, from both terms of the ratio.
     error: f64,
-    /// The variance that independent samples would have.
+    /// The variance of independent samples.
     independent: f64,
-    /// The variance stated, in the median block, and least and most in a block.
+    /// The stated variance in the median block, and its minimum and maximum over blocks.
     blocks: [f64; 3],
 }
 
@@ -170,18 +170,18 @@ fn variances_are_those_between_seeds_for_every_sampler_and_number_of_samples() {
                 let s = study(&mut job, spp, 32);
                 let what =
                     format!("{}, {}, {spp} samples: {} ± {}", case.scene, <&str>::from(sampler), s.stated, s.error);
-                // Of 32 seeds with 144 pixels and replicas each, both errors are about √(2/144/32) = 2 %, and more
-                // where variances differ between pixels: 20 % are more than three of them.
+                // With 32 seeds of 144 pixels and replicas each, both errors are about √(2/144/32) = 2 %, and larger
+                // where variances differ between pixels: 20 % is more than three standard errors
                 assert!(s.error < 0.06, "{what}");
                 assert!((s.stated - 1.0).abs() < 0.2, "{what}");
-                // The formula for independent samples would not do
+                // The formula for independent samples would fail
                 assert!(sampler.has_independent_samples() || spp < 8 || s.independent > 2.0, "{what}");
             }
         }
     }
 }
 
-/// A room whose lamp is seen, with a ball of metal, 32 × 32 pixels.
+/// A room with a visible lamp and a metal ball, 32 × 32 pixels.
 const ROOM: &str = r#"
 LookAt 0 0 4  0 0 0  0 1 0
 Camera "perspective" "float fov" 42
@@ -199,9 +199,9 @@ Material "conductor" "float roughness" 0.05
 AttributeBegin Translate 0.4 -0.6 0.2 Shape "sphere" "float radius" 0.4 AttributeEnd
 "#;
 
-/// The edge of the lamp, of few pixels, has most of the variance: with 24 seeds, the ratio has a standard error of 7 to 10 %,
-/// 19 % where numbers are adaptive. Of 3 standard errors, a right one fails with a probability of 0.003, and with 10 % a factor
-/// of 1.8 is found with one of 0.9. Blocks have errors of 10 %.
+/// The edge of the lamp, of few pixels, has most of the variance. With 24 seeds, the ratio has a standard error of 7 to
+/// 10 %, and of 19 % with adaptive sample counts. At 3 standard errors, a right ratio fails with a probability of
+/// 0.003. At an error of 10 %, a factor of 1.8 is detected with a probability of 0.9. Blocks have errors of 10 %.
 #[test]
 fn variances_are_those_between_seeds_in_every_mode() {
     let loaded = load_text(ROOM, "room", Path::new("."), &LoadOptions::default(), &FileCache::default());
@@ -229,9 +229,12 @@ fn light_paths_have_their_part_of_the_variance() {
 
 #[test]
 fn replicas_change_no_image_and_do_not_depend_on_tiles_and_threads() {
+    // Without replicas
     let job = job_of(Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/demo/gallery.pbrt"), [48, 27]);
     let plain = film(&job, RenderSettings { spp: 5, ..RenderSettings::default() });
     assert!(plain.replicas().is_empty());
+
+    // With replicas: the same image, and variances independent of tiles and threads
     let mut variances: Vec<Vec<[f64; 3]>> = Vec::new();
     for (threads, tile_size) in [(1, 16), (2, 16), (2, 7)] {
         let settings = RenderSettings {
@@ -254,10 +257,13 @@ fn replicas_change_no_image_and_do_not_depend_on_tiles_and_threads() {
 #[ignore = "prints the table of docs/measurements/variance"]
 #[allow(clippy::print_stdout)]
 fn table() {
+    // Scenes, from the environment or the list
     println!("| scene | mode | s²/N | stated | ± | median block | least | most |\n|---|---|---|---|---|---|---|---|");
     let own = |name: &&str| Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes").join(name).with_extension("pbrt");
     let others = |paths: String| paths.split(':').map(PathBuf::from).collect();
     let paths: Vec<PathBuf> = std::env::var(OTHER_SCENES).map_or_else(|_| SCENES.iter().map(own).collect(), others);
+
+    // A row for each scene and mode
     for path in paths {
         let mut job = job_of(path.clone(), [96, 64]);
         let base = *job.settings();

@@ -1,8 +1,8 @@
-//! Direct light with the visibility cache [Keller and Wald 2000, §3]: its contents affect the noise only, unless lights
+//! Direct light with the visibility cache [Keller and Wald 2000, §3]: its contents affect only the noise, unless lights
 //! are left out on request.
 //!
-//! That every estimator gives the known answer with the cache absent, empty, right and wrong is tested in
-//! [`super::analytic_scenes`].
+//! [`super::analytic_scenes`] tests that every estimator gives the known answer with the cache absent, empty, right and
+//! wrong.
 
 use super::analytic_scenes::answer;
 use lumiris::accel::{Coherence, RayBatch};
@@ -29,17 +29,18 @@ pub(crate) enum CacheContents {
     Absent,
     /// A cache without photons.
     Empty,
-    /// The lights that photons show to be visible.
+    /// The lights that photons prove to be visible.
     Right,
-    /// The same photons with other lights, chosen at random, some of which do not exist.
+    /// The same photons with other lights, chosen at random; some of them do not exist.
     Wrong,
 }
 
-/// Photons of a light.
+/// Photons per light.
 const PHOTONS: u32 = 1000;
 
-/// Photons of every light where they first meet a surface.
+/// Photons of every light at their first intersections.
 fn primary_photons(job: &RenderJob) -> Vec<(Vec3, Vec3, LightId)> {
+    // Emit photons
     let lights = &job.lights;
     let (mut rays, mut ids) = (RayBatch::default(), Vec::new());
     for (id, light) in (0..).zip(&lights.lights) {
@@ -53,8 +54,12 @@ fn primary_photons(job: &RenderJob) -> Vec<(Vec3, Vec3, LightId)> {
             }
         }
     }
+
+    // Trace them
     let mut hits = Vec::new();
     job.world.accel.intersect(&rays, Coherence::Incoherent, &mut hits);
+
+    // Photons at the hits
     let photon = |(i, hit): (usize, &Option<lumiris::accel::Hit>)| {
         let hit = hit.as_ref()?;
         let surface = job.world.scene.geometry.surface_hit(hit.geometry, hit.primitive, hit.instance, hit.uv, 0.0);
@@ -64,7 +69,7 @@ fn primary_photons(job: &RenderJob) -> Vec<(Vec3, Vec3, LightId)> {
     hits.iter().enumerate().filter_map(photon).collect()
 }
 
-/// A visibility cache with given contents for a job.
+/// A visibility cache with the given contents for a job.
 pub(crate) fn cache_with(job: &RenderJob, kind: CacheContents) -> Option<VisibilityCache> {
     let radius = job.lights.scene_radius;
     match kind {
@@ -82,7 +87,7 @@ pub(crate) fn cache_with(job: &RenderJob, kind: CacheContents) -> Option<Visibil
     }
 }
 
-/// The lights of the scene that the origin sees, and the others.
+/// Whether the light is visible from the origin.
 fn is_seen(job: &RenderJob, light: LightId) -> bool {
     let ctx = lumiris::lights::LightCtx::at(Vec3::ZERO);
     job.lights.lights[light as usize].sample_li(&ctx, [0.5; 2]).is_some_and(|s| s.p.x < 0.5)
@@ -94,7 +99,7 @@ fn job(settings: impl Fn(&mut IntegratorSettings), seen: impl Fn(&RenderJob, Lig
     settings(&mut loaded.settings.integrator);
     let mut job = loaded.job(AccelKind::Embree, None).unwrap();
     let ids = (0..job.lights.lights.len() as LightId).filter(|&id| seen(&job, id));
-    // So few paths that more photons arrive than are expected: lights with photons are known to be visible
+    // With so few expected paths, the photons exceed them: lights with photons are classified as visible
     let paths = (0..job.lights.lights.len() as LightId).map(|id| (id, 1000.0));
     let visibility_cache = VisibilityCache::new(ids.flat_map(|id| vec![(Vec3::ZERO, Vec3::Z, id); 20]), 0.1);
     let visibility_cache = visibility_cache.with_paths(paths);
@@ -151,11 +156,14 @@ fn a_image_says_that_lights_were_left_out() {
 
 #[test]
 fn a_right_visibility_cache_lowers_the_variance() {
+    // The variance ratio without and with a cache is above `min`
     let ratio = |settings: &dyn Fn(&mut IntegratorSettings), min: f64| {
         let without = pixels(&mut job(settings, |_, _| false), 100).variance();
         let with = pixels(&mut job(settings, is_seen), 100).variance();
         assert!(without > min * with, "{without} without a cache, {with} with one");
     };
+
+    // Light selection, resampling, and contributing lights
     ratio(
         &|s| {
             s.light_sampler = LightSamplerKind::Photons;
@@ -177,7 +185,7 @@ fn a_right_visibility_cache_lowers_the_variance() {
 
 #[test]
 fn brighter_lights_first_leave_little_noise_and_no_bias() {
-    // All 25 lights are taken for seen: 16 of them are hidden, which the order does not know.
+    // All 25 lights are taken for visible. The order does not account for the 16 hidden ones
     let estimate = |samples| pixels(&mut job(contributing(samples, 0), |_, _| true), 100);
     let estimates = [1, 8, 20, 60].map(estimate);
     for e in &estimates {
@@ -186,12 +194,12 @@ fn brighter_lights_first_leave_little_noise_and_no_bias() {
     let [one, eight, twenty, sixty] = estimates.map(|e| e.variance());
     assert!(one > 2.0 * eight && eight > 2.0 * twenty && twenty > sixty, "{one} {eight} {twenty} {sixty}");
 
-    // Where all are seen, one of them in proportion to its brightness is worth as much as all.
+    // If all are visible, one light chosen in proportion to its brightness is as good as all lights
     let [one, all] = [1, 9].map(|samples| pixels(&mut job(contributing(samples, 0), is_seen), 100).variance());
     assert!(one < 2.0 * all, "{one} {all}");
 }
 
-/// A floor that reflects lamps, some of them behind a wall, a sky, and another sky whose directions are the same.
+/// A floor that reflects lamps, some of them behind a wall, a sky, and another sky with the same directions.
 const GLOSSY: &str = r#"
 LookAt -1 0 1  0 0 0  0 0 1
 Camera "orthographic" "float screenwindow" [ -0.3 0.3 -0.3 0.3 ]
@@ -241,7 +249,7 @@ fn with_bsdf(samples: u32, noncontributing: u32, bsdf: u32) -> impl Fn(&mut Inte
 
 #[test]
 fn bsdf_samples_beside_contributing_lights_leave_no_bias() {
-    // Up to 64 lights are weighed, more are chosen by their photons; only one of `part` lights has any
+    // Up to 64 lights are weighted, more are chosen by their photons; only one of `part` lights has photons
     for (lamps, part) in [(0, 1), (3, 3), (3, 1), (16, 2)] {
         let mis = |s: &mut IntegratorSettings| (s.estimator, s.samples) = (EstimatorKind::Mis, Some(8));
         let expected = pixels(&mut glossy_job(lamps, mis), 2000);

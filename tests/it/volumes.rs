@@ -1,4 +1,4 @@
-//! Media of NanoVDB files: the same images as those of dense grids of the same values, and what is wrong with files.
+//! Media of NanoVDB files: the same images as with dense grids of the same values, and errors of files.
 
 use crate::media::{Answer, BOX, assert_answer, assert_they_agree, camera, choose, estimators, means};
 use lumiris::import::cache::FileCache;
@@ -10,7 +10,7 @@ use lumiris_test_support::nanovdb::{NanoSpec, plain_nano_file};
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
-/// Voxels along an axis, the index of the first, and the distance between them.
+/// The number of voxels along an axis, the index of the first one, and their spacing.
 const VOXELS: i32 = 20;
 const FIRST: [i32; 3] = [-13, -12, -9];
 const STEP: f64 = 0.125;
@@ -20,7 +20,7 @@ fn job(text: &str, folder: &Path) -> RenderJob {
     loaded.map_err(|d| d.to_string()).unwrap().job(AccelKind::Embree, None).unwrap()
 }
 
-/// The density of voxel x, y, z of a box: nothing in a third of it, and the same in one cube.
+/// The density of voxel x, y, z of a box: empty in a third of it, and constant in one cube.
 fn density([x, y, z]: [i32; 3]) -> f32 {
     let index = [x + FIRST[0], y + FIRST[1], z + FIRST[2]];
     match index.map(|i| i >> 3) {
@@ -34,17 +34,18 @@ fn kelvin([x, y, z]: [i32; 3]) -> f32 {
     1000.0 + 100.0 * ((x * 3 + y * 7 + z) % 19) as f32
 }
 
-/// A grid of these values whose box is about the origin; indices are turned about z by `degrees` and stretched along x.
+/// A grid of these values whose box is about the origin. Indices are rotated about z by `degrees` and stretched along
+/// x.
 fn spec(name: &str, value: fn([i32; 3]) -> f32, degrees: f64, stretch: f64) -> NanoSpec {
     let mut spec = NanoSpec::new(name);
     let end = FIRST.map(|i| i + VOXELS);
     spec.fill(FIRST, end, |p| value([0, 1, 2].map(|a| p[a] - FIRST[a])));
-    // A leaf that is the same all over is a tile
+    // A leaf of a constant value is a tile
     let (tiles, leaves): (Vec<_>, Vec<_>) = spec.leaves.into_iter().partition(|(_, v)| v.iter().all(|x| *x == v[0]));
     spec.tiles = tiles.into_iter().map(|(origin, values)| (origin, 8, values[0])).collect();
     spec.leaves = leaves;
     let (sin, cos) = degrees.to_radians().sin_cos();
-    // What the text undoes: first the turn, then the stretch
+    // The scene text undoes these: first the rotation, then the stretch
     let moved = |[x, y, z]: [f64; 3]| [stretch * (cos * x - sin * y), sin * x + cos * y, z];
     let middle = f64::from(VOXELS - 1) / 2.0;
     let shift = FIRST.map(|i| -STEP * (f64::from(i) + middle));
@@ -52,7 +53,7 @@ fn spec(name: &str, value: fn([i32; 3]) -> f32, degrees: f64, stretch: f64) -> N
     spec
 }
 
-/// The same values as text, x first, times a factor.
+/// The same values as text, x first.
 fn values(value: impl Fn([i32; 3]) -> f32) -> String {
     let n = VOXELS;
     (0..n * n * n).map(|i| format!("{} ", value([i % n, i / n % n, i / n / n]))).collect()
@@ -70,8 +71,8 @@ fn scene(medium: &str) -> String {
         )
 }
 
-/// A tree and a dense grid of the same values are the same medium: with voxels of negative indices, empty space, a tile,
-/// temperatures, and maps that are turned and stretched. The box that is lit lies between the outermost voxels.
+/// A tree and a dense grid of the same values are the same medium: with voxels of negative indices, empty space, a
+/// tile, temperatures, and maps with rotation and stretch. The lit box lies between the outermost voxels.
 #[test]
 fn a_volume_is_lit_like_the_dense_grid_of_its_values() {
     let folder = tempfile::tempdir().unwrap();
@@ -116,12 +117,12 @@ fn a_volume_is_lit_like_the_dense_grid_of_its_values() {
             .collect();
         assert_they_agree(&answers, 0.06);
     }
-    // Temperatures have a map of their own
+    // Temperatures have their own map
     let named = scene(&sparse("hot.nvdb", r#""string gridname" "fog" "string temperaturename" "heat""#));
     assert!(job(&named, folder.path()).world.scene.media.is_emissive());
 }
 
-/// What a sample costs, by which their numbers are adaptive.
+/// The cost of a sample, which determines the adaptive sample counts.
 #[test]
 fn collisions_are_counted_of_flights_and_of_shadow_segments() {
     let collisions = |factor: f32| {
@@ -141,11 +142,11 @@ fn collisions_are_counted_of_flights_and_of_shadow_segments() {
     assert!((0..2).all(|k| thin[k] > 0 && dense[k] > 2 * thin[k]), "{thin:?} {dense:?}");
 }
 
-/// In even light, a volume that only scatters is not seen, by any estimator.
+/// Under uniform light, a purely scattering volume is invisible with every estimator.
 #[test]
 fn a_volume_that_only_scatters_is_invisible_in_even_light() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/nanovdb");
-    // A map of the file, undone by the transformation but for a factor
+    // The transformation undoes the map of the file, except for a factor
     let text = camera("0.3 0.2 3", "", 60)
         + &format!(
             r#"AttributeBegin Scale 0.25 0.3 0.3 Translate 0 0 12.5
@@ -159,7 +160,7 @@ fn a_volume_that_only_scatters_is_invisible_in_even_light() {
         choose(&mut job, &settings);
         assert_answer(&mut job, 48, [1.0; 3], 0.13, &estimator);
     }
-    // The tree, its nodes and majorants: not the box of its voxels
+    // The tree, its nodes and majorants, but not all voxels of the box
     let bytes = job.world.scene.media.media.iter().map(Medium::bytes).sum::<usize>();
     assert!((1 << 15..1 << 22).contains(&bytes), "{bytes}");
 }
@@ -198,7 +199,7 @@ fn faults_in_volumes_are_reported_with_their_places() {
         assert!(text.contains("volumes:2:"), "{medium}: {text}");
     }
     assert!(!load(r#""string filename" "fog.nvdb""#).contains("temperature"), "no temperature is no fault");
-    // Impossible values
+    // Invalid values
     let mut odd = fog;
     odd.leaves[0].1[..3].copy_from_slice(&[f32::NAN, -1.0, f32::INFINITY]);
     write("odd.nvdb", &plain_nano_file(&[odd]));

@@ -1,4 +1,4 @@
-//! Vertices side by side are the vertices one by one: the same random numbers give the same radiance.
+//! Batched path tracing equals tracing vertex by vertex: the same random numbers give the same radiance.
 
 use lumiris::direct::Fits;
 use lumiris::film::PixelSample;
@@ -27,6 +27,7 @@ fn job(scene: &str, kind: IntegratorKind, estimator: EstimatorKind, samples: u32
 }
 
 fn camera_samples(job: &RenderJob) -> Vec<CameraSample> {
+    // One camera sample through the centre of each pixel
     let pixels = (0..RESOLUTION[1]).flat_map(|y| (0..RESOLUTION[0]).map(move |x| [x, y]));
     let sample = |pixel: [u32; 2]| {
         let stream = SampleStream::new(SamplerKind::Sobol, pixel, 0, 3);
@@ -48,7 +49,7 @@ fn camera_samples(job: &RenderJob) -> Vec<CameraSample> {
     pixels.map(sample).collect()
 }
 
-/// Traces side by side, or by the stages of direct light, which list what samples contribute.
+/// Traces in batches, or by the stages of direct light, which list the contributions of samples.
 fn traced(job: &RenderJob, samples: &[CameraSample], side_by_side: bool) -> Vec<PixelSample> {
     let mut out = Vec::new();
     let mut tracer = PathTracer::default();
@@ -83,7 +84,7 @@ fn assert_same_radiance_of(job: &RenderJob, scene: &str, part: f64) {
         assert!((f.normal - g.normal).length() < 1e-4 && (f.depth - g.depth).abs() <= 1e-4 * g.depth, "{what}");
         assert!((f.albedo - g.albedo).map(f32::abs).max_component() < 1e-4, "{what}");
     }
-    // Rounding may decide whether a segment is occluded, and where a path goes on
+    // Rounding may change occlusion and the continuation of a path
     let allowed = ((1.0 - part) * samples.len() as f64) as usize;
     assert!(lit > samples.len() / 4 && different <= allowed, "{what}: {different} of {lit}");
 }
@@ -103,7 +104,7 @@ fn direct_light_is_that_of_the_stages() {
 fn paths_go_the_same_ways() {
     for scene in SCENES {
         assert_same_radiance(scene, IntegratorKind::Path, (EstimatorKind::Mc, 2, 0.0), 0.96);
-        // Only in columns is a lone BSDF sample of a first vertex that of the path
+        // Only in columns does the path continue with the single BSDF sample of the first vertex
         assert_same_radiance(scene, IntegratorKind::Path, (EstimatorKind::Mis, 4, 0.5), 0.96);
     }
 }

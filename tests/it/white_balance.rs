@@ -1,4 +1,4 @@
-//! `whitebalance` of a film: a linear map of what the film would have without.
+//! `whitebalance` of a film: a linear map of the film without it.
 
 use lumiris::film::{Film, PixelSums};
 use lumiris::import::cache::FileCache;
@@ -100,7 +100,7 @@ fn sensors_have_the_exposure_and_the_white_balance_of_pbrt() {
         assert_eq!(open("1.25", &film).scene.film.scale, 0.5, "{sensor}");
     }
 
-    // Daylight of 6500 K is white to cameras unless they are told
+    // Cameras assume daylight of 6500 K as white unless told otherwise
     let balance = |parameters: &str| film_of(parameters).balance;
     assert_eq!(balance("\"string sensor\" \"canon_eos_m\""), white_balance(6500.0));
     assert_eq!(balance("\"string sensor\" \"canon_eos_m\" \"float whitebalance\" 4000"), white_balance(4000.0));

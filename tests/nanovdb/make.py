@@ -1,10 +1,10 @@
-# Makes the files beside it: `python3 make.py`, with pyopenvdb 10.0 and nanovdb_convert 32.4.2 (on Debian 12: the packages
-# python3-openvdb and libnanovdb-tools).
+# Makes the files of this folder: `python3 make.py`, with pyopenvdb 10.0 and nanovdb_convert 32.4.2 (on Debian 12: the
+# packages python3-openvdb and libnanovdb-tools).
 import subprocess
 import numpy as np
 import pyopenvdb as vdb
 
-# A box of known values at negative indices, tiles of 8 and of 128 voxels along each axis, and two voxels far away
+# A box of known values at negative indices, tiles of 8 and of 128 voxels along each axis, and two distant voxels
 size = (20, 13, 9)
 i, j, k = np.indices(size)
 values = (((i * 37 + j * 11 + k * 5) % 16) / 16).astype(np.float32)

@@ -1,8 +1,8 @@
-//! Finds Embree, checks its headers against the committed bindings, and links it. With the feature `generate-bindings` the
-//! bindings are made from the headers instead.
+//! Finds Embree, checks its headers against the committed bindings, and links it. With the feature `generate-bindings`,
+//! the bindings are generated from the headers instead.
 //!
-//! Search order: `EMBREE_DIR` (an installation prefix, or its CMake configuration directory), the
-//! compiler's own include directories, then `embree_DIR` (CMake's variable) and pkg-config.
+//! Search order: `EMBREE_DIR` (an installation prefix, or its CMake configuration directory), the compiler's own
+//! include directories, then `embree_DIR` (CMake's variable) and pkg-config.
 
 #[cfg(feature = "generate-bindings")]
 mod generate;
@@ -11,11 +11,11 @@ use std::env;
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitStatus, exit};
 
-/// How to get the headers, for the end of each error message.
+/// Installation hint for the end of each error message.
 const HELP: &str = "Install Embree's headers (Debian, Ubuntu: apt-get install libembree-dev), or \
                     set EMBREE_DIR to the prefix of an installation of Embree 3.13 or 4.x.";
 
-/// What to do about headers that no committed file fits.
+/// Hint for headers that fit no committed bindings.
 #[cfg(not(feature = "generate-bindings"))]
 const GENERATE: &str = "The feature `generate-bindings` makes bindings from these headers: build with \
                         --features embree4-sys/generate-bindings (needs libclang: apt-get install libclang-dev).";
@@ -23,7 +23,7 @@ const GENERATE: &str = "The feature `generate-bindings` makes bindings from thes
 /// Library directories below an installation prefix, most specific first.
 const LIB_DIRS: [&str; 4] = ["lib/x86_64-linux-gnu", "lib/aarch64-linux-gnu", "lib64", "lib"];
 
-/// An installation whose headers were found.
+/// An installation of Embree with its headers.
 struct Embree {
     /// `None`: the headers are in the compiler's default include directories.
     prefix: Option<PathBuf>,
@@ -55,14 +55,15 @@ fn main() {
     emit(&embree);
 }
 
-/// Stops the build with `reason` and the install command.
+/// Stops the build with `reason` and the installation hint.
 fn fail(reason: &str) -> ! {
     eprintln!("\nerror: embree4-sys: {reason}\n{HELP}\n");
     exit(1);
 }
 
-/// Finds the headers, or says why not.
+/// Finds the headers; the error gives the reason if there are none.
 fn find() -> Result<Embree, String> {
+    // EMBREE_DIR
     if let Some(dir) = env::var_os("EMBREE_DIR").filter(|dir| !dir.is_empty()) {
         let dir = PathBuf::from(dir);
         let prefix = prefix_of(&dir).ok_or_else(|| {
@@ -75,6 +76,8 @@ fn find() -> Result<Embree, String> {
         return detect(Some(prefix))?
             .ok_or_else(|| format!("the compiler cannot read the headers below EMBREE_DIR = {}", dir.display()));
     }
+
+    // The compiler's directories, then configured prefixes
     if let Some(found) = detect(None)? {
         return Ok(found);
     }
@@ -106,7 +109,7 @@ fn prefix_of(dir: &Path) -> Option<PathBuf> {
     dir.ancestors().take(6).find(has_headers).map(Path::to_path_buf)
 }
 
-/// A compiler call with the include directory of `prefix`, plus its arguments and output.
+/// Runs the compiler with `args` and the include directory of `prefix`. Returns its status, output and errors.
 fn compiler(prefix: Option<&Path>, args: &[&str]) -> Result<(ExitStatus, String, String), String> {
     let mut build = cc::Build::new();
     build.cargo_metadata(false).warnings(false);
@@ -124,20 +127,20 @@ fn compiler(prefix: Option<&Path>, args: &[&str]) -> Result<(ExitStatus, String,
     ))
 }
 
-/// Asks the preprocessor which headers it sees. `Ok(None)`: none.
+/// Detects the headers with the preprocessor. `Ok(None)`: there are none.
 fn detect(prefix: Option<PathBuf>) -> Result<Option<Embree>, String> {
     let (status, expanded, errors) = compiler(prefix.as_deref(), &["-E", "detect.c"])?;
     if !status.success() {
         return Err(format!("the C compiler does not preprocess detect.c:\n{errors}"));
     }
-    // A header that changes (an upgrade of the library) must run this again.
+    // A header that changes (an upgrade of the library) must run this script again
     let markers = expanded.lines().filter(|line| line.starts_with('#'));
     let config = markers.filter_map(|line| line.split('"').nth(1));
     if let Some(path) = config.into_iter().find(|path| path.ends_with("rtcore_config.h")) {
         println!("cargo:rerun-if-changed={path}");
     }
 
-    // The compiler may spread the numbers over lines, with line markers between.
+    // The compiler may spread the numbers over several lines, separated by line markers
     let Some((_, rest)) = expanded.split_once("EMBREE_FOUND") else {
         return Ok(None);
     };
@@ -149,7 +152,7 @@ fn detect(prefix: Option<PathBuf>) -> Result<Option<Embree>, String> {
     Ok(Some(Embree { prefix, family, version: [major, minor, patch], instance_array: instance_array == 1 }))
 }
 
-/// The file with the bindings: made from the headers found.
+/// The bindings, generated from the headers.
 #[cfg(feature = "generate-bindings")]
 fn bindings(embree: &Embree) -> Result<PathBuf, String> {
     let include = embree.prefix.as_ref().map(|prefix| prefix.join("include"));
@@ -160,14 +163,14 @@ fn bindings(embree: &Embree) -> Result<PathBuf, String> {
     Ok(path)
 }
 
-/// The file with the bindings: the committed one, if it fits the headers found.
+/// The committed bindings, if they fit the headers.
 #[cfg(not(feature = "generate-bindings"))]
 fn bindings(embree: &Embree) -> Result<PathBuf, String> {
     check_layout(embree).map_err(|reason| format!("{reason}\n{GENERATE}"))?;
     committed(embree)
 }
 
-/// The committed bindings of a family and, in family 4, of a layout of the hits.
+/// The committed bindings for a family; for family 4, also for a layout of hits.
 fn committed(embree: &Embree) -> Result<PathBuf, String> {
     let name = match (embree.family, embree.instance_array) {
         (3, _) => "embree3.rs",
@@ -178,7 +181,7 @@ fn committed(embree: &Embree) -> Result<PathBuf, String> {
     Ok(root.join("src/bindings").join(name))
 }
 
-/// Compiles the static assertions of probe.c against the headers found.
+/// Compiles the static assertions of probe.c against the headers.
 #[cfg(not(feature = "generate-bindings"))]
 fn check_layout(embree: &Embree) -> Result<(), String> {
     let family = format!("-DEXPECT_FAMILY={}", embree.family);
@@ -199,7 +202,7 @@ fn check_layout(embree: &Embree) -> Result<(), String> {
     Err(reason)
 }
 
-/// Prints what cargo and the dependents' build scripts need.
+/// Prints the instructions for cargo and for dependents' build scripts.
 fn emit(embree: &Embree) {
     let family = embree.family;
     println!("cargo:rustc-cfg=embree{family}");
@@ -216,8 +219,8 @@ fn emit(embree: &Embree) {
     if let Some(libdir) = &libdir {
         println!("cargo:libdir={}", libdir.display());
     }
-    // A library outside the loader's directories needs a search path, and a run path in each
-    // binary: here for this crate's tests, in dependents by `DEP_EMBREE_RPATH`.
+    // A library outside the loader's directories needs a search path, and a run path in each binary: in this crate's
+    // tests, and in dependents through `DEP_EMBREE_RPATH`
     if let (Some(_), Some(libdir)) = (&embree.prefix, &libdir) {
         println!("cargo:rustc-link-search=native={}", libdir.display());
         println!("cargo:rustc-link-arg-tests=-Wl,-rpath,{}", libdir.display());
@@ -225,7 +228,7 @@ fn emit(embree: &Embree) {
     }
 }
 
-/// The directory that holds the library, or stops if a prefix was given that has none.
+/// The directory of the library. Stops the build if the given prefix has none.
 fn find_libdir(embree: &Embree) -> Option<PathBuf> {
     let names = ["so", "dylib"].map(|suffix| format!("libembree{}.{suffix}", embree.family));
     let below = |prefix: &Path| {

@@ -1,5 +1,5 @@
 /* Preprocessed, never compiled: build.rs reads the numbers after EMBREE_FOUND.
-   Family 4 is preferred to family 3. */
+   Family 4 takes precedence over family 3. */
 #if __has_include(<embree4/rtcore_config.h>)
 #include <embree4/rtcore_config.h>
 #define FAMILY 4

@@ -1,12 +1,12 @@
-//! The bindings of a header by bindgen: with these options the files in `src/bindings/` were made, too.
+//! Generates the bindings of a header with bindgen. The files in `src/bindings/` were generated with the same options.
 
 use bindgen::{Builder, EnumVariation, Formatter, RustEdition, RustTarget};
 use std::path::Path;
 
-/// The bindings of `embree3/rtcore.h` or `embree4/rtcore.h` in `include`, or among the compiler's own headers.
+/// The bindings of `embree3/rtcore.h` or `embree4/rtcore.h`, in `include` or in the compiler's own directories.
 pub(crate) fn bindings(include: Option<&Path>, family: u32, version: &str) -> Result<String, String> {
     let first_line = format!("// Made by bindgen from the headers of Embree {version}, see README.md. Do not edit.\n");
-    // The oldest compiler that has `unsafe extern`, so that the text does not follow the compiler in use
+    // The oldest compiler with `unsafe extern`, so that the text does not depend on the compiler in use
     let target = RustTarget::stable(85, 0).map_err(|e| e.to_string())?;
     let builder = Builder::default()
         .header_contents("embree.h", &format!("#include <embree{family}/rtcore.h>\n"))

@@ -1,6 +1,6 @@
-/* Compiled by build.rs against the headers found, to reject those that the committed bindings do
-   not fit. build.rs defines EXPECT_FAMILY (3 or 4) and EXPECT_INSTANCE_ARRAY (0 or 1), by which it
-   chose the bindings; src/layout.rs asserts the same figures of the Rust side. */
+/* Compiled by build.rs against the headers, to reject headers that do not fit the committed bindings.
+   build.rs defines EXPECT_FAMILY (3 or 4) and EXPECT_INSTANCE_ARRAY (0 or 1), which determine the
+   bindings. src/layout.rs asserts the same sizes and offsets for the Rust side. */
 #if EXPECT_FAMILY == 4
 #include <embree4/rtcore.h>
 #else
@@ -18,7 +18,7 @@ _Static_assert(RTC_MAX_INSTANCE_LEVEL_COUNT == 1,
                "Embree was built with EMBREE_MAX_INSTANCE_LEVEL_COUNT other than 1: the bindings have one level");
 _Static_assert(RTC_MIN_WIDTH == 0, "Embree was built with EMBREE_MIN_WIDTH: the bindings are without it");
 
-/* A packet of K rays has 12 words per ray, and a hit 8, or 9 with instance arrays, padded to the
+/* A packet of K rays has 12 words per ray, and 8 words per hit (9 with instance arrays), padded to the
    alignment of the packet. */
 #define ROUND_UP(size, align) (((size) + (align) - 1) / (align) * (align))
 #define HIT_WORDS (8 + EXPECT_INSTANCE_ARRAY)

@@ -1,11 +1,11 @@
-//! Compiles the shim into a shared object of its own, linked to OpenImageIO, which `load` opens on
-//! first use. Nothing is linked to the Rust side.
+//! Compiles the shim into a separate shared object, linked to OpenImageIO, which `load` opens at its first use. Nothing
+//! is linked to the Rust side.
 
 use std::env;
 use std::path::{Path, PathBuf};
 use std::process::exit;
 
-/// How to get the headers, for the end of each error message.
+/// Installation hint for the end of each error message.
 const HELP: &str = "Install OpenImageIO's headers (Debian, Ubuntu: apt-get install \
                     libopenimageio-dev pkg-config g++), or set PKG_CONFIG_PATH to the directory that \
                     holds OpenImageIO.pc.";
@@ -13,7 +13,7 @@ const HELP: &str = "Install OpenImageIO's headers (Debian, Ubuntu: apt-get insta
 fn main() {
     println!("cargo:rerun-if-changed=build.rs");
     println!("cargo:rerun-if-changed=shim");
-    // pkg-config's own variables are tracked by the crate.
+    // The crate tracks pkg-config's own variables
     let library = pkg_config::Config::new()
         .range_version("2.4".."4")
         .cargo_metadata(false)
@@ -26,7 +26,7 @@ fn main() {
     println!("cargo:version={}", library.version);
 }
 
-/// Stops the build with `reason` and the install command.
+/// Stops the build with `reason` and the installation hint.
 fn fail(reason: &str) -> ! {
     eprintln!("\nerror: openimageio-sys: {reason}\n{HELP}\n");
     exit(1);
@@ -53,7 +53,7 @@ fn build_shim(library: &pkg_config::Library) -> Result<PathBuf, String> {
     if macos {
         command.arg("-dynamiclib");
     } else {
-        // An undefined symbol shall fail here, not when the first picture is read.
+        // An undefined symbol must fail here, not when the first image is read
         command.args(["-shared", "-Wl,--no-undefined", "-Wl,-soname,liblumiris_oiio.so"]);
     }
     command.arg("-o").arg(&shim).args(&objects);

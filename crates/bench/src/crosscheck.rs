@@ -1,11 +1,11 @@
-//! Two ray tracers, the same rays: where do they disagree, and why?
+//! Crosscheck of two ray tracers with the same rays.
 //!
-//! Five families of rays go through both: camera rays, shadow segments towards the lights, random chords of the scene's
-//! bounds, rays that graze the surfaces that camera rays met, and rays aimed at edges and vertices of triangles. An
-//! answer is *equal* if both name the same primitive and their t differ by at most [`T_TOLERANCE_ULPS`] units in the
-//! last place of the largest number involved. A different answer is *explained* if the nearer primitive is tied in t
-//! with the other one's, or if the ray, in f64 arithmetic, passes one of its edges within [`EDGE_ULPS`] units in the
-//! last place. What remains is a disagreement.
+//! Both trace five families of rays: camera rays, shadow segments towards the lights, random chords of the scene's
+//! bounds, rays that graze the surfaces hit by camera rays, and rays aimed at edges and vertices of triangles. Answers
+//! are *equal* if both hit the same primitive and their t differ by at most [`T_TOLERANCE_ULPS`] units in the last
+//! place of the largest number involved. A different answer is *explained* in two cases: the nearer primitive is tied
+//! in t with the other one, or the ray, in f64 arithmetic, passes one of its edges within [`EDGE_ULPS`] units in the
+//! last place. All other differences are disagreements.
 
 use glam::DVec3;
 use lumiris::accel::{Accel, Coherence, Hit, RayBatch};
@@ -49,15 +49,15 @@ impl Family {
 pub struct Tally {
     /// Rays traced.
     pub rays: u64,
-    /// Rays that hit something by the first tracer.
+    /// Rays for which the first tracer reports a hit.
     pub hits: u64,
     /// Same primitive, t within tolerance.
     pub equal: u64,
     /// Different primitives, t within tolerance: a tie or a shared edge.
     pub ties: u64,
-    /// One hits and the other misses, or hits farther, at the edge of a primitive or at a grazing angle.
+    /// Only one tracer hits, or one hits farther away, at the edge of a primitive or at a grazing angle.
     pub edge_flips: u64,
-    /// What neither explains.
+    /// Differences without an explanation.
     pub disagreements: u64,
     /// The largest difference of t among equal answers, in units in the last place.
     pub max_t_ulps: f64,
@@ -80,7 +80,7 @@ pub struct Disagreement {
     pub t_b: Option<f32>,
 }
 
-/// The outcome for all families.
+/// Results of all families.
 #[derive(Clone, Debug, Serialize)]
 pub struct Report {
     /// One tally per family.
@@ -90,22 +90,25 @@ pub struct Report {
 }
 
 impl Report {
-    /// Number of answers that nothing explains.
+    /// Number of answers without an explanation.
     pub fn disagreements(&self) -> u64 {
         self.tallies.iter().map(|(_, t)| t.disagreements).sum()
     }
 }
 
-/// Disagreements that are kept in full.
+/// Maximum number of disagreements stored in full.
 const MAX_EXAMPLES: usize = 16;
 
 /// Traces `rays` rays of each family through both tracers of the same scene.
 pub fn crosscheck(job: &RenderJob, other: &dyn Accel, rays: u32) -> Report {
+    // Camera rays and their hits, from which other families start
     let mut report = Report { tallies: Vec::new(), examples: Vec::new() };
     let scene = &job.world.scene;
     let camera = camera_rays(scene, rays);
     let mut hits = Vec::new();
     job.world.accel.intersect(&camera, Coherence::Coherent, &mut hits);
+
+    // Check the families
     for family in Family::ALL {
         let batch = match family {
             Family::Camera => camera.clone(),
@@ -154,6 +157,7 @@ fn random_rays(scene: &Scene, count: u32) -> RayBatch {
 }
 
 fn shadow_rays(job: &RenderJob, camera: &RayBatch, hits: &[Option<Hit>]) -> RayBatch {
+    // A light sample at every camera hit
     let mut batch = RayBatch::default();
     for (i, hit) in hits.iter().enumerate() {
         let Some(hit) = hit else { continue };
@@ -163,6 +167,8 @@ fn shadow_rays(job: &RenderJob, camera: &RayBatch, hits: &[Option<Hit>]) -> RayB
         let u = uniforms(Family::Shadow, i as u32);
         let ctx = LightCtx { ns: s.ns, ..LightCtx::on(s.p, s.n) };
         let Some((_, sample)) = job.lights.sample(&ctx, u[0], [u[1], u[2]]) else { continue };
+
+        // A segment to a point, or a ray to a light at infinity
         let o = offset_origin(s.p, s.p_error, s.n, sample.wi);
         if sample.t.is_finite() {
             let end = offset_origin(sample.p, sample.p_error, sample.n, o - sample.p);
@@ -182,7 +188,7 @@ fn grazing_rays(scene: &Scene, camera: &RayBatch, hits: &[Option<Hit>]) -> RayBa
         let ray = camera.get(i);
         let s = scene.geometry.surface_hit_of_ray(hit.geometry, hit.primitive, hit.instance, hit.uv, &ray);
         let u = uniforms(Family::Grazing, i as u32);
-        // Elevations from 10⁻⁵ to 10⁻¹ radians, log-uniform.
+        // Elevations from 10⁻⁵ to 10⁻¹ radians, log-uniform
         let elevation = 10.0_f32.powf(-5.0 + 4.0 * u[0]);
         let frame = lumiris_numbers::math::Frame::from_z(s.n);
         let d = frame.to_world(warp::direction(elevation.sin(), std::f32::consts::TAU * u[1]));
@@ -191,8 +197,9 @@ fn grazing_rays(scene: &Scene, camera: &RayBatch, hits: &[Option<Hit>]) -> RayBa
     batch
 }
 
-/// Rays from outside at random points of edges, and at vertices, of random triangles.
+/// Rays from outside, aimed at random points of edges, or at vertices, of random triangles.
 fn edge_rays(scene: &Scene, count: u32) -> RayBatch {
+    // Meshes
     let mut batch = RayBatch::default();
     let (center, radius) = scene.geometry.world_bounds().bounding_sphere();
     let meshes: Vec<_> = scene
@@ -208,6 +215,8 @@ fn edge_rays(scene: &Scene, count: u32) -> RayBatch {
     if meshes.is_empty() {
         return batch;
     }
+
+    // One ray in four is aimed at a vertex
     for i in 0..count {
         let u = uniforms(Family::Edge, i);
         let mesh = meshes[i as usize % meshes.len()];
@@ -247,7 +256,7 @@ impl Checker<'_> {
         let (mut bits_a, mut bits_b) = (Vec::new(), Vec::new());
         a.occluded(rays, Coherence::Packets, &mut bits_a);
         b.occluded(rays, Coherence::Incoherent, &mut bits_b);
-        // To explain a flip, the hit of the tracer that says "occluded" is needed.
+        // The explanation needs the hit of the tracer that reports occlusion
         let (mut hit_a, mut hit_b) = (Vec::new(), Vec::new());
         for (i, (&x, &y)) in bits_a.iter().zip(&bits_b).enumerate() {
             self.tally.rays += 1;
@@ -268,7 +277,7 @@ impl Checker<'_> {
         }
     }
 
-    /// Two hits.
+    /// Compares two hits of the same ray.
     fn compare(&mut self, ray: &Ray, a: &Hit, b: &Hit) {
         let ulps = self.t_ulps(ray, a.t, b.t);
         let same = (a.instance, a.geometry, a.primitive) == (b.instance, b.geometry, b.primitive);
@@ -280,13 +289,13 @@ impl Checker<'_> {
                 self.tally.ties += 1;
             }
         } else {
-            // One of them did not see the nearer one.
+            // One tracer missed the nearer primitive
             let nearer = if a.t < b.t { a } else { b };
             self.explain(ray, nearer, Some(*a), Some(*b));
         }
     }
 
-    /// Decides whether rounding may decide about `hit`.
+    /// Counts a difference as explained if rounding may decide about `hit`, else as a disagreement.
     fn explain(&mut self, ray: &Ray, hit: &Hit, a: Option<Hit>, b: Option<Hit>) {
         if self.is_marginal(ray, hit) {
             self.tally.edge_flips += 1;
@@ -309,7 +318,7 @@ impl Checker<'_> {
         }
     }
 
-    /// Difference of two t in units in the last place of the largest number that enters them.
+    /// Difference of two t in units in the last place of the largest number involved.
     fn t_ulps(&self, ray: &Ray, a: f32, b: f32) -> f64 {
         let scale = ray.o.abs().max_element().max(ray.at(a.max(b)).abs().max_element());
         let in_t = scale / ray.d.abs().max_element().max(f32::MIN_POSITIVE);
@@ -319,8 +328,7 @@ impl Checker<'_> {
 
     fn is_marginal(&self, ray: &Ray, hit: &Hit) -> bool {
         let Shape::Mesh(mesh) = &self.scene.geometry.geometries[hit.geometry as usize].shape else {
-            // The tracers share the code that meets curved shapes; what differs is the ray after an instance's
-            // transform.
+            // Both tracers intersect curved shapes with the same code; only rays transformed to an instance differ
             return hit.instance != Hit::NO_INSTANCE;
         };
         let (mut o, mut d) = (ray.o.as_dvec3(), ray.d.as_dvec3());
@@ -334,7 +342,7 @@ impl Checker<'_> {
             stretch = columns.x_axis.length().max(columns.y_axis.length()).max(columns.z_axis.length());
         }
         // Distances between the ray's line and the lines of the edges, from signed volumes. A ray that grazes the
-        // triangle is near to its edges as well.
+        // triangle is also near its edges
         let [a, b, c] = mesh.triangle(hit.primitive as usize).map(|p| p.as_dvec3() - o);
         let distance = |p: DVec3, q: DVec3| (d.dot(p.cross(q)) / d.cross(q - p).length()).abs();
         let nearest = [distance(a, b), distance(b, c), distance(c, a)].into_iter().fold(f64::INFINITY, f64::min);

@@ -1,18 +1,18 @@
 //! Efficiency of several settings on one scene: 1/(error × CPU time).
 //!
-//! Every setting renders the image with several seeds; settings take turns. What they leave to a pilot is chosen anew for
-//! each seed. CPU time is that of all threads, and includes whatever the settings need before the first sample: light
-//! trees, photons, pilots.
+//! Every setting renders the image with several seeds, in alternation with the other settings. Choices of pilots are
+//! made anew for each seed. CPU time is the total of all threads, including the preparation before the first sample:
+//! light trees, photons, pilots.
 //!
-//! With two reference images a and b, the error of an image x is (x − a)(x − b), per pixel and channel: what it expects
-//! is the squared error of x, since the noise of a and that of b are independent of x and of each other. Their mean says
-//! how bright a pixel is, for the relative error. They are of the same integrator, so that its own bias, if it has one, is
-//! none of the error. Without references, the error is the variance between seeds, which is that of unbiased images, and the mean over all settings and
-//! seeds says how bright a pixel is.
+//! With two reference images a and b, the error of an image x is (x − a)(x − b), per pixel and channel. Its expectation
+//! is the squared error of x, since the noise of a and of b are independent of x and of each other. The mean of a and b
+//! is the pixel's brightness in the relative error. References use the same integrator, so that its bias, if any, is
+//! not part of the error. Without references, the error is the variance between seeds, which assumes unbiased images;
+//! the brightness is the mean over all settings and seeds.
 //!
-//! What a pilot chooses differs from seed to seed, and with it both error and time, so an efficiency is the inverse of the mean
-//! of their product. Intervals are those of ±2 standard errors: by the spread of the products between blocks of the image, with the covariance of
-//! the two that are compared, and by that between seeds.
+//! Choices of pilots differ between seeds, and with them both error and time. Efficiency is therefore the inverse of
+//! the mean of error × time. Intervals are ±2 standard errors: from the spread of the products between blocks of the
+//! image, with the covariance of the two settings that are compared, and from the spread between seeds.
 
 use lumiris::film::{PixelBounds, PixelSums};
 use lumiris::imaging::metrics::difference::DEFAULT_EPSILON;
@@ -28,19 +28,19 @@ use lumiris_numbers::math::luminance;
 use serde::Serialize;
 use std::sync::atomic::AtomicBool;
 
-/// Blocks of the image along each axis, between which the error varies.
+/// Blocks of the image along each axis, for the spread of the error.
 const BLOCKS: u32 = 16;
-/// Pixels around one, in each direction, whose emission is compared with its own.
+/// Radius (pixels) of the neighbourhood whose emission is compared with a pixel's.
 const EDGE_RADIUS: i64 = 2;
-/// Camera samples per pixel of the emission.
+/// Camera samples per pixel for the emission.
 const EDGE_SPP: u32 = 16;
-/// Combined with the seed of an image to give those of its references.
+/// Constant that is hashed with the seed of an image to give the seeds of its references.
 const REFERENCE_SEED: u32 = 0x7265_6665;
 
 /// Colours of the pixels, row by row.
 pub type Colors = Vec<[f64; 3]>;
 
-/// Settings with the name that a report gives them.
+/// Settings with their name in the report.
 #[derive(Clone, Debug)]
 pub struct Case {
     /// Its name.
@@ -54,14 +54,14 @@ pub struct Case {
 pub struct Efficiency {
     /// Mean error of one image.
     pub error: f64,
-    /// 1/(error × CPU time) by the mean product of seeds, relative to that of the first case. Not a number where one of both errors is within two of its
-    /// standard errors.
+    /// 1/(error × CPU time), from the mean product over seeds, relative to the first case. NaN if either error is
+    /// within two standard errors of 0.
     pub relative: f64,
     /// Interval of `relative`.
     pub interval: [f64; 2],
 }
 
-/// What was measured of a case.
+/// Results of a case.
 #[derive(Clone, Debug, Serialize)]
 pub struct Row {
     /// Its name.
@@ -70,13 +70,13 @@ pub struct Row {
     pub cpu_seconds: f64,
     /// Mean luminance over all pixels and seeds.
     pub mean: f64,
-    /// By (x − r)²/(r² + 0.01).
+    /// With the error (x − r)²/(r² + 0.01).
     pub relmse: Efficiency,
-    /// By (x − r)².
+    /// With the error (x − r)².
     pub mse: Efficiency,
-    /// By (x − r)² without pixels at the edge of visible lights, which only camera samples resolve.
+    /// With the error (x − r)², without pixels at the edge of visible lights, which only camera samples resolve.
     pub masked_mse: Efficiency,
-    /// The settings that were chosen for each seed because these left them open, by their names in metadata.
+    /// The choices for each seed of settings that the case leaves open, by their metadata names.
     pub chosen: Vec<Vec<(&'static str, String)>>,
 }
 
@@ -88,8 +88,8 @@ struct Measured {
     chosen: Vec<Vec<(&'static str, String)>>,
 }
 
-/// Measures the cases with `seeds` seeds each, at least two, against two images by [`reference_image`] if there are any.
-/// `observe` is told before each rendering.
+/// Measures the cases with `seeds` seeds each (at least two), against two references by [`reference_image`] if given.
+/// `observe` is called before each rendering.
 pub fn measure_efficiency(
     job: &mut RenderJob,
     cases: &[Case],
@@ -98,6 +98,7 @@ pub fn measure_efficiency(
     render_settings: &RenderSettings,
     observe: &mut dyn FnMut(&str, u32),
 ) -> Result<Vec<Row>, RenderError> {
+    // Render, alternating between the cases
     let mut measured: Vec<Measured> = cases.iter().map(|_| Measured::default()).collect();
     for seed in 0..seeds.max(2) {
         for (case, measured) in cases.iter().zip(&mut measured) {
@@ -113,12 +114,15 @@ pub fn measure_efficiency(
     }
 
     let bounds = job.world.scene.film.bounds;
+    // Errors
     let mean_image = match references {
         Some(references) => mean_of(references.iter(), bounds.area()),
         None => mean_of(measured.iter().flat_map(|m| &m.images), bounds.area()),
     };
     let weights = Weights::new(job, &cases[0].settings, mean_image, references, render_settings)?;
     let errors: Vec<Vec<Errors>> = measured.iter().map(|m| weights.errors(&m.images)).collect();
+
+    // Rows
     let rows = cases.iter().zip(&measured).zip(&errors).map(|((case, m), e)| {
         let compare = |of: fn(&Errors) -> &Vec<f64>| {
             let seeds = |m: &Measured, errors: &[Errors]| -> Vec<Inefficiency> {
@@ -141,9 +145,9 @@ pub fn measure_efficiency(
     Ok(rows.collect())
 }
 
-/// Efficiency of each of these cases relative to that of the best of them, by relMSE, masked MSE and MSE, as one image of `spp`
-/// samples per pixel shows it that is none of those which [`measure_efficiency`] compares by as many seeds. It is 1 where
-/// the error is less than the noise of the references.
+/// Screening pass: the efficiency of each case relative to the best, by relMSE, masked MSE and MSE, from one image of
+/// `spp` samples per pixel. Its seed is none of the seeds that [`measure_efficiency`] uses for the same number of
+/// seeds. The result is 1 if the error is below the noise of the references.
 pub fn first_look(
     job: &mut RenderJob,
     cases: &[Case],
@@ -152,9 +156,12 @@ pub fn first_look(
     render_settings: &RenderSettings,
     observe: &mut dyn FnMut(&str, u32),
 ) -> Result<Vec<[f64; 3]>, RenderError> {
+    // Weights of pixels
     let Some(first) = cases.first() else { return Ok(Vec::new()) };
     let mean_image = mean_of(references.iter(), job.world.scene.film.bounds.area());
     let weights = Weights::new(job, &first.settings, mean_image, Some(references), render_settings)?;
+
+    // Error × time of each case
     let look = |case: &Case| {
         observe(&case.name, seeds);
         let mut settings = case.settings;
@@ -170,15 +177,15 @@ pub fn first_look(
     Ok(relative_to_the_least(&inefficiencies))
 }
 
-/// What the least that is above zero is by each, and 1 for those which are not above zero.
+/// For each component, the smallest positive value divided by the value; 1 for values that are not positive.
 fn relative_to_the_least<const N: usize>(values: &[[f64; N]]) -> Vec<[f64; N]> {
     let least: [f64; N] =
         std::array::from_fn(|k| values.iter().map(|v| v[k]).filter(|v| *v > 0.0).fold(f64::INFINITY, f64::min));
     values.iter().map(|v| std::array::from_fn(|k| if v[k] > 0.0 { least[k] / v[k] } else { 1.0 })).collect()
 }
 
-/// The settings of one of two references of an image by settings of these: their expectation is that of `base`, textures
-/// included, and their random numbers are of their own.
+/// Settings of one of two references. The image's expectation is the same as with `base`, texture footprints included;
+/// the random numbers are different.
 pub fn reference_settings(base: &Settings, spp: u32, index: u32) -> Settings {
     let mut settings = *base;
     settings.integrator.estimator = EstimatorKind::Auto;
@@ -192,7 +199,7 @@ pub fn reference_settings(base: &Settings, spp: u32, index: u32) -> Settings {
     settings
 }
 
-/// A reference by [`reference_settings`], in single precision as files have it.
+/// Renders a reference with [`reference_settings`], rounded to single precision as in files.
 pub fn reference_image(
     job: &mut RenderJob,
     settings: Settings,
@@ -202,7 +209,7 @@ pub fn reference_image(
     Ok(image.into_iter().map(|color| color.map(|v| f64::from(v as f32))).collect())
 }
 
-/// The image by these settings, with everything prepared anew.
+/// Renders an image, with all preparation done anew. Also returns the choices.
 fn image(
     job: &mut RenderJob,
     settings: Settings,
@@ -217,7 +224,7 @@ fn image(
     Ok((rendering.film.pixels().iter().map(PixelSums::mean).collect(), plan))
 }
 
-/// What emits, as the camera sees it.
+/// Renders the directly visible emission.
 fn emission(job: &mut RenderJob, settings: &Settings, render_settings: &RenderSettings) -> Result<Colors, RenderError> {
     let mut settings = *settings;
     settings.integrator.kind = IntegratorKind::Path;
@@ -239,7 +246,7 @@ fn mean_of<'a>(images: impl Iterator<Item = &'a Colors> + Clone, area: usize) ->
     sum
 }
 
-/// Pixels around which the emission varies by no more than the mean of the image.
+/// True for pixels around which the emission varies by no more than the mean of the image.
 fn away_from_edges(emission: &[[f64; 3]], image: &[[f64; 3]], bounds: &PixelBounds) -> Vec<bool> {
     let mean = image.iter().map(|&p| luminance(p)).sum::<f64>() / image.len().max(1) as f64;
     let (width, height) = (i64::from(bounds.width()), i64::from(bounds.height()));
@@ -267,7 +274,7 @@ struct Errors {
 
 struct Weights<'a> {
     mean: Colors,
-    /// Pixels that count for the masked MSE.
+    /// Pixels that count in the masked MSE.
     is_away: Vec<bool>,
     references: Option<&'a [Colors; 2]>,
     bounds: PixelBounds,
@@ -286,7 +293,7 @@ impl<'a> Weights<'a> {
         Ok(Weights { mean, is_away, references, bounds })
     }
 
-    /// Those of each image; without references, what is expected of all of them.
+    /// Errors of each image. Without references, all images have the same expected error.
     fn errors(&self, images: &[Colors]) -> Vec<Errors> {
         if let Some([a, b]) = self.references {
             let of = |x: &Colors| self.sums(|i, c| (x[i][c] - a[i][c]) * (x[i][c] - b[i][c]));
@@ -296,7 +303,7 @@ impl<'a> Weights<'a> {
         vec![self.sums(variance); images.len()]
     }
 
-    /// Sums of what `square` is at the channels of pixels.
+    /// Block sums of `square(pixel, channel)` with the three weightings.
     fn sums(&self, square: impl Fn(usize, usize) -> f64) -> Errors {
         let (width, height) = (self.bounds.width(), self.bounds.height());
         let blocks = (BLOCKS * BLOCKS) as usize;
@@ -318,7 +325,7 @@ impl<'a> Weights<'a> {
     }
 }
 
-/// Of one seed: errors by block of the image, and CPU time (s).
+/// Results of one seed: errors by block of the image, and CPU time (s).
 #[derive(Clone)]
 struct Inefficiency {
     errors: Vec<f64>,
@@ -331,7 +338,7 @@ impl Inefficiency {
     }
 }
 
-/// Efficiency of the seeds of one case, relative to those of another.
+/// Efficiency of a case relative to another one, from the results of all seeds.
 fn efficiency(case: &[Inefficiency], base: &[Inefficiency]) -> Efficiency {
     let error = mean_by(case, Inefficiency::error);
     let [of_case, of_base] = [case, base].map(|seeds| -> Vec<f64> {
@@ -340,7 +347,7 @@ fn efficiency(case: &[Inefficiency], base: &[Inefficiency]) -> Efficiency {
     if !is_known(&of_case) || !is_known(&of_base) {
         return Efficiency { error, relative: f64::NAN, interval: [f64::NAN; 2] };
     }
-    // Standard error of the logarithm of the ratio: of sums over blocks, and over seeds
+    // Standard error of the logarithm of the ratio, from the spread over blocks and over seeds
     let [sum, base_sum] = [&of_case, &of_base].map(|blocks| blocks.iter().sum::<f64>());
     let terms: Vec<f64> = of_case.iter().zip(&of_base).map(|(e, b)| b / base_sum - e / sum).collect();
     let n = terms.len() as f64;
@@ -352,7 +359,8 @@ fn efficiency(case: &[Inefficiency], base: &[Inefficiency]) -> Efficiency {
     Efficiency { error, relative, interval: [relative / factor, relative * factor] }
 }
 
-/// True if an error, by blocks, is two of its standard errors at least: the logarithm of less has no interval.
+/// True if an error, given by blocks, is at least two standard errors above 0. The logarithm of a smaller error has no
+/// interval.
 fn is_known(errors: &[f64]) -> bool {
     let spread: Welford = errors.iter().copied().collect();
     spread.mean() > 2.0 * spread.standard_error()
@@ -371,7 +379,7 @@ mod tests {
     use super::*;
     use lumiris_test_support::random::{normal, pcg32};
 
-    /// Seeds of these errors in each block of two, and these times.
+    /// Results of seeds with these errors in each of two blocks, and these times.
     fn seeds<const N: usize>(errors: [f64; N], cpu: [f64; N]) -> Vec<Inefficiency> {
         let of = |(error, cpu)| Inefficiency { errors: vec![error; 2], cpu };
         errors.into_iter().zip(cpu).map(of).collect()
@@ -393,7 +401,7 @@ mod tests {
     #[test]
     fn the_interval_holds_the_ratio_of_errors_as_often_as_it_says() {
         let mut s = pcg32([11, 3, 1]);
-        // Errors of two seeds: squares of normal numbers, of which one case has half the variance
+        // Errors of two seeds: squares of normal numbers; one case has half the variance
         let mut normal = || normal(&mut s);
         let inside = (0..400).filter(|_| {
             let base: Vec<f64> = (0..256).map(|_| (0..4).map(|_| normal().powi(2)).sum()).collect();
@@ -406,7 +414,7 @@ mod tests {
         assert!((365..=396).contains(&inside), "{inside} of 400, 382 expected");
     }
 
-    /// Images of 40 × 40 pixels with normal noise of this standard deviation and this bias around 1.
+    /// Images of 40 × 40 pixels with normal noise around 1 + bias.
     fn noisy(seed: u32, count: usize, deviation: f64, bias: f64) -> Vec<Colors> {
         let mut s = pcg32([seed, 7, 2]);
         let mut image = || (0..1600).map(|_| [0; 3].map(|_| 1.0 + bias + deviation * normal(&mut s))).collect();
@@ -422,12 +430,12 @@ mod tests {
             let weights = Weights { mean: mean.clone(), is_away: vec![true; 1600], references, bounds };
             mean_by(&weights.errors(images), |errors| errors.squared.iter().sum())
         };
-        // With one reference twice it would be five times as much. The standard error is that of the product of both
-        // references, 0.1²/√4800 = 6 % of 0.05²
+        // With the same reference twice the error would be five times as large. The standard error is the product of
+        // both references' noise: 0.1²/√4800 = 6 % of 0.05²
         let unbiased = noisy(2, 4, 0.05, 0.0);
         assert!((of(Some(&references), &unbiased) / 0.0025 - 1.0).abs() < 0.2);
         assert!((of(None, &unbiased) / 0.0025 - 1.0).abs() < 0.05, "a standard error is 1.2 %");
-        // Between seeds, bias is not to be seen
+        // The variance between seeds does not contain bias
         let biased = noisy(3, 4, 0.05, 0.1);
         assert!((of(Some(&references), &biased) / 0.0125 - 1.0).abs() < 0.1);
         assert!((of(None, &biased) / 0.0025 - 1.0).abs() < 0.05);

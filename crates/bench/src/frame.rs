@@ -1,9 +1,8 @@
-//! What a whole frame costs per camera sample on one thread, and which part of that tracing by itself would cost: a bare
-//! Embree loop over exactly the rays that were traced, in their order, in packets of the width that is best for each
-//! kind.
+//! Cost of a frame per camera sample on one thread, and the share of pure ray tracing: a bare Embree loop over exactly
+//! the traced rays, in their order, in packets of the best width for each kind of ray.
 //!
 //! Whole batches, spread over the image, are rendered from the camera samples to the film. The renderer and the bare
-//! loop take turns.
+//! loop alternate; one run of each is a turn.
 
 use lumiris::accel::RayBatch;
 use lumiris::accel::embree::EmbreeError;
@@ -27,26 +26,26 @@ use std::time::{Duration, Instant};
 /// The cost of a frame.
 #[derive(Clone, Debug, Serialize)]
 pub struct FrameReport {
-    /// Camera samples of a turn.
+    /// Camera samples per turn.
     pub camera_samples: usize,
     /// Median time of the renderer per camera sample (ns).
     pub ns_per_camera_sample: f64,
     /// Median time of the bare loops per camera sample (ns).
     pub bare_trace_ns_per_camera_sample: f64,
-    /// The second by the first.
+    /// Time of the bare loops over the time of the renderer.
     pub tracing_share: f64,
-    /// Time of the stages per camera sample, which are all of it: `paths` is what tracing takes beside its stages.
+    /// Time per camera sample of all stages. `paths` is the time of path tracing outside its other stages.
     pub stages: Vec<FrameStage>,
-    /// The rays that were traced.
+    /// The traced rays.
     pub rays: Vec<BareRays>,
-    /// Nanoseconds per camera sample of each turn, of the renderer and of the bare loops.
+    /// Time per camera sample (ns) of each turn: renderer, bare loops.
     pub turns: Vec<[f64; 2]>,
 }
 
 /// A stage of the renderer.
 #[derive(Clone, Debug, Serialize)]
 pub struct FrameStage {
-    /// Which.
+    /// Name.
     pub name: &'static str,
     /// Median time (ns per camera sample).
     pub ns_per_camera_sample: f64,
@@ -65,7 +64,7 @@ pub struct BareRays {
     pub ns_per_ray: f64,
 }
 
-/// Batches of a kind, and how the bare loop traces them best.
+/// Batches of one kind of ray, with the fastest options of the bare loop.
 struct Kind<'a> {
     name: &'static str,
     batches: &'a [RayBatch],
@@ -79,7 +78,7 @@ impl Kind<'_> {
         self.batches.iter().map(RayBatch::len).sum()
     }
 
-    /// Time of the bare loop over all rays, packing not included.
+    /// Time of the bare loop over all rays, without packing.
     fn time(&self, bare: &Bare) -> Result<Duration, EmbreeError> {
         let mut sum = Duration::ZERO;
         for rays in self.batches {
@@ -93,7 +92,7 @@ impl Kind<'_> {
         Ok(sum)
     }
 
-    /// Chooses the width and the flag of the shortest time.
+    /// Chooses the fastest packet width and coherence flag.
     fn calibrate(&mut self, bare: &Bare) -> Result<(), EmbreeError> {
         let mut best = (Duration::MAX, self.width, self.coherent);
         for (width, coherent) in [(1, false), (4, false), (8, false), (16, false), (4, true), (8, true), (16, true)] {
@@ -108,13 +107,15 @@ impl Kind<'_> {
     }
 }
 
-/// Measures `turns` turns of some `rays` camera samples.
+/// Measures `turns` turns with about `rays` camera samples each.
 pub fn measure_frame(job: &RenderJob, tile_size: u32, rays: usize, turns: u32) -> Result<FrameReport, EmbreeError> {
+    // Batches
     let settings = RenderSettings { tile_size, spp: job.settings().sampling.spp, ..RenderSettings::default() };
     let batches = Batches::new(job, &settings, rays);
     let pixels = (0..batches.count()).map(|batch| batches.pixels(batch)).sum::<usize>();
     let camera_samples = pixels * batches.samples_per_pixel();
 
+    // Record the rays
     let (tracer, samples, results, packed, times) = Default::default();
     let mut frame = Frame { job, batches, tracer, samples, results, packed, times };
     frame.tracer.record();
@@ -123,6 +124,7 @@ pub fn measure_frame(job: &RenderJob, tile_size: u32, rays: usize, turns: u32) -
     frame.tracer.take_stats();
     frame.times = Times::default();
 
+    // Calibrate the bare loop
     let (geometry, textures) = (Arc::clone(&job.world.scene.geometry), Arc::clone(&job.world.scene.textures));
     let bare = Bare::new(geometry, Some(textures as Arc<dyn AlphaSource>))?;
     let mut kinds = kinds(&recording);
@@ -131,6 +133,7 @@ pub fn measure_frame(job: &RenderJob, tile_size: u32, rays: usize, turns: u32) -
     }
 
     let per_sample = |time: Duration| time.as_secs_f64() * 1e9 / camera_samples.max(1) as f64;
+    // Alternate between renderer and bare loop
     let mut stats: Vec<(PathStats, Times)> = Vec::new();
     let (mut both, mut of_kinds) = (Vec::new(), vec![Vec::new(); kinds.len()]);
     for _ in 0..turns.max(1) {
@@ -146,6 +149,8 @@ pub fn measure_frame(job: &RenderJob, tile_size: u32, rays: usize, turns: u32) -
         }
         both.push([per_sample(ours), per_sample(sum)]);
     }
+
+    // Medians
     let [ours, traced] = [0, 1].map(|slot| median(both.iter().map(|turn| turn[slot])));
     let stage = |name, of: &dyn Fn(&PathStats, &Times) -> Duration| FrameStage {
         name,
@@ -203,7 +208,7 @@ struct Frame<'a> {
     tracer: PathTracer,
     samples: Vec<CameraSample>,
     results: Vec<PixelSample>,
-    /// The sums of a batch, and memory to pack them.
+    /// Packed sums of a batch, and scratch memory for packing.
     packed: (PackedSums, Vec<u8>),
     times: Times,
 }
@@ -211,6 +216,7 @@ struct Frame<'a> {
 impl Frame<'_> {
     /// Renders the batches, from camera samples to sums of pixels.
     fn render(&mut self) {
+        // From camera samples to packed sums, with the time of each step
         let integrator = &self.job.settings().integrator;
         for batch in 0..self.batches.count() {
             let start = Instant::now();

@@ -1,8 +1,9 @@
 //! Measurements of the renderer.
 //!
 //! [`stages`] times ray queries and the stages of a rendering, [`frame`] a camera sample from the camera to the film,
-//! [`photons`] photons and their maps. [`efficiency`] compares settings by error and CPU time, and [`crosscheck`] two ray
-//! tracers by their answers.
+//! [`stages`] times ray queries and the stages of a rendering, [`frame`] a camera sample from the camera to the film,
+//! [`photons`] photon tracing and photon maps. [`efficiency`] compares settings by error and CPU time; [`crosscheck`]
+//! compares the answers of two ray tracers.
 
 pub mod crosscheck;
 pub mod efficiency;

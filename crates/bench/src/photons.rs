@@ -1,4 +1,4 @@
-//! How fast photons are traced, and how fast their maps are built and asked.
+//! Speed of photon tracing, and of building and querying photon maps.
 
 use lumiris::photons::{GatherScratch, PhotonBudget, PhotonError, PhotonMap, Place, Search, Tracing, trace_photons};
 use lumiris::render::{RenderError, thread_pool};
@@ -8,34 +8,36 @@ use serde::Serialize;
 use std::hint::black_box;
 use std::time::Instant;
 
-/// Photon paths that are traced in a turn.
+/// Photon paths per run.
 const PATHS: u64 = 1 << 18;
-/// Places that the map is asked at: where its photons lie.
+/// Number of query points, at the positions of photons.
 const QUERIES: usize = 1 << 14;
 
-/// What was measured; times are medians over the turns.
+/// Results; times are medians over the runs.
 #[derive(Clone, Debug, Serialize)]
 pub struct PhotonReport {
-    /// Photon paths of a turn.
+    /// Photon paths per run.
     pub paths: u64,
-    /// Photons that arrived at diffuse surfaces.
+    /// Photons at diffuse surfaces.
     pub photons: u64,
     /// Rays traced.
     pub rays: u64,
-    /// Tracing: threads, and seconds.
+    /// Tracing: number of threads, and time (s).
     pub tracing: Vec<(usize, f64)>,
-    /// Photons in the map that is asked.
+    /// Photons in the queried map.
     pub stored: usize,
     /// Bytes per photon of that map.
     pub bytes_per_photon: f64,
-    /// Seconds to build it, on all threads.
+    /// Time to build it on all threads (s).
     pub build_seconds: f64,
-    /// Kinds of queries, and how many one thread answers per second.
+    /// Kinds of queries, with their rates on one thread (1/s).
     pub queries: Vec<(&'static str, f64)>,
 }
 
-/// Traces photons on one thread and on `threads` (all cores if `None`), `runs` times each, and asks their map.
+/// Traces photons on one thread and on `threads` threads (all cores if `None`), `runs` times each, and queries their
+/// map.
 pub fn measure_photons(job: &RenderJob, threads: Option<usize>, runs: u32) -> Result<PhotonReport, RenderError> {
+    // Trace
     let one = thread_pool(Some(1))?;
     let all = thread_pool(threads)?;
     let budget = PhotonBudget::Paths(PATHS);
@@ -57,6 +59,7 @@ pub fn measure_photons(job: &RenderJob, threads: Option<usize>, runs: u32) -> Re
     let (photons, rays) = (traced.arrivals, traced.rays);
 
     let mut all_photons = traced.global;
+    // Build the map
     all_photons.extend(traced.caustic);
     let mut builds = Vec::new();
     let mut map = PhotonMap::default();
@@ -66,6 +69,8 @@ pub fn measure_photons(job: &RenderJob, threads: Option<usize>, runs: u32) -> Re
         map = all.install(|| PhotonMap::new(copy));
         builds.push(start.elapsed().as_secs_f64());
     }
+
+    // Query it
     let max_radius = job.lights.scene_radius;
     let nearest = |count| Search::Nearest { count, max_radius };
     let queries = [("50 nearest", nearest(50)), ("200 nearest", nearest(200))];

@@ -1,8 +1,9 @@
-//! How fast the stages are, on one thread: ray queries against bare loops over Embree with the same rays, and the time
-//! per stage of a rendering.
+//! Speed of the stages on one thread: ray queries against bare Embree loops with the same rays, and the time per stage
+//! of a rendering.
 //!
-//! The rays are those of a rendering: whole batches, spread evenly over the image. The renderer and the bare loop take
-//! turns, and the time of a batch is the median over the turns; so what else the machine does meanwhile matters little.
+//! The rays are recorded from a rendering: whole batches, spread evenly over the image. The renderer and the bare loop
+//! alternate; one run of each is a turn. The time of a batch is the median over the turns, so that other load on the
+//! machine matters little.
 
 use lumiris::accel::embree::bare::{Bare, Packed};
 use lumiris::accel::embree::{EmbreeAccel, EmbreeError};
@@ -22,34 +23,34 @@ use std::hint::black_box;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-/// Seed of the shuffled order.
+/// Seed of the shuffle.
 const SHUFFLE: u32 = 0x5EED;
 
-/// What to measure, and how long.
+/// Measurements and their extent.
 #[derive(Clone, Copy, Debug)]
 pub struct BenchSettings {
-    /// First hits.
+    /// Measure first hits.
     pub intersect: bool,
-    /// Stages of a rendering, and what a proposal costs.
+    /// Measure the stages of a rendering, and the cost of a proposal.
     pub t1: bool,
-    /// Shadow segments.
+    /// Measure shadow segments.
     pub t2: bool,
     /// Runs of each loop.
     pub runs: u32,
     /// Maximum number of camera rays.
     pub rays: usize,
-    /// Rays per packet; the processor's own width if not given.
+    /// Rays per packet; `None` for the processor's best width.
     pub packet_width: Option<u32>,
     /// Edge of a tile in pixels.
     pub tile_size: u32,
 }
 
-/// What was measured.
+/// Results.
 #[derive(Clone, Debug, Serialize)]
 pub struct Report {
     /// Camera rays.
     pub camera_rays: usize,
-    /// Seconds to build the ray tracer and the structures of the bare loop, on all cores.
+    /// Time to build the ray tracer and the structures of the bare loop, on all cores (s).
     pub build_seconds: Option<[f64; 2]>,
     /// First hits.
     pub intersect: Vec<RayCase>,
@@ -57,11 +58,11 @@ pub struct Report {
     pub t2: Vec<RayCase>,
     /// Proposals.
     pub t1: Option<Proposals>,
-    /// Seconds per stage of a rendering of these camera rays, in order.
+    /// Times of the stages of a rendering of these camera rays, in order.
     pub stages: Vec<Stage>,
 }
 
-/// A query, by the renderer and by the bare loop.
+/// A ray query by the renderer and by the bare loop.
 #[derive(Clone, Debug, Serialize)]
 pub struct RayCase {
     /// Kind of rays.
@@ -70,49 +71,50 @@ pub struct RayCase {
     pub width: u32,
     /// Number of rays.
     pub rays: usize,
-    /// How many hit something, by the renderer.
+    /// Rays with a hit, by the renderer.
     pub hits: usize,
-    /// How many hit something, by the bare loop.
+    /// Rays with a hit, by the bare loop.
     pub bare_hits: usize,
-    /// Millions of rays per second of the renderer, by the medians of its batches.
+    /// Speed of the renderer (10⁶ rays/s), from the medians of its batches.
     pub mrays: f64,
-    /// Millions of rays per second of the bare loop, by the medians of its batches.
+    /// Speed of the bare loop (10⁶ rays/s), from the medians of its batches.
     pub bare_mrays: f64,
     /// The renderer's speed relative to the bare loop.
     pub ratio: f64,
-    /// Median over the turns of the ratio of a whole turn of each.
+    /// Median of the ratio of whole turns.
     pub turn_ratio: f64,
     /// The smallest and the largest ratio of a turn.
     pub turn_ratio_range: [f64; 2],
-    /// Seconds of each turn, of the renderer and of the bare loop.
+    /// Times of each turn (s): renderer, bare loop.
     pub seconds: Vec<[f64; 2]>,
 }
 
-/// What a proposal of T1 costs, median over the runs.
+/// Cost of a proposal of T1, median over the runs.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct Proposals {
     /// Light samples.
     pub light_proposals: u64,
     /// BSDF samples.
     pub bsdf_proposals: u64,
-    /// Nanoseconds per light sample.
+    /// Time per light sample (ns).
     pub light_nanoseconds: Option<f64>,
-    /// Nanoseconds per BSDF sample, the search for the emitter included.
+    /// Time per BSDF sample (ns), including the search for the emitter.
     pub bsdf_nanoseconds: Option<f64>,
 }
 
 /// A stage of a rendering.
 #[derive(Clone, Debug, Serialize)]
 pub struct Stage {
-    /// Which.
+    /// Name.
     pub name: &'static str,
     /// Median time of a run (s).
     pub seconds: f64,
-    /// What it works on: rays, points, proposals.
+    /// Number of items: rays, points or proposals.
     pub items: u64,
 }
 
-/// Measures. The ray tracers of `job` are dropped before bare loops run, so that a large scene is not held three times.
+/// Runs the measurements. The ray tracers of `job` are dropped before the bare loops run, so that a large scene is not
+/// in memory three times.
 pub fn measure(mut job: RenderJob, settings: &BenchSettings) -> Result<Report, EmbreeError> {
     let batches = camera_batches(&job, settings.tile_size, settings.rays);
     let camera_rays = batches.iter().map(Vec::len).sum();
@@ -131,7 +133,7 @@ pub fn measure(mut job: RenderJob, settings: &BenchSettings) -> Result<Report, E
         return Ok(report);
     }
 
-    // The rays of a path of two segments, and the segments of its vertices
+    // Rays of paths of two segments, and the shadow segments at their vertices
     job.change(|settings| (settings.integrator.kind, settings.integrator.max_depth) = (IntegratorKind::Path, 2));
     let recording = record(&job, &batches);
     let (geometry, textures) = (Arc::clone(&job.world.scene.geometry), Arc::clone(&job.world.scene.textures));
@@ -161,8 +163,9 @@ fn record(job: &RenderJob, batches: &[Vec<CameraSample>]) -> Recording {
     tracer.take_recording()
 }
 
-/// Renders the batches several times.
+/// Renders the batches several times, and returns the times of the stages.
 fn stages(job: &RenderJob, batches: &[Vec<CameraSample>], runs: u32) -> (Vec<Stage>, Option<Proposals>) {
+    // Run, once without measuring
     let mut tracer = PathTracer::default();
     let mut out = Vec::new();
     let fits = batches.iter().flatten().map(|s| s.fit + 1).max().unwrap_or(0) as usize;
@@ -178,12 +181,14 @@ fn stages(job: &RenderJob, batches: &[Vec<CameraSample>], runs: u32) -> (Vec<Sta
     one_run();
     let runs: Vec<(Duration, PathStats)> = (0..runs.max(1)).map(|_| one_run()).collect();
 
+    // Medians
     let of = |time: &dyn Fn(&(Duration, PathStats)) -> Duration| median(runs.iter().map(|r| time(r).as_secs_f64()));
     let last = runs[runs.len() - 1].1;
     let (direct, points) = (last.direct, last.camera_rays + last.bounce_rays);
     let bsdf_proposals = direct.proposals - direct.light_proposals;
     let (t1_light, t1_bsdf) = (of(&|r| r.1.direct.t1_light), of(&|r| r.1.direct.t1 - r.1.direct.t1_light));
     let stage = |name, seconds, items| Stage { name, seconds, items };
+    // Stages
     let stages = vec![
         stage("camera rays", of(&|r| r.1.camera_time), last.camera_rays),
         stage("bounce rays", of(&|r| r.1.bounce_time), last.bounce_rays),
@@ -194,6 +199,8 @@ fn stages(job: &RenderJob, batches: &[Vec<CameraSample>], runs: u32) -> (Vec<Sta
         stage("T2 shadow segments", of(&|r| r.1.direct.t2), direct.segments),
         stage("all", of(&|r| r.0), last.camera_rays),
     ];
+
+    // Proposals
     let per = |seconds: f64, count: u64| (count > 0).then(|| seconds * 1e9 / count as f64);
     let proposals = Proposals {
         light_proposals: direct.light_proposals,
@@ -206,11 +213,11 @@ fn stages(job: &RenderJob, batches: &[Vec<CameraSample>], runs: u32) -> (Vec<Sta
 
 /// The renderer's tracer and the bare loop over the same scene.
 pub struct Pair {
-    /// The renderer's.
+    /// The renderer's tracer.
     pub accel: EmbreeAccel,
-    /// Embree by itself.
+    /// The bare Embree loop.
     pub bare: Bare,
-    /// Turns of each.
+    /// Number of turns.
     pub runs: u32,
 }
 
@@ -241,6 +248,7 @@ impl Pair {
         batches: &[RayBatch],
         coherence: Coherence,
     ) -> Result<Option<RayCase>, EmbreeError> {
+        // The bare loop gets the same packet width and coherence flag
         let coherent = coherence == Coherence::Coherent;
         let width = self.accel.packet_width(coherence);
         let mut hits = Vec::new();
@@ -277,8 +285,8 @@ impl Pair {
         self.compare(name, width, batches, ours, bare)
     }
 
-    /// Lets both take turns, after one of each that does not count. Batches are made just before they are traced, as in
-    /// the renderer, which is not part of the time.
+    /// Alternates between both, after one turn that is not measured. Batches are copied just before they are traced, as
+    /// in the renderer; the copy is not part of the time.
     fn compare(
         &self,
         name: &'static str,
@@ -307,7 +315,7 @@ impl Pair {
             turns.push([turn(&mut ours)?.0, turn(&mut bare)?.0]);
         }
 
-        // The sum over batches of the median over turns: what interrupts a batch now and then drops out
+        // The sum over batches of the median over turns, so that occasional interruptions do not count
         let of_batch = |slot: usize, batch: usize| median(turns.iter().map(|turn| turn[slot][batch]));
         let [ours, bare] = [0, 1].map(|slot| (0..batches.len()).map(|b| of_batch(slot, b)).sum::<f64>().max(1e-9));
         let seconds: Vec<[f64; 2]> =
@@ -339,7 +347,7 @@ fn time(run: impl FnOnce()) -> Duration {
     start.elapsed()
 }
 
-/// All rays of the batches in random order, in batches as large as the renderer's.
+/// All rays of the batches in random order, in batches of the renderer's size.
 fn shuffled(batches: &[RayBatch]) -> Vec<RayBatch> {
     let places = batches.iter().enumerate().flat_map(|(b, batch)| (0..batch.len()).map(move |i| (b, i)));
     let mut order: Vec<(usize, usize)> = places.collect();

@@ -1,4 +1,5 @@
-//! The command-line program.
+//! The command-line program. Commands are in `commands`, the page of a comparison in `compare`, the viewers'
+//! connections in `watch`.
 
 mod commands;
 mod compare;

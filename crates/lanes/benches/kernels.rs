@@ -12,14 +12,14 @@ use std::hint::black_box;
 use std::time::Instant;
 
 const ROWS: usize = 4096;
-/// Directions that one BSDF is evaluated for.
+/// Number of directions for which one BSDF is evaluated.
 const MANY: usize = 32;
 
 fn arguments() -> impl Iterator<Item = String> {
     std::env::args().skip(1).filter(|a| !a.starts_with('-'))
 }
 
-/// Best of several runs, in nanoseconds per row.
+/// Shortest time of several runs (ns per row).
 fn time(mut run: impl FnMut()) -> f64 {
     let runs = arguments().nth(1).and_then(|a| a.parse().ok()).unwrap_or(50);
     let mut best = f64::INFINITY;
@@ -31,7 +31,7 @@ fn time(mut run: impl FnMut()) -> f64 {
     best * 1e9 / ROWS as f64
 }
 
-/// The rows of all kernels: directions in world space, in columns and one by one.
+/// Input rows for all kernels: directions in world space, as columns and as vectors.
 struct Scene {
     tables: Vec<f32>,
     frames: Vec<Frame>,
@@ -54,7 +54,7 @@ impl Scene {
         let mut s = pcg32([1, 2, 3]);
         let frames: Vec<Frame> =
             (0..ROWS).map(|_| Frame::from_z(warp::sample_uniform_sphere(s.random::<[f32; 2]>()))).collect();
-        // Both sides of glass, but mostly the one of the viewer
+        // Mostly on the viewer's side, some through the surface
         let mut direction = |frame: &Frame, below: f32| {
             let w = warp::sample_cosine_hemisphere(s.random::<[f32; 2]>());
             frame.to_world(if s.random::<f32>() < below { -w } else { w })
@@ -70,6 +70,7 @@ impl Scene {
     }
 
     fn measure<K: BsdfKernel>(&self, name: &str, kernel: Kernel, params: impl Fn(&mut Pcg32) -> Vec<f32>) {
+        // Arguments in columns
         if arguments().next().is_some_and(|part| !name.contains(&part)) {
             return;
         }
@@ -82,6 +83,7 @@ impl Scene {
         let mut out = vec![vec![0.0; ROWS]; 9];
         let [x, y, z, r, g, b, pdf, lobe, eta] = &mut out[..] else { unreachable!("there are nine") };
 
+        // Evaluate
         let single = time(|| {
             for i in 0..ROWS {
                 let [wo, wi] = [self.wo[i], self.wi[i]].map(|w| self.frames[i].to_local(w).into());
@@ -99,6 +101,8 @@ impl Scene {
                 evaluate_one(level(), kernel, &one, wi.map(|column| &column[range.clone()]), &mut values);
             }
         });
+
+        // Sample
         let sampled_single = time(|| {
             for i in 0..ROWS {
                 let wo = self.frames[i].to_local(self.wo[i]).into();
@@ -115,6 +119,7 @@ impl Scene {
 }
 
 fn main() {
+    // Header, then one row per kernel
     let scene = Scene::new();
     let some = |s: &mut Pcg32, n: usize| (0..n).map(|_| 0.1 + 0.8 * s.random::<f32>()).collect::<Vec<f32>>();
     println!("| ns per row | f and pdf, single | rows | one BSDF, {MANY} | sample, single | rows |");

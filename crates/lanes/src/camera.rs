@@ -7,24 +7,24 @@ use lumiris_numbers::math::{Mat3, Vec2};
 /// A perspective camera without a lens.
 #[derive(Clone, Copy, Debug)]
 pub struct Pinhole {
-    /// Maps directions of camera space to those of the world.
+    /// Matrix from camera space to world space for directions.
     pub world_from_camera: Mat3,
     /// Size of the image in pixels.
     pub resolution: Vec2,
-    /// Screen window: x from, x to, y from, y to.
+    /// Screen window: x min, x max, y min, y max.
     pub screen_window: [f32; 4],
-    /// Half the width of the plane z = 1 that is one screen unit.
+    /// Half-width of the image plane z = 1 that corresponds to one screen unit.
     pub tan_half_fov: f32,
     /// Area of a pixel on the screen.
     pub pixel_area: f32,
 }
 
-/// Rays of a [`Pinhole`], all from one point. Slices have one length, a multiple of [`LANES`].
+/// Rays of a [`Pinhole`], all with the same origin. Slices have the same length, a multiple of [`LANES`].
 #[derive(Debug)]
 pub struct PinholeRays<'a> {
     /// Unit directions.
     pub d: [&'a mut [f32]; 3],
-    /// Growth of the width of a pixel per unit length.
+    /// Growth of the pixel footprint's width per unit length.
     pub spread: &'a mut [f32],
 }
 
@@ -41,7 +41,7 @@ impl Pinhole {
             let x = (load(simd, film[0], i) / self.resolution.x * (x1 - x0) + x0) * self.tan_half_fov;
             let y = (-(load(simd, film[1], i) / self.resolution.y * (y1 - y0)) + y1) * self.tan_half_fov;
             let d = Vec3s { x, y, z: one };
-            // A pixel of area a on the plane z = 1 subtends a·cos³θ.
+            // A pixel of area a on the plane z = 1 subtends a·cos³θ
             let cos = one / d.dot(d).sqrt();
             store((cos * self.pixel_area).sqrt() * cos * self.tan_half_fov, out.spread, i);
             let d = d.transformed(&self.world_from_camera);

@@ -1,4 +1,4 @@
-//! Columns of numbers, one for each item of a batch.
+//! Columns of numbers: one number per item of a batch.
 
 use super::lane::LANES;
 use lumiris_numbers::math::{Rgb, Vec3};
@@ -6,16 +6,16 @@ use lumiris_numbers::math::{Rgb, Vec3};
 /// A column.
 pub type Column = Vec<f32>;
 
-/// The components of vectors, or the channels of colours.
+/// Three columns: the components of vectors, or the channels of colours.
 #[derive(Clone, Debug, Default)]
 pub struct Columns3([Column; 3]);
 
-/// The least length of columns of `n` items: kernels work on whole vectors.
+/// Length of columns of `n` items, rounded up to whole SIMD vectors.
 pub fn padded(n: usize) -> usize {
     n.next_multiple_of(LANES)
 }
 
-/// Lengthens columns that are shorter.
+/// Extends shorter columns to `len`.
 pub fn reserve(columns: &mut [&mut Column], len: usize) {
     for column in columns {
         if column.len() < len {
@@ -25,17 +25,17 @@ pub fn reserve(columns: &mut [&mut Column], len: usize) {
 }
 
 impl Columns3 {
-    /// Lengthens the columns if they are shorter.
+    /// Extends shorter columns to `len`.
     pub fn reserve(&mut self, len: usize) {
         reserve(&mut self.0.each_mut(), len);
     }
 
-    /// The first `len` numbers of each.
+    /// The first `len` numbers of each column.
     pub fn get(&self, len: usize) -> [&[f32]; 3] {
         self.0.each_ref().map(|c| &c[..len])
     }
 
-    /// The first `len` numbers of each, to be written.
+    /// The first `len` numbers of each column, mutable.
     pub fn get_mut(&mut self, len: usize) -> [&mut [f32]; 3] {
         self.0.each_mut().map(|c| &mut c[..len])
     }

@@ -1,9 +1,9 @@
-//! The weights of proposals of two techniques [Talbot 2005, Section 4.6.1]: q̂ = Y(f·cos θ·L), r = w/(m p), and q̂·r.
+//! Weights of proposals of two techniques [Talbot 2005, Section 4.6.1]: q̂ = Y(f·cos θ·L), r = w/(m p), and q̂·r.
 //!
-//! With m_i proposals of density p_i of each technique, r_j = w_i(x_j)/(m_i p_i(x_j)), one target q̂ and one drawing,
-//! c_j = f r_j and w_j = q̂ r_j are as for a single technique. The thesis prints the weight as w_i q̂/p_i without
-//! 1/m_i, for an estimate that divides by M afterwards; that is right only if all m_i are equal to M, and off by m_i/M
-//! otherwise.
+//! Technique i has m_i proposals of density p_i, and r_j = w_i(x_j)/(m_i p_i(x_j)). With one target q̂ and a single
+//! drawing step, c_j = f r_j and w_j = q̂ r_j are the same as for a single technique. The thesis prints the weight as
+//! w_i q̂/p_i without 1/m_i, for an estimate that divides by M afterwards. That is correct only if all m_i are equal to
+//! M, and off by m_i/M otherwise.
 
 use super::lane::{F, LANES, Vec3s, begin, load, or_zero, padded, store};
 use super::wide::Wide;
@@ -12,14 +12,14 @@ use lumiris_numbers::estimators::mis::Heuristic;
 use lumiris_numbers::estimators::ris::weight;
 use lumiris_numbers::math::rgb::LUMINANCE;
 
-/// Samples of one technique, and the density of another one at them. All slices have the same length.
+/// Samples of one technique, with the density of another technique. All slices have the same length.
 #[derive(Clone, Copy, Debug)]
 pub struct Proposals<'a> {
     /// f·|cos θi| by channel.
     pub f_cos: [&'a [f32]; 3],
     /// Radiance by channel.
     pub li: [&'a [f32]; 3],
-    /// Density of the technique of the samples; not positive where there is none.
+    /// Density of the samples' technique; not positive if there is no sample.
     pub p: &'a [f32],
     /// Density of the other technique.
     pub p_other: &'a [f32],
@@ -27,18 +27,18 @@ pub struct Proposals<'a> {
     pub m: f32,
     /// Number of samples of the other technique; 0 if it is not used.
     pub m_other: f32,
-    /// How both are weighted.
+    /// MIS heuristic.
     pub heuristic: Heuristic,
 }
 
-/// What [`combine`] computes.
+/// Output of [`combine`].
 #[derive(Debug)]
 pub struct Weights<'a> {
-    /// q̂, the luminance of f·cos θ·li; 0 where p is not positive.
+    /// q̂, the luminance of f·cos θ·li; 0 if p is not positive.
     pub q_hat: &'a mut [f32],
-    /// r = w/(m·p), w the weight of multiple importance sampling; 0 where p is not positive.
+    /// r = w/(m·p), where w is the MIS weight; 0 if p is not positive.
     pub r: &'a mut [f32],
-    /// q̂·r; 0 where that is not finite.
+    /// q̂·r; 0 if not finite.
     pub w: &'a mut [f32],
 }
 

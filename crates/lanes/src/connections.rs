@@ -1,13 +1,12 @@
-//! Segments from all Lambertian vertices of one set to all of another one.
-//!
-//! The formulas are those of the module `integrators::reuse`.
+//! Segments between all pairs of Lambertian vertices of two sets. The formulas are in the module
+//! `integrators::reuse`.
 
 use super::lane::{F, LANES, Vec3s, or_zero, store};
 use super::vertex::{Columns3, ColumnsMut3, End, Ends, offset_origins};
 use fearless_simd::{Level, Simd, dispatch, prelude::*};
 use lumiris_numbers::math::Vec3;
 
-/// Lambertian vertices, with their geometric normals on the side that is lit.
+/// Lambertian vertices, with geometric normals on the lit side.
 #[derive(Clone, Copy, Debug)]
 pub struct Vertices<'a> {
     /// The points, with their geometric normals.
@@ -16,21 +15,21 @@ pub struct Vertices<'a> {
     pub ns: Columns3<'a>,
 }
 
-/// The segments to each vertex of the second set, one after another, from all of the first set.
+/// Segments from all vertices of the first set to each vertex of the second set, one after another.
 #[derive(Debug)]
 pub struct Connections<'a> {
-    /// cos θ cos θ'/d² (1/area), by shading normals at `from` and geometric ones at `to`; 0 where one vertex lies below
-    /// the other.
+    /// cos θ cos θ'/d² (1/area), with shading normals at `from` and geometric normals at `to`; 0 if one vertex is below
+    /// the other's horizon.
     pub g: &'a mut [f32],
     /// Origins.
     pub o: ColumnsMut3<'a>,
-    /// Directions, as long as the segments.
+    /// Directions; their lengths are the segments' lengths.
     pub d: ColumnsMut3<'a>,
 }
 
 /// Connects all of `from`, in columns of a multiple of [`LANES`], with all of `to`.
 ///
-/// Segments that do not count may be left as they are.
+/// Segments with `g` = 0 may keep their old values.
 pub fn connect(level: Level, from: &Vertices<'_>, to: &Vertices<'_>, out: &mut Connections<'_>) {
     dispatch!(level, simd => connect_lanes(simd, from, to, out));
 }

@@ -1,9 +1,9 @@
-//! Points along the Hilbert curve, at scrambled strata.
+//! Points along the Hilbert curve at scrambled strata.
 //!
 //! The k-th base-4 digit of a position on the curve, hi·2 + lo, selects a quadrant: x = hi, y = hi ⊕ lo. Digit 0
-//! reflects the quadrant's contents about the diagonal, digit 3 about the antidiagonal, which is the diagonal and both
-//! axes. These reflections commute, so all digits are processed at once: whether the axes are swapped and whether they
-//! are reversed in digit k are the parities of the number of digits 0 or 3, and of digits 3, before it.
+//! reflects the quadrant's contents about the diagonal; digit 3 reflects them about the antidiagonal, which is the
+//! diagonal and both axes. These reflections commute, so all digits are processed at once. In digit k, the axes are
+//! swapped if the number of digits 0 or 3 before it is odd, and reversed if the number of digits 3 before it is odd.
 
 use fearless_simd::{Level, dispatch};
 
@@ -27,7 +27,7 @@ const fn even_bits(x: u32) -> u32 {
     (x | (x >> 8)) & 0xffff
 }
 
-/// Each bit the parity of the bits above it, of 16.
+/// Replaces each of 16 bits by the parity of the bits above it.
 #[inline(always)]
 const fn parity_above(x: u32) -> u32 {
     let x = x >> 1;
@@ -37,13 +37,13 @@ const fn parity_above(x: u32) -> u32 {
     x ^ (x >> 8)
 }
 
-/// The cell of position `t` on the curve of order 16, 16 bits each.
+/// The cell, 16 bits per coordinate, at position `t` on the curve of order 16.
 #[inline(always)]
 pub const fn hilbert_cell(t: u32) -> [u32; 2] {
     let (hi, lo) = (even_bits(t >> 1), even_bits(t));
     let swap = parity_above(!(hi ^ lo) & 0xffff);
     let reverse = parity_above(hi & lo);
-    // x and y differ where lo is set.
+    // x and y differ where lo is set
     let x = hi ^ reverse ^ (lo & swap);
     [x, x ^ lo]
 }
@@ -60,9 +60,8 @@ fn hilbert_points_lanes(t: &[u32], jitter: &[u32], u0: &mut [f32], u1: &mut [f32
     }
 }
 
-/// Points of [0, 1)² at the positions `t`/2³² along the Hilbert curve of order 16: its cell gives 16 bits to each
-/// coordinate, and the low byte of `jitter` (for x) and the next byte (for y) give 8 more. All slices have the same
-/// length.
+/// Points of [0, 1)² at the positions `t`/2³² along the Hilbert curve of order 16. The cell gives 16 bits of each
+/// coordinate; the low byte of `jitter` (for x) and the next byte (for y) give 8 more. All slices have the same length.
 pub fn hilbert_points(t: &[u32], jitter: &[u32], u0: &mut [f32], u1: &mut [f32]) {
     dispatch!(Level::new(), _simd => hilbert_points_lanes(t, jitter, u0, u1));
 }
@@ -76,8 +75,8 @@ pub fn hilbert_points_scalar(t: &[u32], jitter: &[u32], u0: &mut [f32], u1: &mut
     }
 }
 
-/// Owen scrambling of the fraction whose bits, lowest first, are `reversed` [Laine and Karras 2011; the constants of
-/// Burley 2020]: a bit is flipped or not by a hash of the bits before it.
+/// Owen scrambling of the fraction whose bits, lowest first, are `reversed` [Laine and Karras 2011; constants of Burley
+/// 2020]. Each bit is flipped depending on a hash of the bits before it.
 #[inline(always)]
 const fn owen_scramble_reversed(reversed: u32, seed: u32) -> u32 {
     let mut x = reversed.wrapping_add(seed);
@@ -88,20 +87,20 @@ const fn owen_scramble_reversed(reversed: u32, seed: u32) -> u32 {
     x.reverse_bits()
 }
 
-/// Hash of a stratum, the seed of its scramble.
+/// Hash of a stratum, used as the seed of its scramble.
 #[inline(always)]
 const fn stratum_seed(seed: u32, i: u32) -> u32 {
     mix(mix(seed).wrapping_add(i.wrapping_mul(0x9e37_79b9)))
 }
 
-/// ξ of stratum `i`, and its jitter.
+/// ξ of stratum `i` with its jitter.
 #[inline(always)]
 const fn stratum(reversed: u32, hash_phi: u32, seed: u32, i: u32) -> (u32, u32) {
     let key = stratum_seed(seed, i);
     (owen_scramble_reversed(reversed, key), mix(key ^ hash_phi))
 }
 
-/// Hash of `phi` for the jitter.
+/// Hash of `phi` for jitter.
 #[inline(always)]
 const fn phi_hash(phi: u32) -> u32 {
     mix(phi ^ 0x68bc_21eb)
@@ -121,8 +120,8 @@ fn strata_lanes(phi: u32, seed: u32, m: u32, out: &mut [u32], jitter: &mut [u32]
         }
         return;
     }
-    // The dividend is an integer below 2⁴⁸, so the fraction of the quotient is within 2⁻²⁰ of a multiple of 1/m. Less
-    // (1 − 1/m)/2 it rounds to its floor, in the low bits of a number whose last digit is 1.
+    // The dividend is an integer below 2⁴⁸, so the fraction of the quotient is within 2⁻²⁰ of a multiple of 1/m.
+    // Subtracting (1 − 1/m)/2 makes it round to its floor, in the low bits of a number with an ulp of 1
     let (count, bias) = (f64::from(m), 0.5 / f64::from(m) - 0.5);
     for i in 0..n {
         let (xi, j) = stratum(reversed, hash_phi, seed, i as u32);
@@ -132,14 +131,14 @@ fn strata_lanes(phi: u32, seed: u32, m: u32, out: &mut [u32], jitter: &mut [u32]
     }
 }
 
-/// One position in each of `m` ≤ 2¹⁶ equal strata of [0, 1), in units of 2⁻³²: `out[i]` = ⌊(i·2³² + ξᵢ)/m⌋, where ξᵢ is
-/// the fraction `phi`/2³² in a nested (Owen) scramble of its own, seeded by `seed` and i. Each ξᵢ is stratified over
-/// the samples of a pixel if `phi` is. `jitter[i]` is a hash of `phi`, `seed` and i. Both slices have the length `m`.
+/// One position in each of `m` ≤ 2¹⁶ equal strata of [0, 1), in units of 2⁻³²: `out[i]` = ⌊(i·2³² + ξᵢ)/m⌋. ξᵢ is the
+/// fraction `phi`/2³² after nested (Owen) scrambling seeded by `seed` and i. Each ξᵢ is stratified over the samples of
+/// a pixel if `phi` is. `jitter[i]` is a hash of `phi`, `seed` and i. Both slices have the length `m`.
 pub fn strata(phi: u32, seed: u32, m: u32, out: &mut [u32], jitter: &mut [u32]) {
     dispatch!(Level::new(), _simd => strata_lanes(phi, seed, m, out, jitter));
 }
 
-/// The scalar twin of [`strata`], in integers.
+/// The scalar twin of [`strata`], in integer arithmetic.
 pub fn strata_scalar(phi: u32, seed: u32, m: u32, out: &mut [u32], jitter: &mut [u32]) {
     for i in 0..out.len() {
         let (xi, j) = stratum(phi.reverse_bits(), phi_hash(phi), seed, i as u32);

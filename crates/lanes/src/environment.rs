@@ -1,7 +1,7 @@
-//! Directions importance sampled from an image of radiance over the sphere.
+//! Importance sampling of directions from an environment map.
 //!
-//! The running integrals are inverted lane by lane, since that is a matter of cache lines; directions and densities are
-//! in lanes; a texel is one load of four floats. The maps of the square to the sphere are those of
+//! The cumulative distributions are inverted sample by sample, since cache misses dominate. Directions and densities
+//! are computed in lanes. A texel is one load of four floats. The mappings between square and sphere are in
 //! [`lumiris_numbers::math::sphere_map`].
 
 use super::lane::{Columns3, F, I, LANES, Vec3s, begin, load, or_zero, safe_sqrt, store};
@@ -13,34 +13,34 @@ use lumiris_numbers::math::sphere_map::{self, pdf_equal_area_square_to_sphere};
 use lumiris_numbers::math::{Mat3, ONE_MINUS_EPSILON, TexelDistribution};
 use std::f32::consts::{PI, TAU};
 
-/// An image of the radiance from all directions, and how it is sampled.
+/// An environment map with its sampling distribution.
 #[derive(Clone, Copy, Debug)]
 pub struct Environment<'a> {
     /// Density over the unit square.
     pub distribution: &'a TexelDistribution,
-    /// Red, green, blue and the density per unit area of the square, row by row, with a border of one texel that
-    /// continues the image around the sphere.
+    /// Red, green, blue, and the density per unit area of the square, row by row. A border of one texel continues the
+    /// image around the sphere.
     pub texels: &'a [[f32; 4]],
-    /// True for the equal-area octahedral map, false for latitude and longitude.
+    /// True for the equal-area octahedral mapping, false for latitude–longitude.
     pub is_equal_area: bool,
-    /// True for a blend of four texels, false for the nearest.
+    /// True for bilinear interpolation, false for the nearest texel.
     pub is_bilinear: bool,
-    /// Orthogonal map of directions.
+    /// Orthogonal matrix for directions.
     pub world_from_light: Mat3,
     /// Factor of the radiance.
     pub scale: f32,
 }
 
-/// Samples that are worked on together.
+/// Samples per chunk.
 const CHUNK: usize = 32;
 
-/// One number for each sample of a chunk.
+/// One number per sample of a chunk.
 type Column = [f32; CHUNK];
 
-/// Where the numbers of a chunk fall in one dimension.
+/// Bins of a chunk's random numbers in one dimension.
 struct Places {
     bin: [i32; CHUNK],
-    /// The number, less the running integral at the beginning of its bin.
+    /// The random number minus the cumulative probability at the start of its bin.
     above: Column,
     /// Probability of the bin.
     width: Column,
@@ -51,7 +51,7 @@ impl Places {
         Places { bin: [0; CHUNK], above: [0.0; CHUNK], width: [1.0; CHUNK] }
     }
 
-    /// Inverts the running integral at `u`: the last bin with `cdf[i] <= u`.
+    /// Inverts the cumulative distribution at `u`: the last bin with `cdf[i] <= u`.
     #[inline(always)]
     fn set<S: Simd>(&mut self, i: usize, simd: S, running: &Running<'_>, u: f32) {
         let Running { cdf, guide } = *running;
@@ -71,17 +71,17 @@ impl Places {
         self.width[i] = bin.end - bin.begin;
     }
 
-    /// How far a number is in its bin.
+    /// Position of sample `i` within its bin, in [0, 1).
     #[inline(always)]
     fn fraction(&self, i: usize) -> f32 {
         (self.above[i] / self.width[i]).min(ONE_MINUS_EPSILON)
     }
 }
 
-/// Where the numbers of a chunk fall among the texels of one dimension.
+/// Texels of a chunk's samples in one dimension.
 struct Along {
     texel: [i32; CHUNK],
-    /// In units of texels.
+    /// Position in units of texels.
     place: Column,
 }
 
@@ -90,7 +90,7 @@ impl Along {
         Along { texel: [0; CHUNK], place: [0.0; CHUNK] }
     }
 
-    /// The texels at the places in blocks of one density, of so many texels.
+    /// Texels and positions within blocks of `edge` texels of uniform density.
     #[inline(always)]
     fn set<S: Simd>(&mut self, simd: S, i: usize, blocks: &Places, edge: usize) {
         let block = I::from_slice(simd, &blocks.bin[i..i + LANES]);
@@ -108,17 +108,17 @@ impl Along {
     }
 }
 
-/// Texels of the lookups of a chunk.
+/// Texel lookups of a chunk.
 struct Lookups {
-    /// The sampled texel, in whose fourth component the density is.
+    /// Index of the sampled texel, whose fourth component is the density.
     cell: [i32; CHUNK],
-    /// The first of the four texels of a blend.
+    /// Index of the first of the four texels for bilinear interpolation.
     first: [i32; CHUNK],
     dx: Column,
     dy: Column,
     /// Density per unit area of the square.
     pdf_area: Column,
-    /// What makes it a density per steradian.
+    /// Jacobian from density per unit area of the square to density per steradian.
     density: Column,
 }
 
@@ -129,7 +129,7 @@ impl Lookups {
     }
 }
 
-/// A direction on the sphere before the rotation, and the density per steradian of a uniform point of the square.
+/// A direction before the rotation, and the density (1/sr) of a uniform point of the square.
 #[inline(always)]
 fn equal_area<S: Simd>(x: F<S>, y: F<S>) -> (Vec3s<S>, F<S>) {
     let simd = x.token();
@@ -149,7 +149,7 @@ fn equal_area<S: Simd>(x: F<S>, y: F<S>) -> (Vec3s<S>, F<S>) {
     (w, F::splat(simd, pdf_equal_area_square_to_sphere()))
 }
 
-/// As [`equal_area`], for latitude and longitude.
+/// As [`equal_area`], for the latitude–longitude mapping.
 #[inline(always)]
 fn lat_long<S: Simd>(x: F<S>, y: F<S>) -> (Vec3s<S>, F<S>) {
     let (sin_theta, cos_theta) = sin_cos_turns(y * 0.5);
@@ -158,7 +158,7 @@ fn lat_long<S: Simd>(x: F<S>, y: F<S>) -> (Vec3s<S>, F<S>) {
     (w, F::splat(x.token(), 1.0) / (sin_theta * (TAU * PI)))
 }
 
-/// The points of the square that stand for unit directions under the equal-area octahedral map. Slices have one length, a
+/// Points of the square for unit directions under the equal-area octahedral mapping. Slices have the same length, a
 /// multiple of [`LANES`].
 pub fn equal_area_squares(level: Level, w: Columns3<'_>, out: [&mut [f32]; 2]) {
     dispatch!(level, simd => squares_lanes(simd, w, out));
@@ -174,13 +174,14 @@ fn squares_lanes<S: Simd>(simd: S, w: Columns3<'_>, [u, v]: [&mut [f32]; 2]) {
 }
 
 impl Environment<'_> {
-    /// Samples directions; densities are 0 where the image is black.
+    /// Samples directions. Densities are 0 where the image is black.
     pub fn sample(&self, level: Level, u: [&[f32]; 2], out: &mut LightLanes<'_>) {
         out.with_padding(u, &|u, out| dispatch!(level, simd => self.sample_lanes(simd, u, out)));
     }
 
     #[inline(always)]
     fn sample_lanes<S: Simd>(&self, simd: S, u: [&[f32]; 2], out: &mut LightLanes<'_>) {
+        // Directions, radiances and densities of each chunk
         let n = out.pdf.len();
         for start in (0..n).step_by(CHUNK) {
             let start = begin(start, n);
@@ -201,9 +202,10 @@ impl Environment<'_> {
         }
     }
 
-    /// Inverts the running integrals.
+    /// Inverts the cumulative distributions.
     #[inline(always)]
     fn places<S: Simd>(&self, simd: S, start: usize, count: usize, u: [&[f32]; 2]) -> [Along; 2] {
+        // Invert: rows, then columns within the rows
         let [mut x, mut y] = [Places::new(), Places::new()];
         let (u0, u1) = (&u[0][start..start + count], &u[1][start..start + count]);
         let rows = self.distribution.rows();
@@ -213,6 +215,8 @@ impl Environment<'_> {
         for i in 0..count {
             x.set(i, simd, &self.distribution.row(y.bin[i] as usize), u0[i]);
         }
+
+        // Blocks to texels
         let edge = self.distribution.edge();
         let mut along = [Along::new(), Along::new()];
         for i in (0..count).step_by(LANES) {
@@ -226,7 +230,7 @@ impl Environment<'_> {
         along
     }
 
-    /// The texels of blocks in which they differ.
+    /// Chooses texels within blocks whose texels have different densities.
     #[inline(always)]
     fn tell_apart(&self, x: &Places, y: &Places, count: usize, along: &mut [Along; 2]) {
         let edge = self.distribution.edge() as i32;
@@ -242,7 +246,7 @@ impl Environment<'_> {
         }
     }
 
-    /// Directions, and where their texels are.
+    /// Directions and the indices of their texels.
     #[inline(always)]
     fn directions<S: Simd>(
         &self,
@@ -263,7 +267,7 @@ impl Environment<'_> {
         let stride = I::splat(simd, width as i32 + 2);
         ((row + 1) * stride + column + 1).store_slice(&mut lookups.cell[i..i + LANES]);
         let (x, y) = (x + 0.5, y + 0.5);
-        // Rounding may place a sample of the last texel at its end.
+        // Rounding can move a sample of the last texel to its end
         let (x0, y0) = (x.floor().min(width as f32), y.floor().min(height as f32));
         (y0.to_int::<I<S>>() * stride + x0.to_int::<I<S>>()).store_slice(&mut lookups.first[i..i + LANES]);
         store(x - x0, &mut lookups.dx, i);
@@ -275,9 +279,10 @@ impl Environment<'_> {
         f32x4::from_slice(simd, &self.texels[i])
     }
 
-    /// Radiances, and the densities per unit area of the square.
+    /// Radiances, and densities per unit area of the square.
     #[inline(always)]
     fn radiances<S: Simd>(&self, simd: S, lookups: &mut Lookups, start: usize, count: usize, out: &mut LightLanes<'_>) {
+        // Interpolated or nearest radiance; the density is always the sampled texel's
         let stride = self.distribution.resolution()[0] + 2;
         let [red, green, blue] = &mut out.li;
         let (red, green) = (&mut red[start..start + count], &mut green[start..start + count]);

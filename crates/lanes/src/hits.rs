@@ -1,15 +1,15 @@
-//! Exact hits of rays with triangles, one pair per lane: the watertight test of [Woop et al. 2013] without its rare
-//! branches, which are those of `geometry::triangle` in the renderer.
+//! Exact ray–triangle intersection, one pair per lane: the watertight test of [Woop et al. 2013] without its rare
+//! branches, which are in the renderer's `geometry::triangle`.
 
 use super::lane::{F, LANES, Vec3s, load, store};
 use super::triangles::Axes;
 use fearless_simd::{Level, Simd, dispatch, prelude::*};
 use lumiris_numbers::math::gamma;
 
-/// Pairs in a block: enough that reading the triangles of some overlaps with that of others.
+/// Pairs per block: enough that memory accesses of triangles overlap.
 pub const BLOCK: usize = 64;
 
-/// Rays with one triangle each: `[axis][pair]`.
+/// Pairs of a ray and a triangle: `[axis][pair]`.
 #[derive(Clone, Debug)]
 pub struct Pairs {
     /// Origins.
@@ -25,12 +25,12 @@ pub struct Pairs {
 /// Hits of a block.
 #[derive(Clone, Debug)]
 pub struct Hits {
-    /// Ray parameters, less than the ends of the rays; NaN where the scalar test may take one of its branches, or finds
-    /// nothing.
+    /// Ray parameters below the ends of the rays. NaN if the scalar test might take one of its rare branches, or finds
+    /// no hit.
     pub t: [f32; BLOCK],
-    /// Weights of corners 1.
+    /// Weights of corner 1.
     pub b1: [f32; BLOCK],
-    /// Weights of corners 2.
+    /// Weights of corner 2.
     pub b2: [f32; BLOCK],
 }
 
@@ -47,7 +47,7 @@ impl Default for Hits {
     }
 }
 
-/// The hits of the first `count` pairs, to the bit those of the scalar test.
+/// The hits of the first `count` pairs, bit-identical to the scalar test.
 pub fn exact(level: Level, pairs: &Pairs, count: usize, out: &mut Hits) {
     dispatch!(level, simd => exact_lanes(simd, pairs, count, out));
 }
@@ -67,7 +67,7 @@ fn exact_lanes<S: Simd>(simd: S, pairs: &Pairs, count: usize, out: &mut Hits) {
         let inv_det = F::splat(simd, 1.0) / (u + v + w);
         let t = (u * a.z + v * b.z + w * c.z) * shear.z * inv_det;
 
-        // Comparisons with NaN are false, so a ray that cannot be prepared has no hit
+        // Comparisons with NaN are false, so degenerate rays have no hit
         let zero = F::splat(simd, 0.0);
         let above = u.simd_gt(zero) & v.simd_gt(zero) & w.simd_gt(zero);
         let below = u.simd_lt(zero) & v.simd_lt(zero) & w.simd_lt(zero);
@@ -89,7 +89,7 @@ fn sheared<S: Simd>(shear: Vec3s<S>, p: Vec3s<S>) -> Vec3s<S> {
     Vec3s { x: p.x - shear.x * p.z, y: p.y - shear.y * p.z, z: p.z }
 }
 
-/// Bound of the rounding error of the parameter [Pharr et al. 2023, §6.8.7].
+/// Bound on the rounding error of the ray parameter [Pharr et al. 2023, §6.8.7].
 #[inline(always)]
 fn parameter_error<S: Simd>(a: Vec3s<S>, b: Vec3s<S>, c: Vec3s<S>, scale: F<S>) -> F<S> {
     let x = a.x.abs().max(b.x.abs()).max(c.x.abs());

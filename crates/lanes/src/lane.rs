@@ -1,45 +1,45 @@
-//! Vectors of lanes: loads and stores with padding, and directions by component.
+//! SIMD vectors: loads and stores with padding, and vectors by component.
 
 use fearless_simd::{Simd, SimdCombine, SimdSplit, f64x8, prelude::*};
 use lumiris_numbers::math::{Frame, Mat3, Vec3};
 
-/// The vector of f32 lanes.
+/// Vector of f32 lanes.
 pub type F<S> = fearless_simd::f32x8<S>;
-/// The vector of i32 lanes.
+/// Vector of i32 lanes.
 pub type I<S> = fearless_simd::i32x8<S>;
-/// One truth per lane.
+/// Mask with one boolean per lane.
 pub type M<S> = fearless_simd::mask32x8<S>;
 
 /// Number of lanes.
 pub const LANES: usize = 8;
 
-/// The lanes as f64.
+/// Converts the lanes to f64.
 #[inline(always)]
 pub fn widened<S: Simd>(x: F<S>) -> f64x8<S> {
     let (low, high) = x.widen();
     low.combine(high)
 }
 
-/// The lanes rounded to f32.
+/// Rounds the lanes to f32.
 #[inline(always)]
 pub fn narrowed<S: Simd>(x: f64x8<S>) -> F<S> {
     let (low, high) = x.split();
     low.narrow(high)
 }
 
-/// Three columns of a vector or of a colour.
+/// Three columns: the components of vectors, or the channels of colours.
 pub type Columns3<'a> = [&'a [f32]; 3];
 
-/// Three columns to be written.
+/// Three mutable columns.
 pub type ColumnsMut3<'a> = [&'a mut [f32]; 3];
 
-/// Where a vector of `n` ≥ [`LANES`] numbers begins that covers number `i`: the last one overlaps the one before.
+/// Index at which the SIMD vector for item `i` of `n` ≥ [`LANES`] begins: the last vector overlaps the previous one.
 #[inline(always)]
 pub fn begin(i: usize, n: usize) -> usize {
     i.min(n - LANES)
 }
 
-/// The lanes from index `i` on.
+/// Loads the lanes from index `i` on.
 #[inline(always)]
 pub fn load<S: Simd>(simd: S, from: &[f32], i: usize) -> F<S> {
     F::from_slice(simd, &from[i..i + LANES])
@@ -51,7 +51,7 @@ pub fn store<S: Simd>(v: F<S>, to: &mut [f32], i: usize) {
     v.store_slice(&mut to[i..i + LANES]);
 }
 
-/// Fewer numbers than [`LANES`], followed by copies of the last one.
+/// Fewer numbers than [`LANES`], padded with copies of the last.
 #[inline]
 pub fn padded(from: &[f32]) -> [f32; LANES] {
     let mut to = [from.last().copied().unwrap_or(0.0); LANES];
@@ -77,7 +77,7 @@ impl<S: Simd> Vec3s<S> {
         Vec3s { x: F::splat(simd, v.x), y: F::splat(simd, v.y), z: F::splat(simd, v.z) }
     }
 
-    /// The lanes from index `i` on.
+    /// Loads the lanes from index `i` on.
     #[inline(always)]
     pub fn load(simd: S, from: [&[f32]; 3], i: usize) -> Self {
         Vec3s { x: load(simd, from[0], i), y: load(simd, from[1], i), z: load(simd, from[2], i) }
@@ -97,7 +97,7 @@ impl<S: Simd> Vec3s<S> {
         self.x * o.x + self.y * o.y + self.z * o.z
     }
 
-    /// Dot product with one vector.
+    /// Dot product with the same vector in all lanes.
     #[inline(always)]
     pub fn dot_splat(self, o: Vec3) -> F<S> {
         self.x * o.x + self.y * o.y + self.z * o.z
@@ -115,7 +115,7 @@ impl<S: Simd> Vec3s<S> {
         Vec3s { x: self.x - o.x, y: self.y - o.y, z: self.z - o.z }
     }
 
-    /// Multiple.
+    /// Product with a scalar per lane.
     #[inline(always)]
     pub fn times(self, s: F<S>) -> Self {
         Vec3s { x: self.x * s, y: self.y * s, z: self.z * s }
@@ -131,13 +131,13 @@ impl<S: Simd> Vec3s<S> {
         }
     }
 
-    /// Multiplied by a matrix.
+    /// Product with a matrix.
     #[inline(always)]
     pub fn transformed(self, m: &Mat3) -> Self {
         self.combine(m.x_axis, m.y_axis, m.z_axis)
     }
 
-    /// World to local.
+    /// Transforms from world space to the frame.
     #[inline(always)]
     pub fn to_local(self, frame: &Frame) -> Self {
         Vec3s { x: self.dot_splat(frame.x), y: self.dot_splat(frame.y), z: self.dot_splat(frame.z) }
@@ -150,7 +150,7 @@ pub fn safe_sqrt<S: Simd>(x: F<S>) -> F<S> {
     x.max(0.0).sqrt()
 }
 
-/// `v` where `keep`, else 0.
+/// `v` if `keep`, else 0.
 #[inline(always)]
 pub fn or_zero<S: Simd>(keep: M<S>, v: F<S>) -> F<S> {
     keep.select(v, F::splat(v.token(), 0.0))

@@ -1,24 +1,23 @@
-//! Directions from one point to one light, many at once.
+//! Directions from one point to one light, many samples at once.
 
 use super::lane::{F, LANES, Vec3s, begin, load, padded, safe_sqrt};
 use super::wide::sin_cos_turns;
 use fearless_simd::{Level, Simd, dispatch, prelude::*};
 use lumiris_numbers::math::warp;
 
-/// Directions to one light. All slices have the same length.
+/// Samples of directions to one light. All slices have the same length.
 #[derive(Debug)]
 pub struct LightLanes<'a> {
     /// Unit directions to the light, by component.
     pub wi: [&'a mut [f32]; 3],
-    /// Radiance that arrives if nothing is between, by channel. For delta lights it is the weight of the delta.
+    /// Unoccluded incident radiance, by channel. For delta lights, the weight of the delta.
     pub li: [&'a mut [f32]; 3],
-    /// Density per steradian; 1 for delta lights; 0 where there is no sample, whose direction and radiance are
-    /// arbitrary.
+    /// Density per steradian; 1 for delta lights. 0 if there is no sample; direction and radiance are then arbitrary.
     pub pdf: &'a mut [f32],
 }
 
 impl LightLanes<'_> {
-    /// Gives the same radiance and density to all.
+    /// Sets the same radiance and density for all samples.
     pub fn fill(&mut self, li: [f32; 3], pdf: f32) {
         for (channel, value) in self.li.iter_mut().zip(li) {
             channel.fill(value);
@@ -26,8 +25,8 @@ impl LightLanes<'_> {
         self.pdf.fill(pdf);
     }
 
-    /// Calls `sample` with at least [`LANES`] numbers, the first of which are `u`. (By reference, so that a kernel is
-    /// compiled once and not for each of the two calls.)
+    /// Calls `sample` with at least [`LANES`] numbers, the first of which are `u`. A trait object, so that the kernel
+    /// is compiled once and not for each of the two calls.
     pub(super) fn with_padding(&mut self, u: [&[f32]; 2], sample: &dyn Fn([&[f32]; 2], &mut LightLanes<'_>)) {
         let n = self.pdf.len();
         if n >= LANES {
@@ -44,7 +43,7 @@ impl LightLanes<'_> {
     }
 }
 
-/// Directions uniform on the sphere; see [`warp::sample_uniform_sphere`].
+/// Directions uniform over the sphere; see [`warp::sample_uniform_sphere`].
 pub fn sample_uniform_sphere(level: Level, u: [&[f32]; 2], li: [f32; 3], out: &mut LightLanes<'_>) {
     out.with_padding(u, &|u, out| dispatch!(level, simd => sample_uniform_sphere_lanes(simd, u, out)));
     out.fill(li, warp::pdf_uniform_sphere());

@@ -1,6 +1,6 @@
-//! Probabilities in a light tree for many points: where the branches at the top lead.
+//! Probabilities in a light tree for many points at once: the choice between the branches near the root.
 //!
-//! The formulas are those of [`lumiris_numbers::math::light_bound`].
+//! The formulas are in [`lumiris_numbers::math::light_bound`].
 
 use super::lane::{F, LANES, Vec3s, load, store};
 use super::vertex::Columns3;
@@ -8,14 +8,14 @@ use super::wide::Wide;
 use fearless_simd::{Level, Simd, dispatch, prelude::*};
 use lumiris_numbers::math::light_bound::{GlossyLobe, LightBound, Receiver, first_probability};
 
-/// Points that are lit, in columns of a multiple of [`LANES`].
+/// Receivers, in columns of a multiple of [`LANES`].
 #[derive(Clone, Copy, Debug)]
 pub struct Receivers<'a> {
     /// Positions.
     pub p: Columns3<'a>,
-    /// Shading normals; zero where there is none.
+    /// Shading normals; zero for points without a surface.
     pub ns: Columns3<'a>,
-    /// What is reflected more than by diffuse surfaces, if anything is.
+    /// Glossy lobes; `None` if all receivers are diffuse.
     pub lobes: Option<GlossyLobes<'a>>,
 }
 
@@ -24,17 +24,17 @@ pub struct Receivers<'a> {
 pub struct GlossyLobes<'a> {
     /// Directions to the viewer.
     pub wo: Columns3<'a>,
-    /// Their cosines to the shading normals.
+    /// Cosines of `wo` with the shading normals.
     pub cos_o: &'a [f32],
     /// α² of microfacets.
     pub alpha_squared: &'a [f32],
-    /// The factor of their density; 0 where there is no lobe.
+    /// Scale of the lobe's density; 0 if there is no lobe.
     pub scale: &'a [f32],
-    /// What is diffuse.
+    /// Diffuse part.
     pub diffuse: &'a [f32],
 }
 
-/// For each point, the probability of the first of two bounds.
+/// For each receiver, the probability of the first of two bounds.
 pub fn first_probabilities(level: Level, bounds: [&LightBound; 2], at: &Receivers<'_>, out: &mut [f32]) {
     dispatch!(level, simd => first_lanes(simd, bounds, at, out));
 }
@@ -48,7 +48,7 @@ fn first_lanes<S: Simd>(simd: S, bounds: [&LightBound; 2], at: &Receivers<'_>, o
     }
 }
 
-/// For each point, the importance of a bound.
+/// For each receiver, the importance of a bound.
 pub fn importances(level: Level, bound: &LightBound, at: &Receivers<'_>, out: &mut [f32]) {
     dispatch!(level, simd => importances_lanes(simd, bound, at, out));
 }

@@ -1,19 +1,20 @@
-//! The numbers of many sample streams at once: the coordinates of Owen-scrambled Sobol' points [Burley 2020], as
-//! [`SampleStream::draw`] gives them, to the bit.
+//! Random numbers of many sample streams at once: coordinates of Owen-scrambled Sobol' points [Burley 2020],
+//! bit-identical to [`SampleStream::draw`].
 //!
-//! A point's index is shuffled and each coordinate scrambled by the hash of Laine and Karras, which flips each digit by
-//! those before it. The first coordinate is the index with its digits reversed, the second is that multiplied by
-//! Pascal's triangle modulo 2, which is five steps on the digits; the others are products with the columns of their
-//! matrices [Joe and Kuo 2008]. An index has 16 digits. A second scramble follows, with a seed of its own.
+//! A point's index is shuffled and each coordinate is scrambled with the Laine–Karras hash, which flips each digit
+//! depending on the digits before it. The first coordinate is the index with its digits reversed. The second is the
+//! first multiplied by Pascal's triangle modulo 2, in five steps on the digits. The others are products with the
+//! columns of their matrices [Joe and Kuo 2008]. An index has 16 digits. A second scramble with a separate seed
+//! follows.
 
 use fearless_simd::{Level, dispatch};
 use lumiris_numbers::math::ONE_MINUS_EPSILON;
 use lumiris_numbers::samplers::{NetPoint, SampleStream};
 
-/// Points that are worked on together.
+/// Points per chunk.
 const CHUNK: usize = 64;
 
-/// Columns of the matrices of the third and the fourth coordinate, by the digits of the index, lowest first.
+/// Columns of the generator matrices of the third and fourth coordinate, by the digits of the index, lowest first.
 const COLUMNS: [[u32; 16]; 2] = [
     [
         0xaa09, 0x7706, 0x3903, 0x1601, 0x09aa, 0x0677, 0x0339, 0x0116, 0x00a3, 0x0071, 0x003a, 0x0017, 0x0009, 0x0006,
@@ -25,12 +26,13 @@ const COLUMNS: [[u32; 16]; 2] = [
     ],
 ];
 
-/// Draws N ≤ 4 numbers of each stream: `out[d][i]` is the d-th of stream `i`. All slices have the same length.
+/// Draws N ≤ 4 numbers of each stream: `out[d][i]` is the d-th number of stream `i`. All slices have the same length.
 pub fn draw<const N: usize>(level: Level, streams: &[SampleStream], mut out: [&mut [f32]; N]) {
     let none = NetPoint { index: 0, seed: 0, scramble: 0 };
     let mut points = [none; CHUNK];
     for (chunk, streams) in streams.chunks(CHUNK).enumerate() {
         let first = chunk * CHUNK;
+        // Streams without a net are drawn one by one
         let mut are_nets = true;
         for (point, stream) in points.iter_mut().zip(streams) {
             match stream.net_point() {
@@ -50,14 +52,15 @@ pub fn draw<const N: usize>(level: Level, streams: &[SampleStream], mut out: [&m
     }
 }
 
-/// The first N ≤ 4 coordinates of each point: `out[d][i]` is the d-th of point `i`. All slices have the same length.
+/// The first N ≤ 4 coordinates of each point: `out[d][i]` is the d-th coordinate of point `i`. All slices have the same
+/// length.
 pub fn draw_points<const N: usize>(level: Level, points: &[NetPoint], mut out: [&mut [f32]; N]) {
     for (chunk, points) in points.chunks(CHUNK).enumerate() {
         draw_chunk(level, points, chunk * CHUNK, &mut out);
     }
 }
 
-/// At most [`CHUNK`] points, whose coordinates stand from `first` on.
+/// Computes at most [`CHUNK`] points, and stores their coordinates from index `first` on.
 #[inline]
 fn draw_chunk<const N: usize>(level: Level, points: &[NetPoint], first: usize, out: &mut [&mut [f32]; N]) {
     let (mut index, mut seeds) = ([0; CHUNK], [[0; CHUNK]; 2]);
@@ -77,10 +80,12 @@ fn coordinates<const N: usize>(
     [seed, scramble]: &[[u32; CHUNK]; 2],
     out: &mut [[f32; CHUNK]; N],
 ) {
+    // Shuffle the indices
     let mut shuffled = [0; CHUNK];
     for i in 0..CHUNK {
         shuffled[i] = permuted(index[i].reverse_bits(), seed[i]) >> 16;
     }
+    // Generate the digits of each coordinate, and scramble them
     for (d, out) in out.iter_mut().enumerate() {
         let mut digits = [0; CHUNK];
         match d {
@@ -109,7 +114,7 @@ fn coordinates<const N: usize>(
     }
 }
 
-/// The hash of Laine and Karras: a digit depends on lower ones alone.
+/// The Laine–Karras hash: each digit depends only on lower digits.
 #[inline(always)]
 const fn permuted(mut x: u32, seed: u32) -> u32 {
     x ^= x.wrapping_mul(0x3d20_adea);
@@ -119,13 +124,13 @@ const fn permuted(mut x: u32, seed: u32) -> u32 {
     x ^ x.wrapping_mul(0x53a2_2864)
 }
 
-/// 16 digits in reverse.
+/// Reverses 16 digits.
 #[inline(always)]
 const fn reversed(x: u32) -> u32 {
     x.reverse_bits() >> 16
 }
 
-/// 16 digits, the first one highest, multiplied by Pascal's triangle modulo 2.
+/// Multiplies 16 digits, the first one highest, by Pascal's triangle modulo 2.
 #[inline(always)]
 const fn by_pascal(x: u32) -> u32 {
     let x = x ^ x >> 1 & 0x5555;
@@ -134,7 +139,7 @@ const fn by_pascal(x: u32) -> u32 {
     x ^ x >> 8 & 0x00ff
 }
 
-/// x/2³², rounded so that it stays below 1.
+/// x/2³², rounded so that the result is below 1.
 #[inline(always)]
 fn unit(x: u32) -> f32 {
     let u = (x & !(x >> 24)) as f32 * (1.0 / 4_294_967_296.0);

@@ -1,41 +1,42 @@
-//! Exact sums of many terms at once, in whole numbers of quanta: as f64 numbers, each of which is split at a fixed digit into
-//! two whose sums need no more than the 53 digits that these have.
+//! Exact sums of many terms at once, as whole numbers of quanta. Each f64 number is split at a fixed digit into two
+//! parts, whose sums need at most the 53 digits of an f64.
 //!
-//! Adding M = 1.5·2⁵²·h to a number, and subtracting it again, rounds it to a multiple of h, if it is much smaller than M. The
-//! rest is exact, and is rounded to a quantum by itself: half away from zero for terms, which have all digits wherever they are not
-//! less than h, and half upwards for squares, which are not negative.
+//! Adding M = 1.5·2⁵²·h to a much smaller number, and subtracting it again, rounds the number to a multiple of h. The
+//! remainder is exact, and is rounded to a quantum by itself. Terms round half away from zero (a term of at least h has
+//! no digits below the quantum). Squares are not negative and round half up.
 
 use fearless_simd::{Level, Simd, dispatch, f32x8, f64x4, prelude::*};
 
-/// Numbers of a term.
+/// Numbers per term.
 pub const TERM: usize = 12;
-/// Most terms whose sums do not lose a digit.
+/// Maximum number of terms whose sums are exact.
 pub const MOST: usize = 128;
-/// Where terms are split: quanta of the higher part of each number, and of each square.
+/// Exponents of the quanta of the higher parts: of numbers, and of squares.
 pub const HIGH: [i32; 2] = [-10, -34];
-/// Quanta of numbers, of squares, and of the others.
+/// Exponents of the quanta: of numbers, of squares, and of the other numbers.
 pub const QUANTA: [i32; 3] = [-56, -80, -29];
-/// Magnitudes below which all is exact: of the first three numbers, of the fourth, and of the others.
+/// Magnitudes below which everything is exact: of the first three numbers, of the fourth, and of the others.
 pub const LIMITS: [f64; 3] = [64.0, 1_073_741_824.0, 4.0];
 
-/// What is summed: four numbers, of which the first three are summed with their squares, and eight of magnitudes about 1.
+/// A term: four numbers, the first three of which are summed together with their squares, and eight others of magnitude
+/// about 1.
 pub trait Term {
     /// The numbers.
     fn numbers(&self) -> [f32; TERM];
 }
 
-/// Sums in quanta, or in multiples of [`HIGH`]: whole numbers.
+/// Sums as whole numbers: lower parts in quanta, higher parts in multiples of 2 to the power of [`HIGH`].
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Sums {
     /// Higher and lower parts of the four numbers.
     pub numbers: [[f64; 4]; 2],
-    /// Of their squares.
+    /// Higher and lower parts of the sums of squares.
     pub squares: [[f64; 4]; 2],
-    /// The others.
+    /// Sums of the others.
     pub others: [[f64; 4]; 2],
 }
 
-/// Sums at most [`MOST`] terms; `None` if one is not below [`LIMITS`].
+/// Sums at most [`MOST`] terms. Returns `None` for more terms, or if a number is not below [`LIMITS`].
 #[inline]
 pub fn sums<T: Term>(level: Level, terms: &[T]) -> Option<Sums> {
     let mut out = Sums::default();
@@ -78,7 +79,7 @@ fn sums_lanes<S: Simd, T: Term>(simd: S, terms: &[T], out: &mut Sums) -> bool {
     first.store_slice(&mut out.others[0]);
     second.store_slice(&mut out.others[1]);
 
-    // NaN remains in sums, if not in the greatest
+    // NaN propagates to the sums, though not to the maxima
     let [numbers, fourth, others] = LIMITS;
     let is_finite = (high + first + second).is_finite();
     let is_below = greatest.simd_lt(f64x4::from_slice(simd, &[numbers, numbers, numbers, fourth]))
@@ -86,14 +87,14 @@ fn sums_lanes<S: Simd, T: Term>(simd: S, terms: &[T], out: &mut Sums) -> bool {
     (is_finite & is_below).all_true()
 }
 
-/// A multiple of a quantum, and the rest; `shift` is 1.5·2⁵² of them.
+/// A multiple of a quantum, and the remainder; `shift` is 1.5·2⁵² quanta.
 #[inline(always)]
 fn split<S: Simd>(x: f64x4<S>, shift: f64) -> (f64x4<S>, f64x4<S>) {
     let top = (x + shift) - shift;
     (top, x - top)
 }
 
-/// The nearest whole number, half away from zero.
+/// The nearest whole number; halves are rounded away from zero.
 #[inline(always)]
 fn rounded<S: Simd>(x: f64x4<S>) -> f64x4<S> {
     (x + f64x4::splat(x.token(), 0.5).copysign(x)).trunc()

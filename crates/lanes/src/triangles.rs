@@ -1,7 +1,7 @@
-//! First hits of many rays among a few triangles, each ray with all of them.
+//! First hits of many rays among a few triangles; every ray is tested against every triangle.
 //!
-//! The triangle is translated to the ray's origin and sheared so that the ray runs along an axis, its largest; the signs
-//! of the three edge functions tell whether it is hit [Woop, Benthin and Wald 2013]. A ray through a common edge of two
+//! Triangles are translated to the ray's origin and sheared so that the ray runs along its largest axis. The signs of
+//! the three edge functions decide whether it is hit [Woop, Benthin and Wald 2013]. A ray through a common edge of two
 //! triangles hits at least one of them.
 
 use super::lane::{F, LANES, M, Vec3s, begin, padded, store};
@@ -11,7 +11,7 @@ use lumiris_numbers::math::Vec3;
 /// The first hits of rays.
 #[derive(Debug)]
 pub struct FirstHits<'a> {
-    /// Ray parameters; infinite where nothing is hit.
+    /// Ray parameters; infinite if there is no hit.
     pub t: &'a mut [f32],
     /// Weights of corners 1 and 2.
     pub b: [&'a mut [f32]; 2],
@@ -19,8 +19,8 @@ pub struct FirstHits<'a> {
     pub triangle: &'a mut [f32],
 }
 
-/// Intersects rays from `o` in the directions `d` with all `triangles`. Of hits at the same
-/// place the first triangle's is taken.
+/// Intersects rays from `o` in the directions `d` with all `triangles`. Of hits with equal t, the first triangle's is
+/// taken.
 pub fn first_hits(level: Level, triangles: &[[Vec3; 3]], o: [&[f32]; 3], d: [&[f32]; 3], out: &mut FirstHits<'_>) {
     let n = out.t.len();
     if n >= LANES {
@@ -47,6 +47,7 @@ fn first_hits_lanes<S: Simd>(
     let n = out.t.len();
     for i in (0..n).step_by(LANES) {
         let i = begin(i, n);
+        // Shear along the largest axis of the ray
         let (o, d) = (Vec3s::load(simd, o, i), Vec3s::load(simd, d, i));
         let axes = Axes::new(d);
         let d = axes.ordered(d);
@@ -54,6 +55,7 @@ fn first_hits_lanes<S: Simd>(
         let shear = (d.x * z, d.y * z, z);
         let mut t = F::splat(simd, f32::INFINITY);
         let (mut b1, mut b2, mut index) = (F::splat(simd, 0.0), F::splat(simd, 0.0), F::splat(simd, 0.0));
+        // Keep the nearest hit
         for (k, p) in triangles.iter().enumerate() {
             let a = sheared(axes.ordered(Vec3s::splat(simd, p[0]).minus(o)), shear);
             let b = sheared(axes.ordered(Vec3s::splat(simd, p[1]).minus(o)), shear);
@@ -79,7 +81,7 @@ fn first_hits_lanes<S: Simd>(
     }
 }
 
-/// Which component of a direction is largest.
+/// The largest component of a direction.
 #[derive(Clone, Copy)]
 pub(crate) struct Axes<S: Simd> {
     is_x: M<S>,
@@ -94,7 +96,7 @@ impl<S: Simd> Axes<S> {
         Axes { is_x, is_y: !is_x & y.simd_gt(z) }
     }
 
-    /// The components in an order of which the last is the largest of the direction.
+    /// Permutes the components cyclically, so that z is the largest component of the direction.
     #[inline(always)]
     pub(crate) fn ordered(self, v: Vec3s<S>) -> Vec3s<S> {
         Vec3s {

@@ -1,8 +1,8 @@
-//! Vertices of many paths at once, in columns: the point that a ray met on a triangle, the weights of light samples, and
+//! Vertices of many paths at once, in columns: surface points of rays on triangles, weights of light samples, and
 //! shadow segments.
 //!
-//! The formulas are those of the modules `geometry::mesh` and `direct` for single vertices.
-//! Columns have one length, a multiple of [`LANES`].
+//! The formulas for single vertices are in the modules `geometry::mesh` and `direct`. Columns have the same length, a
+//! multiple of [`LANES`].
 
 pub use super::lane::{Columns3, ColumnsMut3};
 use super::lane::{F, I, LANES, M, Vec3s, load, narrowed, or_zero, store, widened};
@@ -12,22 +12,22 @@ use lumiris_numbers::estimators::mis::Heuristic;
 use lumiris_numbers::math::gamma;
 use lumiris_numbers::math::ray::{COINCIDENCE, SEGMENT_END};
 
-/// Hits of [`LANES`] triangles: `[axis][lane]` of vectors.
+/// Hits on [`LANES`] triangles: `[axis][lane]` for vectors.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct TriangleHits {
     /// The corners.
     pub corners: [[[f32; LANES]; 3]; 3],
-    /// Shading normals of the corners; zero where there are none.
+    /// Shading normals of the corners; zero if there are none.
     pub normals: [[[f32; LANES]; 3]; 3],
     /// Weights of corners 1 and 2.
     pub b: [[f32; LANES]; 2],
-    /// 1, or −1 where the normal is the reverse of (p1 − p0) × (p2 − p0).
+    /// 1, or −1 if the normal is the reverse of (p1 − p0) × (p2 − p0).
     pub orientation: [f32; LANES],
     /// Directions of the rays.
     pub d: [[f32; LANES]; 3],
 }
 
-/// Points of surfaces.
+/// Surface points.
 #[derive(Debug)]
 pub struct Points<'a> {
     /// The points.
@@ -40,11 +40,11 @@ pub struct Points<'a> {
     pub facing: ColumnsMut3<'a>,
     /// Shading normals.
     pub ns: ColumnsMut3<'a>,
-    /// Unit directions to where the rays came from.
+    /// Unit directions to the rays' origins.
     pub wo: ColumnsMut3<'a>,
 }
 
-/// Determines the points that rays have met.
+/// Computes the surface points of hits.
 pub fn points(level: Level, hits: &[TriangleHits], out: &mut Points<'_>) {
     dispatch!(level, simd => points_lanes(simd, hits, out));
 }
@@ -58,7 +58,7 @@ fn points_lanes<S: Simd>(simd: S, hits: &[TriangleHits], out: &mut Points<'_>) {
         let one = F::splat(simd, 1.0);
         let b0 = one - b1 - b2;
 
-        // In f64, which keeps the normals of slivers
+        // In f64, which keeps the normals of slivers accurate
         let (p, n) = point_and_normal(corners, b1, b2);
         let n = n.times(load(simd, &hits.orientation, 0));
 
@@ -99,7 +99,7 @@ fn absolute<S: Simd>(v: Vec3s<S>) -> Vec3s<S> {
     Vec3s { x: v.x.abs(), y: v.y.abs(), z: v.z.abs() }
 }
 
-/// `a` where `first`, else `b`.
+/// `a` if `first`, else `b`.
 #[inline(always)]
 fn either<S: Simd>(first: M<S>, a: Vec3s<S>, b: Vec3s<S>) -> Vec3s<S> {
     Vec3s { x: first.select(a.x, b.x), y: first.select(a.y, b.y), z: first.select(a.z, b.z) }
@@ -110,7 +110,7 @@ fn all_widened<S: Simd>(v: Vec3s<S>) -> [f64x8<S>; 3] {
     [widened(v.x), widened(v.y), widened(v.z)]
 }
 
-/// The points and the unit normals of triangles.
+/// Points and unit normals of triangles.
 #[inline(always)]
 fn point_and_normal<S: Simd>(corners: [Vec3s<S>; 3], b1: F<S>, b2: F<S>) -> (Vec3s<S>, Vec3s<S>) {
     let (b1, b2) = (widened(b1), widened(b2));
@@ -129,26 +129,26 @@ fn point_and_normal<S: Simd>(corners: [Vec3s<S>; 3], b1: F<S>, b2: F<S>) -> (Vec
     )
 }
 
-/// Samples of one technique, and the density of another one at them.
+/// Samples of one technique, with the density of another.
 #[derive(Clone, Copy, Debug)]
 pub struct Samples<'a> {
     /// f·|cos θ| (1/sr).
     pub f_cos: Columns3<'a>,
     /// Radiance.
     pub li: Columns3<'a>,
-    /// Density of the technique; 0 where there is no sample.
+    /// Density of the samples' technique; 0 if there is no sample.
     pub p: &'a [f32],
-    /// Density of the other one.
+    /// Density of the other technique.
     pub p_other: &'a [f32],
     /// Number of samples of the technique.
     pub n: f32,
-    /// Number of samples of the other one.
+    /// Number of samples of the other technique.
     pub n_other: f32,
-    /// How both are weighted.
+    /// MIS heuristic.
     pub heuristic: Heuristic,
 }
 
-/// The contributions f·|cos θ|·L·w/(n·p) of samples that are unoccluded; 0 where they are not finite.
+/// Unoccluded contributions of samples, f·|cos θ|·L·w/(n·p); 0 if not finite.
 pub fn weigh(level: Level, samples: &Samples<'_>, out: &mut ColumnsMut3<'_>) {
     dispatch!(level, simd => weigh_lanes(simd, samples, out));
 }
@@ -168,14 +168,14 @@ fn weigh_lanes<S: Simd>(simd: S, samples: &Samples<'_>, out: &mut ColumnsMut3<'_
     }
 }
 
-/// Surface points with the bounds of their errors and their normals.
+/// Surface points with their error bounds and normals.
 #[derive(Clone, Copy, Debug)]
 pub struct Ends<'a> {
     /// The points.
     pub p: Columns3<'a>,
     /// Bounds of their rounding errors.
     pub p_error: Columns3<'a>,
-    /// Geometric normals; zero where there is no surface.
+    /// Geometric normals; zero for points without a surface.
     pub n: Columns3<'a>,
 }
 
@@ -186,11 +186,11 @@ pub struct Rays<'a> {
     pub o: ColumnsMut3<'a>,
     /// Directions.
     pub d: ColumnsMut3<'a>,
-    /// Ends of their open intervals.
+    /// Ends of their open intervals of t.
     pub t_max: &'a mut [f32],
 }
 
-/// Shadow segments from surfaces to points of lights: in the directions `wi` without end where `is_far` is not 0.
+/// Shadow segments from surfaces to points of lights. Where `is_far` is not 0, infinite rays in the directions `wi`.
 pub fn segments(level: Level, from: &Ends<'_>, wi: Columns3<'_>, to: &Ends<'_>, is_far: &[f32], out: &mut Rays<'_>) {
     dispatch!(level, simd => segments_lanes(simd, from, wi, to, is_far, out));
 }
@@ -228,18 +228,18 @@ fn origins_lanes<S: Simd>(simd: S, from: &Ends<'_>, w: Columns3<'_>, out: &mut C
     }
 }
 
-/// Points, the bounds of their errors, and their normals.
+/// Points, their error bounds, and normals.
 pub(super) type End<S> = [Vec3s<S>; 3];
 
 impl Ends<'_> {
-    /// The lanes from index `i` on.
+    /// Loads the lanes from index `i` on.
     #[inline(always)]
     pub(super) fn load<S: Simd>(&self, simd: S, i: usize) -> End<S> {
         [Vec3s::load(simd, self.p, i), Vec3s::load(simd, self.p_error, i), Vec3s::load(simd, self.n, i)]
     }
 }
 
-/// As [`lumiris_numbers::math::ray::offset_origin`].
+/// The SIMD version of [`lumiris_numbers::math::ray::offset_origin`].
 #[inline(always)]
 pub(super) fn offset_origins<S: Simd>([p, error, n]: End<S>, w: Vec3s<S>) -> Vec3s<S> {
     let zero = F::splat(p.x.token(), 0.0);
@@ -255,7 +255,7 @@ fn moved<S: Simd>(p: F<S>, offset: F<S>) -> F<S> {
     let simd = p.token();
     let (zero, one) = (F::splat(simd, 0.0), F::splat(simd, 1.0));
     let sum = p + offset;
-    // The next number in the direction of the offset, as the next larger one of what is turned to it
+    // The next float in the direction of the offset: the next larger float after multiplication by the offset's sign
     let sign = one.copysign(offset);
     let turned = sum * sign + 0.0;
     let bits = turned.bitcast::<I<S>>();

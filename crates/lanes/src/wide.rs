@@ -1,4 +1,4 @@
-//! Lanes as numbers, for formulas that kernels and single samples share, and elementary functions.
+//! Lanes as a [`Number`], for formulas shared by kernels and single samples, and elementary functions.
 
 use super::lane::{F, I, LANES, M, Vec3s, load};
 use fearless_simd::{Simd, prelude::*};
@@ -12,7 +12,7 @@ use std::ops::{Add, BitAnd, BitOr, Div, Mul, Neg, Not, Sub};
 #[derive(Clone, Copy)]
 pub struct Wide<S: Simd>(pub F<S>);
 
-/// Truths of lanes as a [`Mask`].
+/// The mask of lanes as a [`Mask`].
 #[derive(Clone, Copy)]
 pub struct Truths<S: Simd>(pub M<S>);
 
@@ -198,7 +198,7 @@ impl<S: Simd> From<V3<Wide<S>>> for Vec3s<S> {
     }
 }
 
-/// [`elementary::sin_cos_eighth`].
+/// SIMD version of [`elementary::sin_cos_eighth`].
 #[inline(always)]
 pub fn sin_cos_eighth<S: Simd>(x: F<S>) -> (F<S>, F<S>) {
     let (sin, cos) = elementary::sin_cos_eighth(Wide(x));
@@ -208,7 +208,7 @@ pub fn sin_cos_eighth<S: Simd>(x: F<S>) -> (F<S>, F<S>) {
 /// sin 2πt and cos 2πt for |t| < 2²⁰; errors below 2⁻²³.
 #[inline(always)]
 pub fn sin_cos_turns<S: Simd>(t: F<S>) -> (F<S>, F<S>) {
-    // The nearest quarter turn, and what remains, which is exact.
+    // The nearest quarter turn, and the remainder, which is exact
     let quarters = (t * 4.0).round_ties_even();
     let (sin, cos) = sin_cos_eighth((t - quarters * 0.25) * TAU);
     let k: I<S> = quarters.to_int();
@@ -226,7 +226,7 @@ pub fn sin_cos_quadrant<S: Simd>(a: F<S>) -> (F<S>, F<S>) {
     ((c + s) * scale, (c - s) * scale)
 }
 
-/// [`elementary::exp`].
+/// SIMD version of [`elementary::exp`].
 #[inline(always)]
 pub fn exp<S: Simd>(x: F<S>) -> F<S> {
     elementary::exp(Wide(x)).0

@@ -1,7 +1,7 @@
 //! Builds the binary tree by the binned surface-area heuristic [Wald 2007].
 //!
-//! Every decision is a function of the set of primitives in a range alone, and minima, maxima and counts are exact in
-//! any grouping, so the tree does not depend on the number of threads.
+//! Every decision depends only on the set of primitives in a range. Minima, maxima and counts are exact in any
+//! grouping, so the tree does not depend on the number of threads.
 
 use lumiris_numbers::math::{Bounds3, Vec3, Vec3A};
 use rayon::prelude::*;
@@ -9,7 +9,7 @@ use rayon::prelude::*;
 /// Maximum number of triangles in a leaf: the width of a block.
 pub(super) const LEAF_TRIANGLES: usize = 4;
 const MAX_BINS: usize = 32;
-/// Below this depth ranges are simply halved, which bounds the depth of the tree.
+/// From this depth on, ranges are halved, which bounds the depth of the tree.
 const MAX_SAH_DEPTH: u32 = 64;
 /// Ranges longer than this are split by parallel tasks.
 const PARALLEL_RANGE: usize = 4096;
@@ -23,22 +23,22 @@ pub(super) struct PrimRef {
     /// Geometry, or [`PrimRef::INSTANCE`].
     pub geometry: u32,
     hi: Vec3,
-    /// Triangle or patch; index of an instance.
+    /// Triangle or patch, or index of an instance.
     pub primitive: u32,
 }
 
 impl PrimRef {
-    /// The value of `geometry` for an instance.
+    /// `geometry` of an instance.
     pub(super) const INSTANCE: u32 = u32::MAX;
 
-    /// `None` if a point is not finite.
+    /// The reference to a primitive; `None` if a point is not finite.
     pub(super) fn of_points(geometry: u32, primitive: usize, points: &[Vec3]) -> Option<Self> {
-        // Minima and maxima may ignore NaN.
+        // Minima and maxima may ignore NaN
         let finite = points.iter().all(|p| p.is_finite());
         finite.then(|| Self::of_bounds(geometry, primitive, Bounds3::from_points(points.iter().copied()))).flatten()
     }
 
-    /// `None` if the bounds are not finite.
+    /// The reference to a primitive; `None` if the bounds are not finite.
     pub(super) fn of_bounds(geometry: u32, primitive: usize, bounds: Bounds3) -> Option<Self> {
         let finite = bounds.min.is_finite() && bounds.max.is_finite();
         finite.then_some(PrimRef { lo: bounds.min, geometry, hi: bounds.max, primitive: primitive as u32 })
@@ -111,14 +111,14 @@ impl Binary {
     }
 }
 
-/// Builds the tree and reorders the primitives; `None` if there are none. Leaves hold one primitive, or up to
+/// Builds the tree and reorders the primitives; `None` if there are none. A leaf has one primitive, or up to
 /// [`LEAF_TRIANGLES`] triangles.
 pub(super) fn build_binary(prims: &mut [PrimRef], is_triangle: &[bool]) -> Option<Binary> {
     (!prims.is_empty()).then(|| Builder { is_triangle }.node(prims, 0, 0))
 }
 
 struct Builder<'a> {
-    /// Per geometry.
+    /// True for geometries that are meshes.
     is_triangle: &'a [bool],
 }
 
@@ -169,7 +169,7 @@ impl Extent {
     }
 }
 
-/// Equal cells of the centres' range along each axis.
+/// Equal bins over the centres' range along each axis.
 struct Binning {
     lo: Vec3A,
     scale: Vec3A,
@@ -180,7 +180,7 @@ impl Binning {
     fn new(extent: &Extent, prim_count: usize) -> Self {
         let count = (8 + prim_count / 8).min(MAX_BINS);
         let size = extent.centers.hi - extent.centers.lo;
-        // A flat axis gets the scale 0 and so one bin.
+        // A flat axis has the scale 0, hence one bin
         let scale = Vec3A::select(size.cmpgt(Vec3A::ZERO), (count as f32 * 0.999) / size, Vec3A::ZERO);
         Binning { lo: extent.centers.lo, scale, count }
     }
@@ -188,12 +188,12 @@ impl Binning {
     #[inline]
     fn bins_of(&self, prim: &PrimRef) -> [usize; 3] {
         let x = ((prim.center() - self.lo) * self.scale).to_array();
-        // The cast saturates, and takes NaN to 0.
+        // The cast saturates, and maps NaN to 0
         x.map(|x| (x as i32).clamp(0, self.count as i32 - 1) as usize)
     }
 }
 
-/// The bins of the three axes.
+/// Bounds and counts of the bins along the three axes.
 struct Bins {
     bounds: [[Range3; MAX_BINS]; 3],
     counts: [[u32; MAX_BINS]; 3],
@@ -222,12 +222,13 @@ impl Bins {
         self
     }
 
-    /// The cheapest split after a bin: (axis, last bin of the left side). Cost is area times blocks of triangles,
-    /// summed over the sides.
+    /// The cheapest split between bins: axis and last bin of the left side. The cost is area times number of triangle
+    /// blocks, summed over both sides.
     fn best_split(&self, bin_count: usize) -> Option<(usize, usize)> {
         let mut best: Option<(f32, usize, usize)> = None;
         for axis in 0..3 {
             let (bounds, counts) = (&self.bounds[axis], &self.counts[axis]);
+            // Costs of all right sides
             let mut right_cost = [0.0_f32; MAX_BINS];
             let (mut range, mut n) = (Range3::EMPTY, 0);
             for i in (1..bin_count).rev() {
@@ -235,6 +236,8 @@ impl Bins {
                 n += counts[i];
                 right_cost[i - 1] = side_cost(&range, n);
             }
+
+            // The cheapest sum of left and right side
             (range, n) = (Range3::EMPTY, 0);
             let total: u32 = counts.iter().sum();
             for i in 0..bin_count - 1 {
@@ -255,8 +258,9 @@ fn side_cost(range: &Range3, count: u32) -> f32 {
     if count == 0 { 0.0 } else { range.half_area() * count.div_ceil(LEAF_TRIANGLES as u32) as f32 }
 }
 
-/// Reorders the primitives into a left and a right side; returns the length of the left. Neither is empty.
+/// Partitions the primitives into a left and a right side, neither empty. Returns the length of the left side.
 fn split(prims: &mut [PrimRef], extent: &Extent) -> usize {
+    // Choose the split
     let binning = Binning::new(extent, prims.len());
     let bins = if prims.len() <= PARALLEL_BINNING {
         Bins::of(prims, &binning)
@@ -267,6 +271,8 @@ fn split(prims: &mut [PrimRef], extent: &Extent) -> usize {
     let Some((axis, last)) = bins.best_split(binning.count) else {
         return prims.len() / 2;
     };
+
+    // Partition
     let (mut i, mut j) = (0, prims.len());
     while i < j {
         if binning.bins_of(&prims[i])[axis] <= last {

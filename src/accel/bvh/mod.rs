@@ -1,12 +1,12 @@
 //! The pure-Rust bounding volume hierarchy, the reference for the Embree tracer.
 //!
-//! Two levels: a tree per group, and one over the root's primitives and the instances. A binary tree is built by the
-//! surface-area heuristic ([`build`]), collapsed to eight-wide nodes with leaves of four triangles ([`tree`]), and
-//! traversed one ray at a time ([`walk`]). Triangles are watertight; quadrics and bilinear patches use the exact
+//! There are two levels: a tree per group, and one over the root's primitives and the instances. A binary tree is built
+//! by the surface-area heuristic (`build`), collapsed to eight-wide nodes with leaves of four triangles (`tree`), and
+//! traversed one ray at a time (`walk`). Triangles are watertight; quadrics and bilinear patches use the exact
 //! intersections of [`crate::geometry`].
 //!
-//! Results do not depend on traversal order: among hits with equal t, the smallest (instance, geometry, primitive)
-//! wins. Primitives and instances with NaN or infinite coordinates are left out.
+//! Results do not depend on the traversal order: among hits with equal t, the smallest (instance, geometry, primitive)
+//! wins. Primitives and instances with NaN or infinite coordinates are excluded.
 
 mod build;
 #[cfg(test)]
@@ -24,36 +24,39 @@ use std::time::Instant;
 use tree::Tree;
 use walk::{Any, Closest, Walk};
 
-/// The two-level hierarchy over a scene's geometry.
+/// The two-level hierarchy of a scene's geometry.
 pub struct Bvh {
     geometry: Arc<GeometrySet>,
     alpha: Option<AlphaTest>,
-    /// Per geometry: its visibility bits, and [`TESTED`] if it is a cut-out.
+    /// Visibility bits of each geometry, and [`TESTED`] if it has an alpha mask.
     flags: Vec<u32>,
     root: Tree,
     groups: Vec<Tree>,
-    /// Per instance that does not move.
+    /// Inverse transforms of static instances.
     group_from_world: Vec<Option<Affine3A>>,
     stats: AccelStats,
 }
 
-/// Flag of a geometry whose hits the alpha test must confirm.
+/// Flag of a geometry whose hits need the alpha test.
 const TESTED: u32 = 1 << 31;
 
 impl Bvh {
-    /// Builds the trees in parallel; the result is the same for any number of threads. Without `alpha`, cut-outs are
-    /// opaque.
+    /// Builds the trees in parallel. The result does not depend on the number of threads. Without `alpha`, alpha masks
+    /// are opaque.
     pub fn new(geometry: Arc<GeometrySet>, alpha: Option<Arc<dyn AlphaSource>>) -> Bvh {
+        // Trees of the groups
         let start = Instant::now();
         let flags = geometry.geometries.iter().map(|g| flags_of(g, alpha.is_some())).collect();
         let built: Vec<(Tree, u64)> =
             geometry.groups.par_iter().map(|group| build_tree(&geometry, group_prims(&geometry, group))).collect();
         let group_bounds: Vec<Bounds3> = built.iter().map(|(tree, _)| tree.bounds).collect();
 
+        // Tree of the root
         let mut prims = group_prims(&geometry, &geometry.root);
         prims.extend(instance_prims(&geometry, &group_bounds));
         let (root, root_peak) = build_tree(&geometry, prims);
 
+        // Transforms and memory
         let group_from_world: Vec<Option<Affine3A>> = geometry
             .instances
             .iter()
@@ -104,7 +107,7 @@ fn flags_of(geometry: &Geometry, has_alpha_source: bool) -> u32 {
     geometry.visibility.0 & Visibility::ALL.0 | tested
 }
 
-/// A tree and the peak of the bytes that its build held.
+/// A tree, and the peak memory of its build (bytes).
 fn build_tree(geometry: &GeometrySet, mut prims: Vec<PrimRef>) -> (Tree, u64) {
     let is_triangle: Vec<bool> = geometry.geometries.iter().map(|g| matches!(g.shape, Shape::Mesh(_))).collect();
     let binary = build_binary(&mut prims, &is_triangle);
@@ -114,14 +117,17 @@ fn build_tree(geometry: &GeometrySet, mut prims: Vec<PrimRef>) -> (Tree, u64) {
     (tree, peak)
 }
 
-/// The finite primitives of a group that some ray can see.
+/// The finite primitives of a group that are visible to some ray.
 fn group_prims(set: &GeometrySet, group: &Group) -> Vec<PrimRef> {
+    // Hidden geometries have none
     let mut prims = Vec::new();
     for &id in &group.geometries {
         let geometry = &set.geometries[id as usize];
         if geometry.visibility.0 & Visibility::ALL.0 == 0 {
             continue;
         }
+
+        // One primitive per triangle, patch, quadric or curve piece
         match &geometry.shape {
             Shape::Mesh(mesh) => prims.par_extend(
                 (0..mesh.triangle_count()).into_par_iter().filter_map(|i| PrimRef::of_points(id, i, &mesh.triangle(i))),
@@ -140,8 +146,8 @@ fn group_prims(set: &GeometrySet, group: &Group) -> Vec<PrimRef> {
     prims
 }
 
-/// Placements with their bounds over all times: points move on straight lines between the time samples, so the boxes at
-/// the samples suffice. Singular placements that do not move are left out.
+/// Instances with their bounds over all times. Points move on straight lines between time samples, so the boxes at the
+/// samples suffice. Static instances with a singular transform are excluded.
 fn instance_prims(set: &GeometrySet, group_bounds: &[Bounds3]) -> Vec<PrimRef> {
     let bounds_of = |i: usize| {
         let instance = &set.instances[i];
@@ -152,7 +158,7 @@ fn instance_prims(set: &GeometrySet, group_bounds: &[Bounds3]) -> Vec<PrimRef> {
         }
         let placed = instance.world_from_group.iter().map(|m| bounds.transformed(m));
         let all = placed.fold(Bounds3::EMPTY, Bounds3::union);
-        // The ray's way into the group rounds too.
+        // The transform of the ray into the group has rounding errors, too
         let pad = all.min.abs().max(all.max.abs()).max_element() * 2.0_f32.powi(-18);
         Some(Bounds3 { min: all.min - Vec3::splat(pad), max: all.max + Vec3::splat(pad) })
     };

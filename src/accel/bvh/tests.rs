@@ -1,4 +1,4 @@
-//! Comparison with brute force. Both use the same exact intersections, so results must agree bit for bit.
+//! Comparison with brute force. Both use the same exact intersections, so results must be bit-identical.
 
 use super::*;
 use crate::accel::scenes_for_tests::{
@@ -11,8 +11,9 @@ use lumiris_numbers::math::Ray;
 use lumiris_test_support::random::{RngExt, pcg32};
 use std::cell::RefCell;
 
-/// All hits of a geometry in the space of its group, with the crossings of their primitives.
+/// All hits on a geometry with the ray in the space of its group, with their crossing numbers.
 fn all_hits(set: &GeometrySet, id: GeometryId, ray: &Ray, instance: u32, hits: &mut Vec<(Hit, usize)>) {
+    // Quadrics, patches and curves: reject every hit to collect all
     let hits = RefCell::new(hits);
     let push = |t: f32, uv, primitive: usize, crossing: usize| {
         hits.borrow_mut().push((Hit { t, uv, geometry: id, primitive: primitive as u32, instance }, crossing));
@@ -27,6 +28,8 @@ fn all_hits(set: &GeometrySet, id: GeometryId, ray: &Ray, instance: u32, hits: &
             assert_eq!(none, None);
         }
     };
+
+    // Triangles are tested one by one
     match shape {
         Shape::Mesh(mesh) => {
             let Some(pre) = RayPrecomputed::new(ray) else { return };
@@ -42,8 +45,9 @@ fn all_hits(set: &GeometrySet, id: GeometryId, ray: &Ray, instance: u32, hits: &
     }
 }
 
-/// (first hit, occluded).
+/// First hit, and occlusion.
 fn brute_force(set: &Arc<GeometrySet>, alpha: Option<&AlphaTest>, ray: &Ray) -> (Option<Hit>, bool) {
+    // All hits in the root and in instances
     let mut hits = Vec::new();
     for &id in &set.root.geometries {
         all_hits(set, id, ray, Hit::NO_INSTANCE, &mut hits);
@@ -55,8 +59,12 @@ fn brute_force(set: &Arc<GeometrySet>, alpha: Option<&AlphaTest>, ray: &Ray) -> 
             all_hits(set, id, &moved, index as u32, &mut hits);
         }
     }
+
+    // Apply the interval and the alpha test
     hits.retain(|(h, crossing)| h.t < ray.t_max && alpha.is_none_or(|a| a.stops((h, *crossing), ray)));
     let hits: Vec<Hit> = hits.into_iter().map(|(h, _)| h).collect();
+
+    // First hit on the path, any hit of shadow rays
     let seen = |h: &Hit, mask: Visibility| set.geometries[h.geometry as usize].visibility.0 & mask.0 != 0;
     let first = hits.iter().filter(|h| seen(h, Visibility::PATH)).min_by(|a, b| {
         let key = |h: &Hit| (h.instance, h.geometry, h.primitive);
@@ -72,7 +80,7 @@ fn trace(bvh: &Bvh, rays: &RayBatch) -> (Vec<Option<Hit>>, Vec<bool>) {
     (hits, occluded)
 }
 
-/// Compares with brute force; returns the number of hits and of occluded rays.
+/// Compares with brute force. Returns the number of hits and of occluded rays.
 fn assert_exact(set: &Arc<GeometrySet>, alpha: Option<Arc<dyn AlphaSource>>, rays: &RayBatch) -> (usize, usize) {
     let bvh = Bvh::new(Arc::clone(set), alpha.clone());
     let test = alpha.map(|source| AlphaTest::new(Arc::clone(set), source));
@@ -107,7 +115,7 @@ fn answers_equal_brute_force_on_mixed_scenes() {
 fn answers_equal_brute_force_on_soups_of_any_size() {
     let mut s = pcg32([1, 1, 1]);
     let mut shapes = vec![Shape::Mesh(soup(&mut s, 3000, 0.1)), Shape::Mesh(soup(&mut s, 5, 3.0))];
-    // Far from the origin, and flat in a coordinate plane.
+    // Far from the origin, and flat in a coordinate plane
     let far = soup(&mut s, 200, 0.5);
     let moved = far.positions().iter().map(|p| *p + Vec3::new(0.0, 500.0, 0.0)).collect();
     shapes.push(Shape::Mesh(TriangleMesh::new(moved, far.indices.clone()).unwrap()));
@@ -143,7 +151,7 @@ fn alpha_stops_rays_with_its_probability() {
         rays.push(&Ray { o, d: Vec3::Z, t_max: f32::INFINITY, time: 0.0 });
     }
     let (hits, occluded) = trace(&bvh, &rays);
-    // The surfaces decide independently: 0.4, then 0.6 · 0.4. Five standard deviations are 0.0125.
+    // The surfaces decide independently: 0.4, then 0.6 · 0.4. Five standard deviations are 0.0125
     let share = |id: u32| hits.iter().flatten().filter(|h| h.geometry == id).count() as f64 / f64::from(n);
     assert!((share(0) - 0.4).abs() < 0.0125 && (share(1) - 0.24).abs() < 0.0125, "{} {}", share(0), share(1));
     for (hit, occluded) in hits.iter().zip(occluded) {
@@ -169,7 +177,7 @@ fn degenerate_geometry_and_rays_are_harmless() {
     let mut s = pcg32([4, 1, 1]);
     let mesh = soup(&mut s, 400, 0.4);
     let good = root_only(vec![Shape::Mesh(mesh.clone())]);
-    // The same with bad triangles behind: NaN, infinite, collapsed to lines and points, all at one place.
+    // The same mesh followed by bad triangles: NaN, infinite, and collapsed to lines and points
     let mut positions = mesh.positions().to_vec();
     let n = positions.len() as u32;
     positions.extend([Vec3::NAN, Vec3::INFINITY, Vec3::new(0.0, f32::NAN, 0.0), Vec3::splat(3e38)]);
@@ -232,7 +240,7 @@ fn the_tree_does_not_depend_on_the_number_of_threads() {
     assert_eq!(one.root.others, four.root.others);
 }
 
-/// A closed bumpy surface about the origin.
+/// A closed, bumpy surface around the origin.
 fn closed_mesh() -> TriangleMesh {
     let p = vec![Vec3::X, Vec3::Y, -Vec3::X, -Vec3::Y, Vec3::Z, -Vec3::Z];
     let faces = (0..4).flat_map(|k| [[k, (k + 1) % 4, 4], [(k + 1) % 4, k, 5]]).collect();
@@ -259,7 +267,7 @@ fn rays_through_edges_and_vertices_of_a_closed_mesh_never_leak() {
                 2 => b + (c - b) * u,
                 _ => place(random_point(&mut s)),
             };
-            // From the inside, where every ray must hit.
+            // From the inside, every ray must hit
             let o = place(random_point(&mut s) * 0.15);
             rays.push(&Ray { o, d: target - o, t_max: f32::INFINITY, time: 0.0 });
         }

@@ -1,4 +1,4 @@
-//! The tree that is traversed: nodes of eight boxes and blocks of four triangles, as structures of arrays.
+//! The tree for traversal: nodes of eight boxes and blocks of four triangles, as structures of arrays.
 
 use super::build::{Binary, BinaryKind, LEAF_TRIANGLES, PrimRef};
 use crate::geometry::triangle::RayPrecomputed;
@@ -6,11 +6,11 @@ use crate::geometry::{GeometrySet, Shape};
 use lumiris_numbers::math::{Bounds3, Vec3, Vec4};
 use rayon::prelude::*;
 
-/// Relative growth of every box, of its largest coordinate. With the like growth of the ray's origin this covers the
-/// rounding of the triangle test, which moves corners by up to 5·2⁻²⁴ of their distance from the origin.
+/// Growth of every box, relative to its largest coordinate. Together with the same growth of the ray's origin it covers
+/// the rounding error of the triangle test, which moves corners by up to 5·2⁻²⁴ of their distance from the origin.
 const BOX_GROWTH: f32 = 1.0 / (1 << 20) as f32;
 
-/// The child in a slot of a node: two bits of kind, thirty of index.
+/// Reference to a child of a node: two bits of kind, thirty of index.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct ChildRef(u32);
 
@@ -23,7 +23,7 @@ pub(super) enum Child {
 
 impl ChildRef {
     const KIND_SHIFT: u32 = 30;
-    /// An unused slot; its box is empty, so it is never visited.
+    /// An unused slot. Its box is empty, so it is never visited.
     pub(super) const EMPTY: ChildRef = ChildRef(u32::MAX);
 
     fn new(kind: u32, index: usize) -> Self {
@@ -46,16 +46,16 @@ impl ChildRef {
 #[derive(Clone, Debug, PartialEq)]
 #[repr(C, align(64))]
 pub(super) struct Node {
-    /// Rows of lower x, y, z, then upper x, y, z.
+    /// Rows of minimum x, y, z, then maximum x, y, z.
     pub bounds: [[Vec4; 2]; 6],
     pub children: [ChildRef; 8],
 }
 
-/// Four triangles; missing ones have NaN corners, which no ray hits.
+/// Four triangles. Unused lanes have NaN corners, which no ray hits.
 #[derive(Clone, Debug)]
 #[repr(C, align(64))]
 pub(super) struct Block {
-    /// By corner, then axis.
+    /// Indexed by corner, then axis.
     corners: [[Vec4; 3]; 3],
     geometry: [u32; LEAF_TRIANGLES],
     primitive: [u32; LEAF_TRIANGLES],
@@ -78,7 +78,7 @@ impl Block {
         block
     }
 
-    /// (geometry, primitive) of a lane.
+    /// Geometry and primitive of a lane.
     #[inline]
     pub(super) fn id(&self, lane: usize) -> (u32, u32) {
         (self.geometry[lane], self.primitive[lane])
@@ -90,8 +90,8 @@ impl Block {
         self.corners.map(|axes| Vec3::from(axes.map(|x| x[lane])))
     }
 
-    /// Lanes whose f32 edge functions do not exclude a hit: those of
-    /// [`crate::geometry::triangle::intersect_triangle`], four at a time.
+    /// Bit mask of lanes whose f32 edge functions do not exclude a hit: the functions of
+    /// [`crate::geometry::triangle::intersect_triangle`], four triangles at a time.
     #[inline]
     pub(super) fn candidates(&self, ray: &RayPrecomputed) -> u32 {
         let [kx, ky, kz] = ray.axes;
@@ -116,7 +116,7 @@ impl Block {
 /// A primitive that is not a triangle, or an instance.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Other {
-    /// Quadric, bilinear patch, or piece of a curve.
+    /// Quadric, bilinear patch, or curve piece.
     Exact {
         geometry: u32,
         primitive: u32,
@@ -143,6 +143,7 @@ impl Tree {
         binary: Option<&Binary>,
         is_triangle: &[bool],
     ) -> Self {
+        // Nodes, and ranges of primitives
         let mut collapse = Collapse { prims, is_triangle, nodes: Vec::new(), leaves: Vec::new(), others: Vec::new() };
         let root = binary.map(|binary| {
             let root = collapse.place(binary);
@@ -152,13 +153,15 @@ impl Tree {
         let Collapse { mut nodes, leaves, mut others, .. } = collapse;
         nodes.shrink_to_fit();
         others.shrink_to_fit();
+
+        // Blocks of triangles, in parallel
         let blocks =
             leaves.par_iter().map(|&(start, count)| Block::new(geometry, &prims[start..start + count])).collect();
         let bounds = binary.map_or(Bounds3::EMPTY, |b| Bounds3 { min: b.bounds.lo.into(), max: b.bounds.hi.into() });
         Tree { bounds, root, nodes, blocks, others }
     }
 
-    /// Bytes held.
+    /// Memory (bytes).
     pub(super) fn bytes(&self) -> u64 {
         (size_of_val(&self.nodes[..]) + size_of_val(&self.blocks[..]) + size_of_val(&self.others[..])) as u64
     }
@@ -168,7 +171,7 @@ struct Collapse<'a> {
     prims: &'a [PrimRef],
     is_triangle: &'a [bool],
     nodes: Vec<Node>,
-    /// Ranges of primitives of the blocks.
+    /// Range of primitives of each block.
     leaves: Vec<(usize, usize)>,
     others: Vec<Other>,
 }
@@ -188,7 +191,7 @@ impl Collapse<'_> {
         ChildRef::new(2, self.others.len() - 1)
     }
 
-    /// The child for a binary subtree: its leaf, or a new node that is filled later.
+    /// The reference to a binary subtree: a leaf, or a new node that is filled later.
     fn place(&mut self, binary: &Binary) -> ChildRef {
         match binary.kind {
             BinaryKind::Leaf { start, count } => self.leaf(start, count),
@@ -199,8 +202,8 @@ impl Collapse<'_> {
         }
     }
 
-    /// Fills the node of a subtree and all nodes below. Siblings are stored together: a ray that visits one often
-    /// visits another.
+    /// Fills the node of a subtree and all nodes below. Siblings are adjacent in memory, because a ray that visits one
+    /// often visits another.
     fn fill(&mut self, place: ChildRef, binary: &Binary) {
         let (Child::Node(index), BinaryKind::Inner(children)) = (place.decode(), &binary.kind) else { return };
         let slots = opened(children);
@@ -215,7 +218,8 @@ impl Collapse<'_> {
     }
 }
 
-/// The subtrees that become the children of one node: the largest inner one is opened until there are eight.
+/// The subtrees that become the children of a node. The largest inner subtree is replaced by its children until there
+/// are eight.
 fn opened(children: &[Binary; 2]) -> Vec<&Binary> {
     let mut slots: Vec<&Binary> = children.iter().collect();
     while slots.len() < 8 {
@@ -235,7 +239,7 @@ fn opened(children: &[Binary; 2]) -> Vec<&Binary> {
     slots
 }
 
-/// The rows of boxes of a node; those of unused lanes are empty.
+/// Rows of the boxes of a node. Boxes of unused lanes are empty.
 fn grown_bounds(slots: &[&Binary]) -> [[Vec4; 2]; 6] {
     let mut lanes = [[f32::INFINITY; 8], [f32::NEG_INFINITY; 8]].map(|row| [row; 3]);
     for (lane, slot) in slots.iter().enumerate() {

@@ -1,4 +1,4 @@
-//! Traversal of the two levels by a single ray.
+//! Traversal of both levels by a single ray.
 
 use super::tree::{Block, Child, ChildRef, Node, Other, Tree};
 use super::{Bvh, TESTED};
@@ -7,24 +7,24 @@ use crate::geometry::triangle::{RayPrecomputed, intersect_triangle};
 use crate::geometry::{LocalHit, Visibility};
 use lumiris_numbers::math::{Ray, Vec4, gamma};
 
-/// The query along the ray.
+/// A query along a ray.
 pub(super) trait Query {
-    /// Whether near boxes come first.
+    /// True if near boxes are visited first.
     const ORDERED: bool;
-    /// Which geometries count.
+    /// Visibility bits of the geometries that count.
     const MASK: u32;
     /// Boxes and hits beyond this parameter are ignored.
     fn limit(&self) -> f32;
     /// True if the hit, at a parameter of `limit` or less, changes the result.
     fn wants(&self, hit: &Hit) -> bool;
-    /// Accepts a hit; true if the result is final.
+    /// Accepts a hit. Returns true if the result is final.
     fn take(&mut self, hit: Hit) -> bool;
 }
 
-/// The first hit.
+/// Query for the first hit.
 pub(super) struct Closest {
     limit: f32,
-    /// The answer.
+    /// The result.
     pub best: Option<Hit>,
 }
 
@@ -46,7 +46,7 @@ impl Query for Closest {
     #[inline]
     fn wants(&self, hit: &Hit) -> bool {
         let key = |h: &Hit| (h.instance, h.geometry, h.primitive);
-        // The end of the ray is open; at a known hit the smaller key wins.
+        // The end of the ray is open. Among hits at the same t, the smallest key wins
         hit.t < self.limit || self.best.as_ref().is_some_and(|best| hit.t == best.t && key(hit) < key(best))
     }
 
@@ -58,10 +58,10 @@ impl Query for Closest {
     }
 }
 
-/// Whether there is any hit.
+/// Query for occlusion.
 pub(super) struct Any {
     limit: f32,
-    /// The answer.
+    /// The result.
     pub found: bool,
 }
 
@@ -94,7 +94,7 @@ impl Query for Any {
 
 /// A ray prepared for slab tests.
 struct Slabs {
-    /// Origin for near and far planes, grown apart, by axis.
+    /// Origins for near and far planes, moved apart to grow the box, by axis.
     near_origin: [Vec4; 3],
     far_origin: [Vec4; 3],
     inv_d: [Vec4; 3],
@@ -105,7 +105,7 @@ struct Slabs {
 
 impl Slabs {
     fn new(ray: &Ray) -> Self {
-        // See `BOX_GROWTH`.
+        // See `BOX_GROWTH`
         let growth = ray.o.abs().max_element() * (1.0 / (1 << 20) as f32);
         let smallest = ray.d.abs().max_element() * 1e-18;
         let mut slabs = Slabs {
@@ -116,7 +116,7 @@ impl Slabs {
             far_row: [0; 3],
         };
         for axis in 0..3 {
-            // Finite inverses, so that no product is NaN.
+            // Finite inverses, so that no product is NaN
             let d = ray.d[axis];
             let inv_d = 1.0 / d.abs().max(smallest).max(f32::MIN_POSITIVE).copysign(d);
             let apart = growth.copysign(d);
@@ -130,8 +130,8 @@ impl Slabs {
         slabs
     }
 
-    /// Boxes that the ray meets in 0..=limit, as a bit mask, with their entries. The exit is moved out by its rounding
-    /// error [Ize 2013].
+    /// Bit mask of the boxes that the ray intersects in 0..=limit, and the entry parameters. The exit is increased by
+    /// its rounding error [Ize 2013].
     #[inline(always)]
     fn test(&self, node: &Node, limit: Vec4) -> (u32, [Vec4; 2]) {
         const WIDEN: f32 = 1.0 + 2.0 * gamma(3);
@@ -147,15 +147,15 @@ impl Slabs {
     }
 }
 
-/// A subtree that is still to be traversed.
+/// A subtree to be traversed.
 #[derive(Clone, Copy)]
 pub(super) struct Pending {
     child: ChildRef,
-    /// Parameter at which the ray enters its box.
+    /// Parameter at which the ray enters the box.
     entry: f32,
 }
 
-/// A walk under way.
+/// A traversal in progress.
 pub(super) struct Walk<'a, Q> {
     bvh: &'a Bvh,
     world_ray: &'a Ray,
@@ -169,7 +169,7 @@ impl<'a, Q: Query> Walk<'a, Q> {
         Walk { bvh, world_ray, query, stack }
     }
 
-    /// Walks to the end.
+    /// Traverses the scene and returns the query with its result.
     pub(super) fn run(mut self) -> Q {
         if self.world_ray.t_max > 0.0
             && let Some(ray) = RayPrecomputed::new(self.world_ray)
@@ -179,7 +179,7 @@ impl<'a, Q: Query> Walk<'a, Q> {
         self.query
     }
 
-    /// Traverses a tree with the ray in its space; true if the result is final.
+    /// Traverses a tree with a ray in its space. Returns true if the result is final.
     fn tree(&mut self, tree: &'a Tree, ray: &RayPrecomputed, instance: u32) -> bool {
         let Some(root) = tree.root else { return false };
         let slabs = Slabs::new(&ray.ray);
@@ -190,7 +190,7 @@ impl<'a, Q: Query> Walk<'a, Q> {
             if Q::ORDERED && entry > self.query.limit() {
                 continue;
             }
-            // Down along the nearest boxes to a leaf.
+            // Descend through the nearest boxes to a leaf
             let done = loop {
                 match child.decode() {
                     Child::Node(index) => {
@@ -213,7 +213,7 @@ impl<'a, Q: Query> Walk<'a, Q> {
         false
     }
 
-    /// The box to enter next; the others go onto the stack, the nearest on top.
+    /// The next box to enter. The others go onto the stack, the nearest on top.
     #[inline(always)]
     fn nearest(&mut self, node: &Node, mask: u32, entries: [Vec4; 2]) -> Option<ChildRef> {
         if mask == 0 {
@@ -234,7 +234,7 @@ impl<'a, Q: Query> Walk<'a, Q> {
             rest &= rest - 1;
             let mut pending = Pending { child: node.children[lane], entry: lanes[lane] };
             if Q::ORDERED {
-                // Keep the nearest in hand and the stack descending.
+                // Keep the nearest one out of the stack, and the stack in descending order
                 if pending.entry < next.entry {
                     std::mem::swap(&mut pending, &mut next);
                 }
@@ -272,7 +272,7 @@ impl<'a, Q: Query> Walk<'a, Q> {
         match other {
             Other::Instance(index) => self.instance(index),
             Other::Exact { geometry, primitive } => {
-                // An equal parameter may still win, so the exact test's open end is moved up by one step.
+                // A hit at the same t may still win, so the open end of the exact test is one float larger
                 let ray = Ray { t_max: self.query.limit().next_up(), ..ray.ray };
                 let hit_of = |l: &LocalHit| Hit { t: l.t, uv: l.uv, geometry, primitive, instance };
                 let shape = &self.bvh.geometry.geometries[geometry as usize].shape;
@@ -282,7 +282,8 @@ impl<'a, Q: Query> Walk<'a, Q> {
         }
     }
 
-    /// Traverses an instance. Parameters are those of the world ray: its direction is transformed, not normalised.
+    /// Traverses an instance. Ray parameters stay the same in world space, because the direction is transformed without
+    /// normalisation.
     fn instance(&mut self, index: u32) -> bool {
         let placed = &self.bvh.geometry.instances[index as usize];
         let world = self.world_ray;
@@ -297,7 +298,7 @@ impl<'a, Q: Query> Walk<'a, Q> {
         RayPrecomputed::new(&ray).is_some_and(|ray| self.tree(&bvh.groups[placed.group as usize], &ray, index))
     }
 
-    /// True if the query wants the hit and it stops the ray; `crossing` tells the hits of one primitive apart.
+    /// True if the query wants the hit and the hit stops the ray. `crossing` distinguishes hits on the same primitive.
     #[inline]
     fn accepts(&self, hit: &Hit, crossing: usize) -> bool {
         let flags = self.bvh.flags[hit.geometry as usize];

@@ -1,7 +1,7 @@
-//! Plain Embree: loops over packets filled in advance, without anything the renderer adds. They show how fast a query
-//! can be at best, and what conversion and exact hits cost.
+//! Plain Embree: loops over prefilled packets, without the additions of the renderer. They measure the best possible
+//! speed of a query, and thereby the cost of conversion and of exact hits.
 //!
-//! The scene is built like the renderer's, but without the flag that lets queries bring a filter function. Quadrics,
+//! The scene is built as in the renderer, but without the flag that allows a filter function per query. Quadrics,
 //! patches and alpha masks use callbacks as in the renderer.
 #![allow(unsafe_code)]
 
@@ -21,7 +21,7 @@ use std::time::{Duration, Instant};
 pub struct Bare {
     root: EmbreeScene,
     world: Arc<World>,
-    /// Whether callbacks report hits, for which the context must be prepared.
+    /// True if callbacks report hits; the context must be prepared for them.
     calls_back: bool,
     has_only_triangles: bool,
     build_time: Duration,
@@ -62,7 +62,7 @@ impl Bare {
         self.build_time
     }
 
-    /// Traces packed rays. `coherent` lets packets be traversed by their common frustum, where Embree can do so.
+    /// Traces packed rays. `coherent` allows frustum traversal of packets, where Embree supports it.
     pub fn trace(&self, packed: &mut Packed<'_>, coherent: bool) {
         let rays = packed.rays;
         match &mut packed.packets {
@@ -124,7 +124,7 @@ impl Bare {
 }
 
 impl<'a> Packed<'a> {
-    /// Rays whose nearest hits are queried, in packets of `width`: 1, 4, 8 or 16.
+    /// Packs rays for nearest-hit queries, in packets of `width`: 1, 4, 8 or 16.
     pub fn first(rays: &'a RayBatch, width: u32) -> Result<Packed<'a>, EmbreeError> {
         let packets = match checked_width(width)? {
             4 => Packets::First4(pack_first(rays)),
@@ -143,7 +143,7 @@ impl<'a> Packed<'a> {
         Ok(Packed { rays, packets })
     }
 
-    /// Segments that may be occluded, in packets of `width`: 1, 4, 8 or 16.
+    /// Packs segments for occlusion queries, in packets of `width`: 1, 4, 8 or 16.
     pub fn any(rays: &'a RayBatch, width: u32) -> Result<Packed<'a>, EmbreeError> {
         let packets = match checked_width(width)? {
             4 => Packets::Any4(pack_any(rays)),
@@ -156,16 +156,19 @@ impl<'a> Packed<'a> {
 
     /// Number of rays that hit something.
     pub fn hits(&self) -> usize {
+        // A geometry marks a hit
         fn first<const N: usize>(packets: &[(Valid<N>, RayHitPacket<N>)]) -> usize {
             let geometries = packets.iter().flat_map(|(_, packet)| packet.geometry);
             geometries.filter(|&g| g != sys::RTC_INVALID_GEOMETRY_ID).count()
         }
+        // A negative end marks occlusion
         fn any<const N: usize>(packets: &[(Valid<N>, RayPacket<N>)]) -> usize {
             let stopped = |(valid, packet): &(Valid<N>, RayPacket<N>)| {
                 (0..N).filter(|&lane| valid.0[lane] != 0 && packet.tfar[lane] < 0.0).count()
             };
             packets.iter().map(stopped).sum()
         }
+        // Count by kind of packet
         match &self.packets {
             Packets::First1(rays) => rays.iter().filter(|r| r.hit.geomID != sys::RTC_INVALID_GEOMETRY_ID).count(),
             Packets::First4(packets) => first(packets),

@@ -1,7 +1,7 @@
 //! Callbacks from Embree: nearest hits, alpha masks, quadrics, bilinear patches and curves.
 //!
-//! Embree passes N rays at once as a structure of arrays with N elements per field; lanes whose `valid` is not −1 are
-//! ignored. Fields are addressed by their index in the header's order, which holds for any N, including 1.
+//! Embree passes N rays at once as a structure of arrays with N elements per field. Lanes whose `valid` is not −1 are
+//! ignored. Fields are addressed by their index in the order of the header, which is the same for any N, including 1.
 #![allow(unsafe_code)]
 
 use super::context::{QueryContext, Ties};
@@ -14,15 +14,15 @@ use lumiris_numbers::math::{Bounds3, Ray, Vec4};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 
-/// Relative growth of the boxes of quadrics and patches, for the rounding of rays on their way into a group.
+/// Relative growth of the boxes of quadrics and patches, for rounding errors of rays transformed into a group.
 const BOX_GROWTH: f32 = 1.0 / (1 << 20) as f32;
 
-/// The data that the callbacks of one geometry read.
+/// User data of a geometry for its callbacks.
 #[derive(Clone)]
 pub(super) struct GeometryContext {
     pub world: Arc<World>,
     pub id: GeometryId,
-    /// The test of a cut-out.
+    /// The alpha test, if the geometry has an alpha mask.
     pub alpha: Option<AlphaTest>,
 }
 
@@ -31,15 +31,15 @@ impl GeometryContext {
         self.alpha.is_some()
     }
 
-    /// True if the hit, of which `crossing` of its primitive it is, stops the ray.
+    /// True if the hit stops the ray. `crossing` distinguishes hits on the same primitive.
     fn stops(&self, (hit, crossing): (&Hit, usize), world_ray: &Ray) -> bool {
         self.alpha.as_ref().is_none_or(|alpha| alpha.stops((hit, crossing), world_ray))
     }
 
-    /// Whether there is an exact hit of a quadric or patch with `start` < t < `end`.
+    /// True if there is an exact hit on a quadric or patch with `start` < t < `end`.
     fn occludes(&self, world_ray: &Ray, primitive: u32, instance: u32, [start, end]: [f32; 2]) -> bool {
         match &self.world.set.geometries[self.id as usize].shape {
-            // Segments are never continued behind a hit, so they start before all
+            // Segments are never continued behind a hit, so they start before all hits
             Shape::Quadric(quadric) if !self.has_alpha() => {
                 quadric.distance(&Ray { t_max: end, ..self.world.group_ray(world_ray, instance) }).is_some()
             }
@@ -47,7 +47,7 @@ impl GeometryContext {
         }
     }
 
-    /// The first exact hit of a quadric or patch with `start` < t < `end` that stops the ray.
+    /// The first exact hit on a quadric or patch with `start` < t < `end` that stops the ray.
     fn intersect(&self, world_ray: &Ray, primitive: u32, instance: u32, [start, end]: [f32; 2]) -> Option<LocalHit> {
         let ray = Ray { t_max: end, ..self.world.group_ray(world_ray, instance) };
         self.world.set.geometries[self.id as usize].shape.intersect(primitive, &ray, |hit, crossing| {
@@ -57,7 +57,7 @@ impl GeometryContext {
     }
 }
 
-/// N rays, and after them N hits where the callback gets both in one.
+/// N rays, followed by N hits if the callback gets both in one buffer.
 #[derive(Clone, Copy)]
 struct Lanes {
     words: *mut f32,
@@ -67,7 +67,7 @@ struct Lanes {
 const TNEAR: usize = 3;
 const TFAR: usize = 8;
 const ID: usize = 10;
-/// Words of a ray.
+/// Number of words in a ray.
 const RAY_WORDS: usize = 12;
 
 const HIT_U: usize = 3;
@@ -102,7 +102,7 @@ impl Lanes {
     }
 }
 
-/// Lanes of a callback that take part, of at most 64.
+/// Active lanes of a callback, at most 64.
 ///
 /// # Safety
 /// `valid` has `n` elements, −1 or 0.
@@ -110,7 +110,7 @@ impl Lanes {
 unsafe fn active(valid: *const i32, n: usize) -> impl Iterator<Item = usize> {
     let mut lanes = 0_u64;
     if n.is_multiple_of(4) {
-        // Four signs at once: often only one of 8 or 16 lanes takes part
+        // Four signs at once: often only one of 8 or 16 lanes is active
         for begin in (0..n).step_by(4) {
             // SAFETY: by the caller.
             let four = unsafe { valid.add(begin).cast::<[f32; 4]>().read_unaligned() };
@@ -129,7 +129,7 @@ unsafe fn active(valid: *const i32, n: usize) -> impl Iterator<Item = usize> {
     })
 }
 
-/// Rejects the hits of triangles that an alpha mask lets through.
+/// Filter that rejects hits of triangles where the alpha mask is transparent.
 pub(super) unsafe extern "C" fn alpha_filter(arguments: *const sys::RTCFilterFunctionNArguments) {
     // SAFETY: Embree passes valid arguments: the user data that was set, the context of this query, N lanes each.
     unsafe {
@@ -156,7 +156,7 @@ pub(super) unsafe extern "C" fn alpha_filter(arguments: *const sys::RTCFilterFun
     }
 }
 
-/// Takes the hits of triangles.
+/// Filter that receives the hits of triangles.
 pub(super) unsafe extern "C" fn first_filter(arguments: *const sys::RTCFilterFunctionNArguments) {
     // SAFETY: Embree passes valid arguments: the context of this query, N lanes each, which nothing else refers to.
     unsafe {
@@ -178,7 +178,7 @@ pub(super) unsafe extern "C" fn first_filter(arguments: *const sys::RTCFilterFun
     }
 }
 
-/// The hit of a triangle in a lane of a filter. The position on the triangle is computed by the exact hit.
+/// The hit of a triangle in a lane of a filter. The position on the triangle is computed later, with the exact hit.
 ///
 /// # Safety
 /// `rays` and `hits` have n lanes of rays and of hits, and `lane` is below n.
@@ -196,7 +196,7 @@ unsafe fn reported(rays: Lanes, hits: Lanes, lane: usize) -> Reported {
     }
 }
 
-/// The box of a quadric or patch.
+/// Computes the box of a quadric or patch.
 pub(super) unsafe extern "C" fn bounds(arguments: *const sys::RTCBoundsFunctionArguments) {
     // SAFETY: Embree passes valid arguments, among them the user data that was set.
     unsafe {
@@ -208,7 +208,7 @@ pub(super) unsafe extern "C" fn bounds(arguments: *const sys::RTCBoundsFunctionA
             Shape::Curves(curves) => curves.piece_bounds(arguments.primID as usize),
             Shape::Mesh(_) => Bounds3::EMPTY,
         };
-        // An empty box leaves the primitive out.
+        // An empty box excludes the primitive
         let found = catch_unwind(AssertUnwindSafe(box_of)).unwrap_or(Bounds3::EMPTY);
         let growth = found.min.abs().max(found.max.abs()).max_element() * BOX_GROWTH;
         let (lower, upper) = (found.min - growth, found.max + growth);
@@ -218,7 +218,7 @@ pub(super) unsafe extern "C" fn bounds(arguments: *const sys::RTCBoundsFunctionA
     }
 }
 
-/// First hits of quadrics and patches.
+/// Intersects quadrics and patches.
 pub(super) unsafe extern "C" fn intersect(arguments: *const sys::RTCIntersectFunctionNArguments) {
     // SAFETY: Embree passes valid arguments: the user data that was set, the context of this query, and N lanes of rays
     // followed by N lanes of hits.
@@ -250,7 +250,7 @@ pub(super) unsafe extern "C" fn intersect(arguments: *const sys::RTCIntersectFun
     }
 }
 
-/// Whether quadrics and patches stop rays.
+/// Tests quadrics and patches for occlusion.
 pub(super) unsafe extern "C" fn occluded(arguments: *const sys::RTCOccludedFunctionNArguments) {
     // SAFETY: Embree passes valid arguments: the user data that was set, the context of this query, N lanes of rays.
     unsafe {
@@ -272,8 +272,7 @@ pub(super) unsafe extern "C" fn occluded(arguments: *const sys::RTCOccludedFunct
     }
 }
 
-/// What `intersect` finds with the ray of one lane in the instance of `inst_id`, between the ray's limits: it gets the ray,
-/// the instance and these limits.
+/// Calls `intersect` with the ray of a lane, the instance of `inst_id`, and the limits of the ray.
 ///
 /// # Safety
 /// `rays` has n lanes of rays, and `lane` is below n.

@@ -1,4 +1,4 @@
-//! What the callbacks of a query share: the batch, and the nearest hit of each lane so far.
+//! State shared by the callbacks of a query: the batch, and the nearest hit of each lane so far.
 
 use super::world::{Reported, World};
 use crate::accel::RayBatch;
@@ -7,27 +7,27 @@ use lumiris_lanes::hits::BLOCK;
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-/// Hits whose parameters differ by less than this fraction are compared exactly: much more than what Embree's
-/// parameter is off, but for rays at less than some 0.1° to a triangle.
+/// Hits whose parameters differ by less than this fraction are compared exactly. It is much larger than the error of
+/// Embree's parameters, except for rays at less than about 0.1° to a triangle.
 const TIE: f32 = 1.0 / (1 << 12) as f32;
 
-/// What is done with hits whose parameters nearly agree.
+/// Treatment of hits with nearly equal parameters.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Ties {
-    /// Noted: Embree stores the hits, and rays with a tie are traced again.
+    /// Embree stores the hits. Rays with a tie are noted and traced again.
     Noted,
-    /// Settled by exact hits: the callbacks store the hits.
+    /// The callbacks compare exact hits and store the first.
     Settled,
 }
 
-/// The part of a query that Embree sees.
+/// The part of a query context that Embree accesses.
 #[cfg(embree3)]
 pub(super) type RtcContext = sys::RTCIntersectContext;
-/// The part of a query that Embree sees.
+/// The part of a query context that Embree accesses.
 #[cfg(embree4)]
 pub(super) type RtcContext = sys::RTCRayQueryContext;
 
-/// What Embree reports of a block of rays.
+/// Hits reported by Embree for a block of rays.
 pub(super) struct ReportedBlock {
     pub geometry: [u32; BLOCK],
     pub primitive: [u32; BLOCK],
@@ -68,24 +68,24 @@ impl ReportedBlock {
     }
 }
 
-/// The context of a query; Embree passes the address of its first member to the callbacks.
+/// The context of a query. Embree passes the address of its first member to the callbacks.
 #[repr(C)]
 pub(super) struct QueryContext<'a> {
     pub rtc: RtcContext,
     pub world: &'a World,
-    /// The batch; a ray's `id` is its index in it.
+    /// The batch. The `id` of a ray is its index in the batch.
     pub rays: &'a RayBatch,
-    /// Index of the block's first ray.
+    /// Index of the first ray of the block.
     pub base: u32,
-    /// What is done with ties.
+    /// Treatment of ties.
     pub ties: Ties,
     /// The smallest parameter reported for each ray of the block.
     pub best_t: [f32; BLOCK],
-    /// Not 0 for rays of the block with a tie, where these are noted.
+    /// Not 0 for rays of the block with a noted tie.
     pub tied: [u32; BLOCK],
     /// The hit of each ray of the block.
     pub first: ReportedBlock,
-    /// The payload of a panic in a callback, resumed when Embree has returned.
+    /// The payload of a panic in a callback, resumed after Embree has returned.
     pub panic: Option<Box<dyn Any + Send>>,
 }
 
@@ -104,7 +104,7 @@ impl<'a> QueryContext<'a> {
         }
     }
 
-    /// Begins with the block of rays from `base` on.
+    /// Starts the block of rays from `base` on.
     #[inline]
     pub(super) fn begin(&mut self, base: usize) {
         self.base = base as u32;
@@ -113,14 +113,14 @@ impl<'a> QueryContext<'a> {
         self.first.geometry = [u32::MAX; BLOCK];
     }
 
-    /// The place of the ray `id` in the block.
+    /// Index of the ray `id` in the block.
     #[inline]
     fn lane(&self, id: u32) -> usize {
         id.wrapping_sub(self.base) as usize % BLOCK
     }
 
-    /// Takes a hit of the ray `id`; returns the new end of the ray, or `None` if another hit is nearer. The end is
-    /// slightly beyond the hit, so that ties are found whichever of the hits comes first.
+    /// Offers a hit of the ray `id`. Returns the new end of the ray, or `None` if another hit is nearer. The end is
+    /// slightly beyond the hit, so that ties are detected in any order of the hits.
     #[inline]
     pub(super) fn offer(&mut self, id: u32, hit: &Reported) -> Option<f32> {
         match self.ties {
@@ -129,7 +129,7 @@ impl<'a> QueryContext<'a> {
         }
     }
 
-    /// Notes whether a hit of the ray `id` ties with one before; returns the new end of the ray.
+    /// Notes a tie of a hit of the ray `id` with an earlier one. Returns the new end of the ray.
     #[inline]
     pub(super) fn note(&mut self, id: u32, t: f32) -> f32 {
         let lane = self.lane(id);
@@ -139,7 +139,7 @@ impl<'a> QueryContext<'a> {
         self.best_t[lane] * (1.0 + TIE)
     }
 
-    /// Stores a hit of the ray `id` if it is the first; then returns the new end of the ray.
+    /// Stores a hit of the ray `id` if it is the first one so far. Returns the new end of the ray in that case.
     #[inline]
     pub(super) fn settle(&mut self, id: u32, hit: &Reported) -> Option<f32> {
         let lane = self.lane(id);
@@ -156,7 +156,7 @@ impl<'a> QueryContext<'a> {
         Some(self.best_t[lane] * (1.0 + TIE))
     }
 
-    /// Whether the exact hits put `hit` before the lane's first.
+    /// True if the exact hit of `hit` precedes the lane's first hit.
     #[cold]
     fn wins_tie(&mut self, id: u32, lane: usize, hit: &Reported) -> bool {
         let first = self.first.get(lane);
@@ -170,7 +170,7 @@ impl<'a> QueryContext<'a> {
         wins
     }
 
-    /// Runs the body of a callback; a panic is stored for later.
+    /// Runs the body of a callback. A panic is stored for later.
     #[inline]
     pub(super) fn guard(&mut self, body: impl FnOnce(&mut Self)) {
         let result = catch_unwind(AssertUnwindSafe(|| body(self)));

@@ -1,4 +1,4 @@
-//! The device: errors, memory, capabilities.
+//! The Embree device: errors, memory, capabilities.
 #![allow(unsafe_code)]
 
 use super::{EmbreeError, ErrorCode};
@@ -12,7 +12,7 @@ use std::sync::{Mutex, PoisonError};
 #[derive(Debug)]
 pub(super) struct Device {
     raw: sys::RTCDevice,
-    /// The log written by the device's callbacks; boxed, since they hold its address.
+    /// The log written by the device's callbacks. Boxed, because they hold its address.
     log: Box<DeviceLog>,
 }
 
@@ -30,7 +30,8 @@ struct DeviceLog {
 }
 
 impl Device {
-    /// A device whose structures take `memory_limit` bytes at most, if given. `config` is Embree's own configuration.
+    /// A device whose structures take at most `memory_limit` bytes, if given. `config` is an Embree configuration
+    /// string.
     pub(super) fn new(config: &CStr, memory_limit: Option<u64>) -> Result<Device, EmbreeError> {
         // SAFETY: the configuration ends in a zero byte and is read during the call.
         let raw = unsafe { sys::rtcNewDevice(config.as_ptr()) };
@@ -60,7 +61,7 @@ impl Device {
         self.raw
     }
 
-    /// The first error since the last call, as the failure of `action`.
+    /// Returns the first error since the last call, as the failure of `action`.
     pub(super) fn check(&self, action: &'static str) -> Result<(), EmbreeError> {
         // SAFETY: the device is live.
         let code = ErrorCode::from(unsafe { sys::rtcGetDeviceError(self.raw) });
@@ -73,13 +74,13 @@ impl Device {
         }
     }
 
-    /// True if the build of Embree has a feature.
+    /// True if this build of Embree has a feature.
     pub(super) fn has(&self, property: Property) -> bool {
         // SAFETY: the device is live; an unknown property is an error, not undefined.
         unsafe { sys::rtcGetDeviceProperty(self.raw, property) != 0 }
     }
 
-    /// Bytes now and at the peak.
+    /// Current and peak memory (bytes).
     pub(super) fn memory(&self) -> (u64, u64) {
         let load = |value: &AtomicI64| u64::try_from(value.load(Ordering::Relaxed)).unwrap_or(0);
         (load(&self.log.bytes), load(&self.log.peak_bytes))
@@ -107,7 +108,8 @@ unsafe extern "C" fn on_error(user: *mut c_void, code: RTCError, message: *const
     log.errors.lock().unwrap_or_else(PoisonError::into_inner).push((ErrorCode::from(code), message));
 }
 
-/// Embree's memory callback: before an allocation (`bytes` > 0) and after a release. False refuses an allocation.
+/// Embree's memory callback: called before an allocation (`bytes` > 0) and after a release. Returning false denies an
+/// allocation.
 unsafe extern "C" fn on_memory(user: *mut c_void, bytes: isize, post: bool) -> bool {
     // SAFETY: `user` is the device's log, which outlives the device.
     let log = unsafe { &*user.cast::<DeviceLog>() };

@@ -1,4 +1,4 @@
-//! Exact hits of a block of rays: their triangles are collected, and tested side by side.
+//! Exact hits of a block of rays: their triangles are gathered and intersected in SIMD lanes.
 
 use super::context::ReportedBlock;
 use super::world::World;
@@ -9,10 +9,10 @@ use lumiris_lanes::level;
 use lumiris_numbers::math::Vec3;
 use std::ops::Range;
 
-/// Rays that are looked at together: those beside each other often hit the same triangle.
+/// Rays whose triangles are compared at once: neighbouring rays often hit the same triangle.
 const GROUP: usize = 8;
 
-/// Rays of a block with the triangles that Embree reported.
+/// Rays of a block with the triangles reported by Embree.
 pub(super) struct ExactHits {
     pairs: Pairs,
     hits: Hits,
@@ -32,7 +32,7 @@ impl Default for ExactHits {
 }
 
 impl ExactHits {
-    /// Determines the hits of at most [`BLOCK`] rays, one for each that Embree reported.
+    /// Computes the hits of at most [`BLOCK`] rays, one for each hit reported by Embree.
     pub(super) fn find(&mut self, world: &World, rays: &RayBatch, range: Range<usize>, reported: &ReportedBlock) {
         let count = range.len().min(BLOCK);
         let Pairs { o, d, t_max, .. } = &mut self.pairs;
@@ -42,7 +42,7 @@ impl ExactHits {
         }
         t_max[..count].copy_from_slice(&rays.t_max[range.clone()]);
 
-        // The indices of all, then their corners: each of the two is a cache miss, and those of different rays overlap
+        // All indices first, then all corners: both are cache misses, and the misses of different rays overlap
         let mut triangles: [Option<(&TriangleMesh, [u32; 3])>; BLOCK] = [None; BLOCK];
         for begin in (0..count).step_by(GROUP) {
             if is_same(&reported.geometry, begin)
@@ -78,7 +78,7 @@ impl ExactHits {
         hits::exact(level(), &self.pairs, count, &mut self.hits);
     }
 
-    /// The mesh and the vertices of the triangle that was reported for a ray; also stores its geometry and instance.
+    /// The mesh and the vertices of the triangle reported for a ray. Also stores its geometry and instance.
     #[inline(always)]
     fn triangle<'a>(
         &mut self,
@@ -99,7 +99,7 @@ impl ExactHits {
         }
     }
 
-    /// Gives N lanes the same triangle.
+    /// Sets the same triangle in N lanes.
     #[inline]
     fn set_corners<const N: usize>(&mut self, begin: usize, corners: [Vec3; 3]) {
         for (rows, p) in self.pairs.corners.iter_mut().zip(corners) {
@@ -109,7 +109,7 @@ impl ExactHits {
         }
     }
 
-    /// Takes the rays that hit something in an instance into its space.
+    /// Transforms the rays with hits in instances to the space of the group.
     fn enter_instances(&mut self, world: &World, rays: &RayBatch, range: Range<usize>) {
         let Pairs { o, d, .. } = &mut self.pairs;
         for (lane, i) in range.enumerate().filter(|&(lane, _)| self.instances[lane] != Hit::NO_INSTANCE) {
@@ -119,8 +119,8 @@ impl ExactHits {
         }
     }
 
-    /// The hit of a ray of the block, on the primitive that was reported; `None` where [`World::refine`] must decide, or
-    /// nothing was reported.
+    /// The hit of a ray of the block on the reported primitive. `None` if nothing was reported or [`World::refine`]
+    /// must decide.
     #[inline]
     pub(super) fn hit(&self, lane: usize, primitive: u32) -> Option<Hit> {
         let Hits { t, b1, b2 } = &self.hits;
@@ -129,7 +129,7 @@ impl ExactHits {
     }
 }
 
-/// True if a group of lanes has the same value.
+/// True if all lanes of a group have the same value.
 #[inline]
 fn is_same(row: &[u32; BLOCK], begin: usize) -> bool {
     let group = &row[begin..begin + GROUP];
@@ -145,6 +145,7 @@ mod tests {
 
     #[test]
     fn lanes_give_the_bits_of_the_scalar_test_at_every_level() {
+        // Rays and triangles, most of them hit, some beyond the end
         let mut s = pcg32([2, 9, 4]);
         let mut point = move || Vec3::new(s.random::<f32>(), s.random::<f32>(), s.random::<f32>()) * 2.0 - 1.0;
         let (mut plain, mut hits, mut beyond) = (0, 0, 0);
@@ -165,6 +166,8 @@ mod tests {
                 block.t_max[lane] = t_max;
                 singles.push((ray, triangle));
             }
+
+            // Every SIMD level gives the scalar result or leaves the decision open
             for level in lumiris_lanes::levels() {
                 let mut found = Hits::default();
                 hits::exact(level, &block, count, &mut found);
@@ -187,6 +190,6 @@ mod tests {
         assert!(plain > 400_000 && beyond > 1_000 && plain * 100 > hits * 99, "{plain} {hits} {beyond}");
     }
 
-    /// Blocks of 64, 63, … pairs.
+    /// Number of block sizes: 64, 63, … pairs.
     const LANES_LEFT_OUT: usize = 9;
 }

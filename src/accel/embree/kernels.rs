@@ -8,26 +8,26 @@ use crate::accel::RayBatch;
 use embree4_sys as sys;
 use lumiris_lanes::hits::BLOCK;
 
-/// Words per hit beyond the eight that every version has: `instPrimID`, where it exists.
+/// Words per hit in addition to the eight of all versions: `instPrimID`, if it exists.
 const EXTRA_HIT_WORDS: usize = if size_of::<sys::RTCRayHit8>() == 640 { 0 } else { 1 };
 
 /// The kind of query.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum QueryKind {
-    /// Nearest hits, of which the filter function of the query notes or settles ties.
+    /// Nearest hits. The filter function of the query notes or settles ties.
     First(Ties),
-    /// Nearest hits as Embree determines them.
+    /// Nearest hits as determined by Embree.
     Nearest,
-    /// Whether anything is hit.
+    /// Occlusion.
     Any,
 }
 
-/// How to trace.
+/// Query mode.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Mode {
     /// The kind of query.
     pub query: QueryKind,
-    /// Traverse packets by their common frustum.
+    /// True to traverse packets by their common frustum.
     pub coherent: bool,
 }
 
@@ -59,7 +59,7 @@ pub(super) struct RayHitPacket<const N: usize> {
     pub extra: [[u32; N]; EXTRA_HIT_WORDS],
 }
 
-/// −1 where a lane holds a ray.
+/// −1 in lanes that hold a ray.
 #[repr(C, align(64))]
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Valid<const N: usize>(pub [i32; N]);
@@ -79,8 +79,9 @@ const _: () = {
     assert!(std::mem::offset_of!(RayPacket<8>, tfar) == std::mem::offset_of!(sys::RTCRay8, tfar));
 };
 
-/// Start of the interval that Embree tests: it takes a hit at t = 0 for a hit, and rays that leave a plane through a
-/// coordinate origin start exactly on it. Far below any distance, and far above what underflows when it is multiplied.
+/// Start of the interval that Embree tests. Embree accepts hits at t = 0, and rays that leave a plane through a
+/// coordinate origin start exactly on it. The value is far below any distance, and large enough not to underflow when
+/// multiplied.
 pub(super) const T_NEAR: f32 = 1e-20;
 
 impl<const N: usize> RayPacket<N> {
@@ -106,7 +107,7 @@ impl<const N: usize> RayHitPacket<N> {
         }
     }
 
-    /// Stores the hits in the block of a query, of which the first ray is that of `lane`.
+    /// Stores the hits in the block of a query, from `lane` on.
     #[inline]
     pub(super) fn store(&self, query: &mut QueryContext<'_>, lane: usize) {
         const { assert!(BLOCK.is_multiple_of(N)) };
@@ -120,7 +121,7 @@ impl<const N: usize> RayHitPacket<N> {
     }
 }
 
-/// The context of queries on a batch.
+/// The context of queries for a batch.
 pub(super) fn query_context<'a>(world: &'a World, rays: &'a RayBatch, mode: Mode) -> QueryContext<'a> {
     let ties = if let QueryKind::First(ties) = mode.query { ties } else { Ties::Noted };
     QueryContext::new(rtc_context(mode), world, rays, ties)
@@ -172,7 +173,8 @@ fn occluded_arguments(context: *mut QueryContext<'_>, mode: Mode) -> sys::RTCOcc
 
 /// # Safety
 /// The scene is committed; the pointers are to live values that nothing else refers to; rays are finite and have a
-/// direction; ids are indices of the context's batch; the context was made with `mode`. So for all four.
+/// direction; ids are indices of the context's batch; the context was made with `mode`. The other three functions have
+/// the same conditions.
 #[inline]
 #[cfg_attr(embree3, expect(unused_variables, reason = "the context holds the mode"))]
 pub(super) unsafe fn intersect1(
@@ -222,7 +224,7 @@ pub(super) unsafe fn intersect_packet<const N: usize>(
 ) {
     const { assert!(N == 4 || N == 8 || N == 16) };
     let (valid, rays): (*const i32, *mut RayHitPacket<N>) = (valid.0.as_ptr(), rays);
-    // SAFETY: by the caller; the layouts are those of the header by the assertions above.
+    // SAFETY: by the caller; the layouts match the header by the assertions above.
     unsafe {
         #[cfg(embree3)]
         match N {
@@ -254,7 +256,7 @@ pub(super) unsafe fn occluded_packet<const N: usize>(
 ) {
     const { assert!(N == 4 || N == 8 || N == 16) };
     let (valid, rays): (*const i32, *mut RayPacket<N>) = (valid.0.as_ptr(), rays);
-    // SAFETY: by the caller; the layouts are those of the header by the assertions above.
+    // SAFETY: by the caller; the layouts match the header by the assertions above.
     unsafe {
         #[cfg(embree3)]
         match N {

@@ -1,47 +1,49 @@
 //! Ray tracing by Embree, 3.13 or 4.x.
 //!
-//! Reading order: [`device`] (errors, memory), [`scene`] (geometries, instances), [`world`] (ids and exact hits),
-//! [`exact`] (exact hits of a block of rays), [`context`] (what the callbacks of a query share), [`callbacks`] (first
-//! hits, cut-outs, quadrics, patches, curves), [`kernels`] (the two families' functions), [`query`] (batches), [`bare`] (Embree
-//! by itself, to compare with).
+//! Reading order: `device` (errors, memory), `scene` (geometries, instances), `world` (ids, exact hits), `exact` (exact
+//! hits of a block of rays), `context` (state of the callbacks of a query), `callbacks` (first hits, alpha masks,
+//! quadrics, patches, curves), `kernels` (functions of both API versions), `query` (batches), [`bare`] (Embree without
+//! the renderer, for comparison).
 //!
-//! # Answers do not depend on packets
+//! # Results do not depend on packets
 //!
-//! Embree decides which triangles a ray meets; all else is exact arithmetic of this program, so a ray has one answer,
-//! to the bit, in packets of any width and beside any neighbours:
+//! Embree decides which triangles a ray hits. Everything else is exact arithmetic of this program. A ray therefore has
+//! the same result, bit for bit, in packets of any width and with any neighbours:
 //!
-//! 1. (t, u, v) of a hit are computed from the vertices by the same function as in [`super::bvh`], in the group's
-//!    space. The two tracers, and processors with other vector units, give the same bits for the same triangle.
-//! 2. Of hits whose parameters as Embree reports them differ by less than 2⁻¹², the exact one that comes first is
-//!    taken, and of equal ones the smallest (instance, geometry, primitive), again as in [`super::bvh`]. A filter sees
-//!    every hit that Embree takes for the nearest so far, and leaves the end of the ray that little beyond it. In
-//!    packets it only notes which rays have two such hits, and these few are traced again by single rays, whose filter
-//!    compares exact hits. Without this the first of a tie is a matter of the order of traversal: among rays at
-//!    vertices of a closed mesh, packets with the coherence flag gave other triangles than single rays for 10 %, at
-//!    edges for 0.2 %, camera rays on coplanar triangles for 13 %.
-//! 3. Packets are traced for first hits of coherent rays and for occlusion. For other first hits Embree 3.13 traces the
+//! 1. (t, u, v) of a hit are computed from the vertices by the same function as in [`super::bvh`], in the space of the
+//!    group. Both tracers, and processors with different vector units, give the same bits for the same triangle.
+//! 2. If the parameters reported by Embree differ by less than 2⁻¹², the hit with the smallest exact parameter is
+//!    taken. Among equal ones it is the smallest (instance, geometry, primitive), as in [`super::bvh`]. A filter
+//!    receives every hit that Embree considers the nearest so far, and sets the end of the ray slightly beyond it. In
+//!    packets it only notes which rays have such a tie. These few rays are traced again as single rays, whose filter
+//!    compares exact hits. Without this, the traversal order would decide. Packets with the coherence flag then gave
+//!    other triangles than single rays for 10 % of the rays at vertices of a closed mesh, for 0.2 % at edges, and for
+//!    13 % of camera rays on coplanar triangles.
+//! 3. Packets are used for first hits of coherent rays and for occlusion. For other first hits Embree 3.13 traces the
 //!    rays of a packet one by one anyway.
-//! 4. Scenes with moving instances are traced by single rays. Embree interpolates and inverts their matrices in another
-//!    way in packets: t differed for 6 % of the rays. For instances at rest no bit differed.
-//! 5. Packets have 4 or 8 rays. With 16, Embree 3.13.5 did not return from scenes with instances on a processor with
-//!    AVX-512, and it is no faster.
+//! 4. Scenes with moving instances are traced by single rays. In packets, Embree interpolates and inverts their
+//!    matrices differently: t differed for 6 % of the rays. For static instances no bit differed.
+//! 5. Packets have 4, 8 or 16 rays, at most the native width of the processor. Packets of 16 are coherent only in
+//!    scenes of triangles without instances: from others, Embree 3.13.5 did not return on a processor with AVX-512.
 //! 6. Rays of unused lanes are empty: Embree 3.13 emulates packets that the processor lacks, and then ignores `valid`.
 //!
-//! Whether a ray meets a triangle at all, by less than a rounding error of its edge, remains Embree's decision. Its
-//! kernels decided alike in all of 2·10⁷ rays (camera, random, along edges, at vertices, grazing; soups, crossing,
-//! coplanar and closed meshes, quadrics, patches, instances) with AVX-512, and 10⁷ each with AVX2, AVX and SSE 4.2,
-//! single and in packets of 4 and 8, with and without the coherence flag: no first hit and no occlusion bit differed.
-//! On another processor (Xeon, 2.5 GHz) the kernels of AVX2 decide otherwise in single rays than in packets at edges and vertices
-//! alone: of 5,003 rays at vertices of a closed mesh, 796 first hits and 13 occlusions differ, and none of camera, random and
-//! grazing rays; with AVX-512, AVX and SSE 4.2 none differ there either. The tests repeat this with fewer rays. Rays that leave a surface by [`lumiris_numbers::math::ray::offset_origin`] do
-//! not meet it again.
+//! If a ray passes an edge of a triangle within the rounding error, Embree decides whether it hits. In 2·10⁷ rays with
+//! AVX-512, all kernels decided alike, and in 10⁷ rays each with AVX2, AVX and SSE 4.2: no first hit and no occlusion
+//! bit differed. The rays were camera rays, random and grazing rays, and rays along edges and at vertices. The scenes
+//! were soups, crossing, coplanar and closed meshes, quadrics, patches and instances. They were traced singly and in
+//! packets of 4 and 8, with and without the coherence flag.
+//!
+//! On another processor (Xeon, 2.5 GHz) the AVX2 kernels decide differently for single rays and packets, but only at
+//! edges and vertices. Of 5,003 rays at vertices of a closed mesh, 796 first hits and 13 occlusions differ; of camera,
+//! random and grazing rays none. With AVX-512, AVX and SSE 4.2 none differ there either. The tests repeat this with
+//! fewer rays. Rays that leave a surface by [`lumiris_numbers::math::ray::offset_origin`] do not hit it again.
 //!
 //! # Cost
 //!
-//! Against a bare loop over Embree with packets filled in advance (`benches/embree.rs`: 10⁶ triangles of the size of a
-//! pixel, 10⁶ rays, one thread): occlusion in packets 0.97–1.04 of its speed, single rays 0.83–0.92. First hits of the
-//! rays of a rendering: 0.44–0.66 in coherent packets, 0.68–0.91 for bounces. A filter that only notes ties costs less
-//! than a nanosecond per coherent ray; the rest is loading rays, exact hits, and storing them (docs/measurements/wavefront).
+//! Speed relative to a bare loop over Embree with prefilled packets (`benches/embree.rs`: 10⁶ pixel-sized triangles,
+//! 10⁶ rays, one thread): occlusion in packets 0.97–1.04, single rays 0.83–0.92. First hits of the rays of a rendering:
+//! 0.44–0.66 in coherent packets, 0.68–0.91 for bounces. The filter that notes ties costs less than a nanosecond per
+//! coherent ray. The rest is loading rays, exact hits, and storing them (docs/measurements/wavefront).
 
 pub mod bare;
 mod callbacks;
@@ -78,7 +80,7 @@ pub enum ErrorCode {
     OutOfMemory,
     UnsupportedCpu,
     Cancelled,
-    /// A code that this program does not know.
+    /// An unknown code.
     Other(u32),
 }
 
@@ -112,26 +114,26 @@ impl fmt::Display for ErrorCode {
     }
 }
 
-/// Why there is no ray tracer.
+/// Reason why the ray tracer cannot be used.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum EmbreeError {
     /// A call failed.
     #[error("Embree cannot {action}: {code}{}{message}", if .message.is_empty() { "" } else { ": " })]
     Call {
-        /// What was tried.
+        /// The failed action.
         action: &'static str,
         /// The kind of error.
         code: ErrorCode,
-        /// What Embree says.
+        /// Embree's message.
         message: String,
     },
-    /// The library was built without something that is needed.
+    /// This build of Embree lacks a required feature.
     #[error("this build of Embree has no {0}")]
     Unsupported(&'static str),
     /// Unsupported packet width.
     #[error("packets of {0} rays are not supported: 1, 4, 8 or 16")]
     PacketWidth(u32),
-    /// A shape has more primitives than 32 bits count.
+    /// A shape has more primitives than a 32-bit index allows.
     #[error("a shape has more than 4294967295 primitives")]
     TooManyPrimitives,
 }
@@ -139,22 +141,22 @@ pub enum EmbreeError {
 /// Options of a tracer.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct EmbreeOptions {
-    /// Rays per packet: 1, 4, 8 or 16; what the processor is fastest with if not given.
+    /// Rays per packet: 1, 4, 8 or 16; by default the fastest width of the processor.
     pub packet_width: Option<u32>,
     /// Maximum memory of Embree (bytes).
     pub memory_limit: Option<u64>,
-    /// Embree's own configuration, for instance `threads=4,isa=avx2`.
+    /// Embree configuration string, for instance `threads=4,isa=avx2`.
     pub config: CString,
 }
 
-/// Rays per packet.
+/// Rays per packet, by coherence.
 #[derive(Clone, Copy, Debug)]
 struct Widths {
-    /// Of rays with similar origins and directions.
+    /// For rays with similar origins and directions.
     coherent: usize,
-    /// Of rays with a common origin or end.
+    /// For rays with a common origin or end.
     packets: usize,
-    /// Of rays without: those of wide packets part soon, and are traced one after the other.
+    /// For other rays. They diverge soon in wide packets and are then traced one by one.
     incoherent: usize,
 }
 
@@ -164,8 +166,8 @@ impl Widths {
     }
 }
 
-/// True if nothing is placed and all is triangles. Elsewhere Embree 3.13.5 may not return from coherent queries
-/// for packets of 16 (seen of occlusion).
+/// True if the scene has only triangles and no instances. In other scenes Embree 3.13.5 may not return from coherent
+/// queries for packets of 16 (observed for occlusion).
 fn has_only_triangles(set: &GeometrySet) -> bool {
     set.instances.is_empty() && set.geometries.iter().all(|g| matches!(g.shape, Shape::Mesh(_)))
 }
@@ -181,7 +183,7 @@ pub struct EmbreeAccel {
 }
 
 impl EmbreeAccel {
-    /// Builds on all cores. Without `alpha`, cut-outs are opaque. `packet_width` is 1, 4, 8 or 16.
+    /// Builds on all cores. Without `alpha`, alpha masks are opaque. `packet_width` is 1, 4, 8 or 16.
     pub fn new(
         geometry: Arc<GeometrySet>,
         alpha: Option<Arc<dyn AlphaSource>>,
@@ -190,7 +192,7 @@ impl EmbreeAccel {
         Self::with_options(geometry, alpha, EmbreeOptions { packet_width, ..EmbreeOptions::default() })
     }
 
-    /// As [`Self::new`], with options.
+    /// Like [`Self::new`], with options.
     pub fn with_options(
         geometry: Arc<GeometrySet>,
         alpha: Option<Arc<dyn AlphaSource>>,
@@ -210,7 +212,7 @@ impl EmbreeAccel {
         Ok(EmbreeAccel { root, world, widths, has_only_triangles, has_motion, stats })
     }
 
-    /// Rays per packet. Where instances move, each ray has a time of its own, and is traced alone.
+    /// Rays per packet. With moving instances each ray has its own time and is traced singly.
     pub fn packet_width(&self, coherence: Coherence) -> u32 {
         let width = match coherence {
             Coherence::Coherent => self.widths.coherent,
@@ -220,7 +222,7 @@ impl EmbreeAccel {
         if self.has_motion { 1 } else { width as u32 }
     }
 
-    /// The same structures, traced with packets of another width: 1, 4, 8 or 16.
+    /// Shares the structures, but traces with packets of another width: 1, 4, 8 or 16.
     pub fn with_packet_width(&self, width: u32) -> Result<EmbreeAccel, EmbreeError> {
         let width = checked_width(width)?;
         let widths = Widths::all(width);
@@ -246,14 +248,14 @@ struct Builder<'a> {
     device: &'a Arc<Device>,
     world: &'a Arc<World>,
     alpha: Option<Arc<dyn AlphaSource>>,
-    /// Whether queries bring a filter.
+    /// True if queries have a filter function.
     query_filter: bool,
 }
 
 impl Builder<'_> {
-    /// The scene of everything, committed.
+    /// The committed root scene.
     fn root(&self) -> Result<EmbreeScene, EmbreeError> {
-        // A scene per group that is placed.
+        // A scene for each group with instances
         let (world, set) = (self.world, &self.world.set);
         let mut groups: Vec<Option<Arc<EmbreeScene>>> = vec![None; set.groups.len()];
         for &i in &world.instances {
@@ -265,7 +267,7 @@ impl Builder<'_> {
             }
         }
 
-        // The root with the placements.
+        // The root scene with the instances
         let mut root = self.scene(&world.root)?;
         for &i in &world.instances {
             let instance = &set.instances[i as usize];
@@ -277,7 +279,7 @@ impl Builder<'_> {
         Ok(root)
     }
 
-    /// A scene of geometries, not committed.
+    /// A scene of geometries, before its commit.
     fn scene(&self, geometries: &[GeometryId]) -> Result<EmbreeScene, EmbreeError> {
         let set = &self.world.set;
         let mut scene = EmbreeScene::new(self.device, set, self.query_filter)?;
@@ -290,8 +292,9 @@ impl Builder<'_> {
     }
 }
 
-/// The requested width, or the widest that pay off.
+/// The requested packet width, or the widest ones that pay off.
 fn packet_widths(device: &Device, asked: Option<u32>, is_plain: bool) -> Result<Widths, EmbreeError> {
+    // Check the features of this build
     if !device.has(Property::RTC_DEVICE_PROPERTY_RAY_MASK_SUPPORTED) {
         return Err(EmbreeError::Unsupported("ray masks"));
     }
@@ -301,10 +304,14 @@ fn packet_widths(device: &Device, asked: Option<u32>, is_plain: bool) -> Result<
     if !device.has(Property::RTC_DEVICE_PROPERTY_USER_GEOMETRY_SUPPORTED) {
         return Err(EmbreeError::Unsupported("user geometry"));
     }
+
+    // The requested width
     if let Some(width) = asked {
         let width = checked_width(width)?;
         return Ok(Widths::all(width));
     }
+
+    // The native widths
     let is_native = |width: &(Property, usize)| device.has(width.0);
     let wide = [
         (Property::RTC_DEVICE_PROPERTY_NATIVE_RAY16_SUPPORTED, 16),

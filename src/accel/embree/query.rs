@@ -1,4 +1,4 @@
-//! Converts batches of rays to Embree's single rays and packets, and the results back.
+//! Conversion of ray batches to Embree's single rays and packets, and of the results.
 #![allow(unsafe_code)]
 
 use super::EmbreeAccel;
@@ -12,7 +12,7 @@ use embree4_sys as sys;
 use lumiris_lanes::hits::BLOCK;
 use std::ops::Range;
 
-/// Maximum number of retries to leave the surface that a ray starts on.
+/// Maximum number of retries to leave the surface on which a ray starts.
 const MAX_RETRIES: u32 = 64;
 
 const FIRST_SINGLE: Mode = Mode { query: QueryKind::First(Ties::Settled), coherent: false };
@@ -44,7 +44,7 @@ impl EmbreeAccel {
         }
     }
 
-    /// Whether packets may be traversed by their common frustum.
+    /// True if packets may be traversed by their common frustum.
     fn is_coherent(&self, coherence: Coherence) -> bool {
         coherence == Coherence::Coherent && (self.packet_width(coherence) < 16 || self.has_only_triangles)
     }
@@ -72,7 +72,7 @@ impl EmbreeAccel {
         });
     }
 
-    /// Traces the rays of a block again that have a tie.
+    /// Traces the rays of a block with ties again.
     #[cold]
     fn settle_ties(&self, context: &mut QueryContext<'_>, block: Range<usize>) {
         let mut single = kernels::query_context(&self.world, context.rays, FIRST_SINGLE);
@@ -84,7 +84,7 @@ impl EmbreeAccel {
         single.finish();
     }
 
-    /// Traces rays block by block: `trace` leaves what Embree reports of a block in the context.
+    /// Traces rays block by block. `trace` stores the hits reported by Embree for a block in the context.
     fn intersect_blocks(
         &self,
         rays: &RayBatch,
@@ -96,8 +96,11 @@ impl EmbreeAccel {
         let mut exact = ExactHits::default();
         for base in (0..rays.len()).step_by(BLOCK) {
             let count = BLOCK.min(rays.len() - base);
+            // Trace a block
             context.begin(base);
             trace(&mut context, base..base + count);
+
+            // Compute exact hits; refine single rays where necessary
             let first = &context.first;
             exact.find(&self.world, rays, base..base + count, first);
             hits.extend((0..count).map(|lane| {
@@ -109,7 +112,7 @@ impl EmbreeAccel {
         context.finish();
     }
 
-    /// Traces ray `i` beyond `tnear`; the hit is left in the lane of the context that belongs to `i`.
+    /// Traces ray `i` from `tnear` on. Stores the hit in its lane of the context.
     #[inline]
     fn trace_one(&self, context: &mut QueryContext<'_>, i: usize, tnear: f32) {
         let rays = context.rays;
@@ -125,10 +128,11 @@ impl EmbreeAccel {
         unsafe { kernels::intersect1(self.root.raw(), context, FIRST_SINGLE, &mut query) };
     }
 
-    /// The exact hit of ray `i`, for which Embree reported `first`. If that is the surface that the ray left, the ray
+    /// The exact hit of ray `i`, for which Embree reported `first`. If this is the surface that the ray left, the ray
     /// is continued behind it.
     #[cold]
     fn refine_one(&self, rays: &RayBatch, i: usize, mut first: Reported) -> Option<Hit> {
+        // Continue behind the surface until there is another hit
         let ray = rays.get(i);
         let mut context = kernels::query_context(&self.world, rays, FIRST_SINGLE);
         let mut exact = self.world.refine(&ray, &first);
@@ -144,6 +148,8 @@ impl EmbreeAccel {
             }
             exact = self.world.refine(&ray, &first);
         }
+
+        // Return the hit
         context.finish();
         match exact {
             Refined::Hit(hit) => Some(hit),
@@ -180,7 +186,7 @@ impl EmbreeAccel {
     }
 }
 
-/// Ray `i` as Embree wants it.
+/// Ray `i` in Embree's format.
 #[inline]
 pub(super) fn single_ray(rays: &RayBatch, i: usize, visibility: Visibility) -> sys::RTCRay {
     sys::RTCRay {
@@ -199,7 +205,7 @@ pub(super) fn single_ray(rays: &RayBatch, i: usize, visibility: Visibility) -> s
     }
 }
 
-/// Fills a packet from ray `base` on; lanes that are −1 in the result hold rays that can be traced.
+/// Fills a packet with the rays from `base` on. Lanes that are −1 in the result hold rays that can be traced.
 #[inline]
 pub(super) fn load<const N: usize>(packet: &mut RayPacket<N>, rays: &RayBatch, base: usize) -> Valid<N> {
     let count = N.min(rays.len() - base);
@@ -220,7 +226,7 @@ pub(super) fn load<const N: usize>(packet: &mut RayPacket<N>, rays: &RayBatch, b
             None => lanes[..count].copy_from_slice(&values[base..]),
         }
     }
-    // As `can_trace`, all lanes by the same steps
+    // Like `can_trace`, but vectorised over the lanes
     let ([ox, oy, oz], [dx, dy, dz]) = (&packet.o, &packet.d);
     let mut valid = Valid([0; N]);
     for lane in 0..N {
@@ -239,8 +245,8 @@ pub(super) fn load<const N: usize>(packet: &mut RayPacket<N>, rays: &RayBatch, b
     valid
 }
 
-/// Empties the rays that cannot be traced: where the processor has no packets of this width, Embree 3.13 traces all
-/// lanes, `valid` or not.
+/// Replaces rays that cannot be traced by empty ones: if the processor lacks packets of this width, Embree 3.13 traces
+/// all lanes regardless of `valid`.
 #[cold]
 fn empty_others<const N: usize>(packet: &mut RayPacket<N>, valid: &Valid<N>) {
     for lane in (0..N).filter(|&lane| valid.0[lane] == 0) {
@@ -250,15 +256,15 @@ fn empty_others<const N: usize>(packet: &mut RayPacket<N>, valid: &Valid<N>) {
     }
 }
 
-/// True if the ray is finite, has a direction and is not empty. Anything else may confuse the traversal.
+/// True if the ray is finite, not empty, and has a direction. Other rays could break the traversal.
 #[inline]
 pub(super) fn can_trace(o: [f32; 3], d: [f32; 3], t_max: f32) -> bool {
-    // x·0 is NaN if x is not finite, which no sum repairs.
+    // x·0 is NaN if x is not finite, and so is the sum
     let zero = o[0] * 0.0 + o[1] * 0.0 + o[2] * 0.0 + d[0] * 0.0 + d[1] * 0.0 + d[2] * 0.0;
     (zero == 0.0) & (t_max > 0.0) & ((d[0] != 0.0) | (d[1] != 0.0) | (d[2] != 0.0))
 }
 
-/// `time` in 0..=1; 0 if it is not a number.
+/// `time` clamped to 0..=1; 0 for NaN.
 #[inline]
 fn unit_time(time: f32) -> f32 {
     if time > 0.0 { time.min(1.0) } else { 0.0 }

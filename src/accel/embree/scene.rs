@@ -1,4 +1,4 @@
-//! Geometries and scenes.
+//! Embree geometries and scenes.
 #![allow(unsafe_code)]
 
 use super::EmbreeError;
@@ -11,20 +11,20 @@ use lumiris_numbers::math::Affine3A;
 use std::ffi::c_void;
 use std::sync::Arc;
 
-/// Rays of any kind may enter an instance; its members have masks of their own.
+/// All kinds of rays may enter an instance. The geometries of its group have their own masks.
 const INSTANCE_MASK: u32 = u32::MAX;
 
-/// The scene flag that lets a query bring a filter.
+/// The scene flag that allows a filter function per query.
 #[cfg(embree3)]
 const QUERY_FILTER: RTCSceneFlags = RTCSceneFlags::RTC_SCENE_FLAG_CONTEXT_FILTER_FUNCTION;
 #[cfg(embree4)]
 const QUERY_FILTER: RTCSceneFlags = RTCSceneFlags::RTC_SCENE_FLAG_FILTER_FUNCTION_IN_ARGUMENTS;
 
-/// A geometry that is being described.
+/// A geometry that is not attached to a scene yet.
 pub(super) struct EmbreeGeometry {
     raw: sys::RTCGeometry,
     device: Arc<Device>,
-    /// What the geometry's callbacks read; moves into the scene.
+    /// User data of the callbacks. Moves into the scene.
     context: Option<Arc<GeometryContext>>,
 }
 
@@ -37,7 +37,7 @@ impl EmbreeGeometry {
         Ok(geometry)
     }
 
-    /// The geometry of a shape, whose buffers it shares. The scene that it is attached to must hold `set`.
+    /// The geometry of a shape, with shared buffers. The scene that it is attached to must hold `set`.
     fn of_shape(
         device: &Arc<Device>,
         set: &GeometrySet,
@@ -59,7 +59,7 @@ impl EmbreeGeometry {
         };
         let user: *mut c_void = Arc::as_ptr(&context).cast_mut().cast();
         // SAFETY: the geometry, then the scene keeps the context, so it outlives the callbacks, which only read it.
-        // Filters serve triangles only: the callbacks of other shapes ask the alpha test themselves.
+        // Filters are for triangles only: the callbacks of other shapes apply the alpha test themselves.
         unsafe {
             sys::rtcSetGeometryUserData(result.raw, user);
             if context.has_alpha() && matches!(geometry.shape, Shape::Mesh(_)) {
@@ -74,7 +74,7 @@ impl EmbreeGeometry {
         Ok(result)
     }
 
-    /// Shares a buffer of `count` elements of three words each.
+    /// Shares a buffer of `count` elements with three words each.
     pub(super) fn share<T>(&self, kind: RTCBufferType, data: *const T, count: usize) -> Result<(), EmbreeError> {
         const { assert!(size_of::<T>() == 12) };
         let vertex = kind == RTCBufferType::RTC_BUFFER_TYPE_VERTEX;
@@ -85,7 +85,7 @@ impl EmbreeGeometry {
         self.device.check("share a buffer of a mesh")
     }
 
-    /// A geometry of `count` primitives that callbacks intersect.
+    /// A geometry of `count` primitives that are intersected by callbacks.
     fn user(device: &Arc<Device>, count: usize) -> Result<Self, EmbreeError> {
         let count = u32::try_from(count).map_err(|_| EmbreeError::TooManyPrimitives)?;
         let result = Self::new(device, RTCGeometryType::RTC_GEOMETRY_TYPE_USER)?;
@@ -100,7 +100,7 @@ impl EmbreeGeometry {
         Ok(result)
     }
 
-    /// A placement of a group's scene.
+    /// An instance of a group's scene.
     fn placing(device: &Arc<Device>, group: &EmbreeScene, instance: &Instance) -> Result<Self, EmbreeError> {
         let result = Self::new(device, RTCGeometryType::RTC_GEOMETRY_TYPE_INSTANCE)?;
         let samples = &instance.world_from_group;
@@ -138,13 +138,13 @@ impl Drop for EmbreeGeometry {
     }
 }
 
-/// A scene, with all that Embree holds pointers to.
+/// A scene, and the owners of all memory that Embree points to.
 pub(super) struct EmbreeScene {
     raw: sys::RTCScene,
     device: Arc<Device>,
     /// User data of the geometries.
     contexts: Vec<Arc<GeometryContext>>,
-    /// Placed scenes.
+    /// Scenes of the instances.
     groups: Vec<Arc<EmbreeScene>>,
     /// Owner of the shared buffers.
     _set: Arc<GeometrySet>,
@@ -157,7 +157,7 @@ unsafe impl Send for EmbreeScene {}
 unsafe impl Sync for EmbreeScene {}
 
 impl EmbreeScene {
-    /// An empty scene; `query_filter`: whether queries bring a filter function.
+    /// An empty scene. `query_filter` is true if queries have a filter function.
     pub(super) fn new(device: &Arc<Device>, set: &Arc<GeometrySet>, query_filter: bool) -> Result<Self, EmbreeError> {
         // SAFETY: the device is live.
         let raw = unsafe { sys::rtcNewScene(device.raw()) };
@@ -179,14 +179,14 @@ impl EmbreeScene {
         Ok(scene)
     }
 
-    /// Adds a shape; ids count from 0 in the order of the calls.
+    /// Adds a shape. Ids count from 0 in the order of the calls.
     pub(super) fn add_shape(&mut self, id: GeometryId, context: GeometryContext) -> Result<(), EmbreeError> {
         let set = Arc::clone(&self._set);
         let geometry = EmbreeGeometry::of_shape(&self.device, &set, id, Arc::new(context))?;
         self.attach(geometry)
     }
 
-    /// Adds a placement of a committed scene.
+    /// Adds an instance of a committed scene.
     pub(super) fn add_instance(&mut self, group: &Arc<EmbreeScene>, instance: &Instance) -> Result<(), EmbreeError> {
         let geometry = EmbreeGeometry::placing(&self.device, group, instance)?;
         if self.groups.last().is_none_or(|last| !Arc::ptr_eq(last, group)) {
@@ -217,14 +217,14 @@ impl EmbreeScene {
 impl Drop for EmbreeScene {
     fn drop(&mut self) {
         if !self.raw.is_null() {
-            // SAFETY: released once. Fields are dropped after this, so what the scene points to outlives it; a scene
-            // that places this one holds it by `Arc`.
+            // SAFETY: released once. Fields are dropped after this, so the memory that the scene points to outlives it.
+            // A scene with instances of this one holds it by `Arc`.
             unsafe { sys::rtcReleaseScene(self.raw) };
         }
     }
 }
 
-/// True if Embree can place a group so: finite, and with an inverse if it stands still.
+/// True if Embree supports the instance: its transforms are finite, and invertible if it is static.
 pub(super) fn can_place(instance: &Instance) -> bool {
     let samples = &instance.world_from_group;
     let flat = samples.len() == 1 && !samples[0].inverse().is_finite();

@@ -1,4 +1,4 @@
-//! Embree against the pure-Rust tracer, and packets against single rays.
+//! Comparison of Embree with the pure-Rust tracer, and of packets with single rays.
 
 use super::*;
 use crate::accel::Bvh;
@@ -25,7 +25,7 @@ fn only_root(shapes: Vec<Shape>) -> Arc<GeometrySet> {
     Arc::new(GeometrySet { geometries: shapes.into_iter().map(opaque).collect(), root, ..GeometrySet::default() })
 }
 
-/// Triangles that lie on each other in a few planes, some of them along the axes.
+/// Overlapping triangles in a few planes, some of them parallel to the axes.
 fn coplanar(s: &mut Pcg32, triangles: u32) -> TriangleMesh {
     let mut corners = Vec::new();
     for k in 0..triangles {
@@ -53,7 +53,7 @@ fn camera_rays(side: usize) -> RayBatch {
     rays
 }
 
-/// Rays at edges (or vertices) of the mesh from a few points; 16 in a row start at one point.
+/// Rays from a few points to edges or vertices of the mesh; 16 consecutive rays start at the same point.
 fn aimed_rays(mesh: &TriangleMesh, count: usize, seed: u32, vertices: bool) -> RayBatch {
     let mut s = pcg32([seed, 6, 6]);
     let (mut rays, mut o) = (RayBatch::default(), Vec3::ZERO);
@@ -70,7 +70,7 @@ fn aimed_rays(mesh: &TriangleMesh, count: usize, seed: u32, vertices: bool) -> R
     rays
 }
 
-/// Rays almost along the planes z = const.
+/// Rays almost parallel to the planes z = const.
 fn grazing_rays(count: usize, seed: u32) -> RayBatch {
     let mut s = pcg32([seed, 7, 7]);
     let mut rays = RayBatch::default();
@@ -108,29 +108,33 @@ fn occluded(accel: &dyn Accel, rays: &RayBatch, coherence: Coherence) -> Vec<boo
     bits
 }
 
-/// A hit to the bit.
+/// The bits of a hit.
 fn bits(hit: &Option<Hit>) -> Option<[u32; 6]> {
     hit.map(|h| [h.t.to_bits(), h.uv[0].to_bits(), h.uv[1].to_bits(), h.geometry, h.primitive, h.instance])
 }
 
-/// True if one of two hits is at an edge of its triangle, where rounding errors decide whether there is one.
+/// True if one of the hits is at an edge of its triangle, where rounding errors decide between hit and miss.
 fn is_at_edge(hits: [&Option<Hit>; 2]) -> bool {
     hits.into_iter().flatten().any(|Hit { uv: [u, v], .. }| u.min(*v).min(1.0 - u - v) < 1e-4)
 }
 
-/// The kernels of AVX2 test edges in single rays by other roundings than in packets, on some processors.
+/// True unless the AVX2 kernels round edge tests differently for single rays and packets, as on some processors.
 fn rounds_edges_alike(config: &CStr) -> bool {
     config != c"isa=avx2" && (config != c"" || is_x86_feature_detected!("avx512f"))
 }
 
-/// Asserts that all widths and coherence flags give the same bits, but for hits at edges where these may be rounded in other ways.
+/// Asserts that all widths and coherence flags give the same bits. Hits at edges are exempt if their rounding may
+/// differ.
 fn assert_widths_agree(name: &str, set: &Arc<GeometrySet>, batches: &[RayBatch], config: &CStr) {
+    // Results of single rays
     let accels = WIDTHS.map(|width| configured(set, width, config));
     let is_exact = rounds_edges_alike(config);
     for (b, rays) in batches.iter().enumerate() {
         let first = intersect(&accels[0], rays, Coherence::Incoherent);
         let first_occluded = occluded(&accels[0], rays, Coherence::Incoherent);
         assert!(first.iter().any(Option::is_some), "{name} {b}: nothing is hit");
+
+        // Compare all widths and coherences
         for (accel, coherence) in accels.iter().flat_map(|a| COHERENCES.map(|c| (a, c))) {
             let what = format!("{config:?}, {name}, batch {b}, width {}, {coherence:?}", accel.packet_width(coherence));
             let other = intersect(accel, rays, coherence);
@@ -141,6 +145,8 @@ fn assert_widths_agree(name: &str, set: &Arc<GeometrySet>, batches: &[RayBatch],
             assert_eq!(hits, None, "{what}");
             let of_edges = (0..rays.len()).filter(|&i| differs(i)).count();
             assert!(of_edges * 4 < rays.len(), "{of_edges}: {what}");
+
+            // Compare occlusion
             let other_occluded = occluded(accel, rays, coherence);
             let differing = (0..rays.len()).find(|&i| first_occluded[i] != other_occluded[i] && !is_free(i));
             assert_eq!(differing, None, "occlusion, {what}");
@@ -159,7 +165,7 @@ fn ray_kinds(mesh: &TriangleMesh, count: usize) -> Vec<RayBatch> {
     ]
 }
 
-/// Asserts the same of many scenes, with `count` rays of each kind.
+/// Asserts the same for many scenes, with `count` rays of each kind.
 fn assert_widths_agree_everywhere(count: usize, config: &CStr) {
     let mut s = pcg32([1, 2, 3]);
     let meshes = [
@@ -183,7 +189,7 @@ fn packets_of_any_width_answer_as_single_rays_do() {
     assert_widths_agree_everywhere(20_003, c"");
 }
 
-/// `side` by `side` quads in a plane, of two triangles each along one of the two diagonals.
+/// `side` × `side` quads in a plane, each of two triangles along one of its diagonals.
 fn grid(side: u32, other_diagonal: bool) -> TriangleMesh {
     let point = |i: u32| {
         let (x, y) = ((i % (side + 1)) as f32 / side as f32 - 0.5, (i / (side + 1)) as f32 / side as f32 - 0.5);
@@ -233,7 +239,7 @@ fn answers_agree_with_the_rust_tracer() {
             (intersect(&reference, &rays, Coherence::Packets), intersect(&accel, &rays, Coherence::Packets));
         let hits = expected.iter().flatten().count();
         assert!(hits > 10_000, "{hits}");
-        // Rays by an edge may differ, and hits of the same t.
+        // Rays at edges may differ, and hits with the same t
         let differ = expected.iter().zip(&found).filter(|(a, b)| bits(a) != bits(b)).count();
         assert!(differ <= 3, "{differ} of {hits}");
         let (expected, found) =
@@ -246,12 +252,15 @@ fn answers_agree_with_the_rust_tracer() {
 
 #[test]
 fn answers_agree_with_brute_force_in_f64() {
+    // Trace with Embree
     let mut s = pcg32([4, 0, 1]);
     let mesh = soup(&mut s, 300, 0.4);
     let set = only_root(vec![Shape::Mesh(mesh.clone())]);
     let accel = embree(&set, 8);
     let rays = random_rays(20_000, 8);
     let (hits, shadows) = (intersect(&accel, &rays, Coherence::Packets), occluded(&accel, &rays, Coherence::Packets));
+
+    // Compare with the nearest of all triangles
     let (mut hit_count, mut unclear) = (0, 0);
     for (i, (hit, &shadow)) in hits.iter().zip(&shadows).enumerate() {
         let ray = rays.get(i);
@@ -277,11 +286,14 @@ fn answers_agree_with_brute_force_in_f64() {
 fn rays_that_leave_a_surface_do_not_meet_it_again() {
     let mut s = pcg32([12, 0, 0]);
     let mut tested = 0;
+    // A triangle of any size and position
     for k in 0..60 {
         let (center, scale) = (random_point(&mut s) * 300.0, [0.01, 1.0, 50.0, 2000.0][k % 4]);
         let corners = (0..3).map(|_| center + random_point(&mut s) * scale).collect();
         let set = only_root(vec![Shape::Mesh(separate_triangles(corners))]);
         let accel = embree(&set, 8);
+
+        // Rays that leave it on both sides
         let mut rays = RayBatch::default();
         for _ in 0..20_000 {
             let u = s.random::<[f32; 2]>();
@@ -293,6 +305,8 @@ fn rays_that_leave_a_surface_do_not_meet_it_again() {
                 rays.push(&Ray { o: offset_origin(hit.p, hit.p_error, hit.n, d), d, t_max: f32::INFINITY, time: 0.0 });
             }
         }
+
+        // No ray hits it again
         tested += rays.len();
         for coherence in [Coherence::Packets, Coherence::Incoherent] {
             let again = intersect(&accel, &rays, coherence).iter().flatten().count();
@@ -342,6 +356,7 @@ fn rays_that_are_not_finite_or_empty_hit_nothing() {
 
 #[test]
 fn flat_and_infinite_placements_are_left_out() {
+    // Two unusable instances and a good one
     let placed = |m| Instance { group: 0, world_from_group: vec![m] };
     let set = GeometrySet {
         geometries: vec![opaque(Shape::Mesh(rippled_sphere(20)))],
@@ -358,6 +373,8 @@ fn flat_and_infinite_placements_are_left_out() {
     for x in [0.0, 4.0] {
         rays.push(&Ray { o: Vec3::new(x, 0.1, 3.0), d: -Vec3::Z, t_max: f32::INFINITY, time: 0.0 });
     }
+
+    // Only the last one is hit
     let hits = intersect(&accel, &rays, Coherence::Packets);
     assert_eq!(hits.iter().map(|h| h.map(|h| h.instance)).collect::<Vec<_>>(), [None, Some(2)]);
 }
@@ -385,7 +402,7 @@ fn a_misaligned_buffer_is_an_error_that_says_so() {
     let vertices = embree4_sys::RTCBufferType::RTC_BUFFER_TYPE_VERTEX;
     let error = geometry.share(vertices, askew, 3).unwrap_err();
     assert!(error.to_string().contains("cannot share a buffer of a mesh: invalid"), "{error}");
-    // It is reported once.
+    // The error is reported once
     assert_eq!(device.check("do nothing"), Ok(()));
 }
 
@@ -428,7 +445,7 @@ fn many_instances_build_fast_and_small() {
     };
     let accel = EmbreeAccel::new(Arc::new(set), None, None).unwrap();
     let stats = accel.stats();
-    // 30 k triangles take some 3 MB, an instance some hundred bytes of hierarchy.
+    // 30,000 triangles take about 3 MB, an instance about a hundred bytes of hierarchy
     assert!(stats.bytes < 40_000_000 && stats.peak_bytes < 80_000_000, "{stats:?}");
     let hits = intersect(&accel, &random_rays(1000, 1), Coherence::Packets);
     assert!(hits.iter().flatten().count() > 300);

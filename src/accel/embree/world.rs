@@ -1,4 +1,4 @@
-//! Maps Embree's ids to those of the scene, and Embree's hits to exact ones.
+//! Conversion of Embree's ids to ids of the scene, and of Embree's hits to exact hits.
 
 use crate::accel::Hit;
 use crate::geometry::triangle::{RayPrecomputed, intersect_triangle};
@@ -6,14 +6,14 @@ use crate::geometry::{GeometryId, GeometrySet, Group, Shape};
 use lumiris_numbers::math::{Affine3A, Ray, Vec3};
 use std::sync::Arc;
 
-/// What Embree reports of a hit.
+/// A hit reported by Embree.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Reported {
-    /// `geomID`, of the scene that holds the geometry.
+    /// `geomID` in the scene that contains the geometry.
     pub geometry: u32,
     /// `primID`.
     pub primitive: u32,
-    /// `instID[0]`, `u32::MAX` in the root.
+    /// `instID[0]`; `u32::MAX` in the root.
     pub instance: u32,
     /// Ray parameter.
     pub t: f32,
@@ -21,14 +21,14 @@ pub(super) struct Reported {
     pub uv: [f32; 2],
 }
 
-/// What a reported hit turns out to be.
+/// Result of the exact computation of a reported hit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Refined {
     /// A hit.
     Hit(Hit),
-    /// Its exact parameter is not positive: the surface that the ray left.
+    /// The exact parameter is not positive: the surface that the ray left.
     Behind,
-    /// Its exact parameter is not below `t_max`.
+    /// The exact parameter is not below `t_max`.
     Beyond,
 }
 
@@ -37,19 +37,19 @@ pub(super) enum Refined {
 pub(super) struct World {
     /// The scene.
     pub set: Arc<GeometrySet>,
-    /// Geometry of each id in Embree's root scene; instances follow.
+    /// Geometry of each id in Embree's root scene. Instances have the ids after them.
     pub root: Vec<GeometryId>,
-    /// Geometry of each id in the scene of a group.
+    /// Geometry of each id in the scene of each group.
     pub groups: Vec<Vec<GeometryId>>,
     /// Instances in Embree's root scene.
     pub instances: Vec<u32>,
-    /// Per instance that does not move.
+    /// Inverse transforms of static instances.
     group_from_world: Vec<Option<Affine3A>>,
 }
 
 impl Refined {
-    /// True if this is to be taken rather than `other`: it is a hit, and first, or of hits at the same place the one
-    /// with the smallest (instance, geometry, primitive), as in the Rust tracer.
+    /// True if this is a hit that precedes `other`: by t, and for equal t by (instance, geometry, primitive), as in the
+    /// Rust tracer.
     pub(super) fn precedes(&self, other: &Refined) -> bool {
         let key = |h: &Hit| (h.instance, h.geometry, h.primitive);
         match (self, other) {
@@ -61,7 +61,7 @@ impl Refined {
 }
 
 impl World {
-    /// Assigns ids to everything that rays can hit. `can_place` is true for usable instances.
+    /// Assigns ids to everything that rays can hit. `can_place` is true for supported instances.
     pub(super) fn new(set: Arc<GeometrySet>, can_place: impl Fn(u32) -> bool) -> World {
         let members = |group: &Group| group.geometries.iter().copied().filter(|&id| can_be_met(&set, id)).collect();
         let groups: Vec<Vec<GeometryId>> = set.groups.iter().map(members).collect();
@@ -91,7 +91,7 @@ impl World {
         self.groups[self.set.instances[instance as usize].group as usize][geom_id as usize]
     }
 
-    /// The ray in the space of the group that `instance` places.
+    /// The ray in the space of the group of `instance`.
     #[inline]
     pub(super) fn group_ray(&self, world: &Ray, instance: u32) -> Ray {
         if instance == Hit::NO_INSTANCE {
@@ -111,7 +111,7 @@ impl World {
         self.refine_primitive(world_ray, geometry, instance, reported)
     }
 
-    /// As [`Self::refine`], with Embree's `geomID` and `instID` translated.
+    /// Like [`Self::refine`], with translated `geomID` and `instID`.
     #[inline]
     pub(super) fn refine_primitive(
         &self,
@@ -125,7 +125,7 @@ impl World {
             let hit = Hit { t, uv, geometry, primitive, instance };
             if t < ray.t_max { Refined::Hit(hit) } else { Refined::Beyond }
         };
-        // Other shapes come from callbacks that are exact.
+        // Hits of other shapes come from callbacks and are exact already
         let Shape::Mesh(mesh) = &self.set.geometries[geometry as usize].shape else {
             return hit_at(reported.t, reported.uv);
         };
@@ -143,8 +143,9 @@ impl World {
     }
 }
 
-/// Where a ray that Embree lets hit a triangle, but that exactly runs by its edge, meets the triangle's plane, and the
-/// weights of vertices 1 and 2 of a point of the triangle near by. `None` if the triangle has no plane.
+/// Hit of a ray that Embree accepts although it exactly passes by an edge of the triangle: the parameter at which it
+/// intersects the triangle's plane, and the weights of vertices 1 and 2 of a nearby point of the triangle. `None` if
+/// the triangle has no plane.
 #[cold]
 fn beside(ray: &Ray, triangle: [Vec3; 3]) -> Option<(f32, [f32; 2])> {
     let [p0, p1, p2] = triangle.map(Vec3::as_dvec3);
@@ -160,7 +161,7 @@ fn beside(ray: &Ray, triangle: [Vec3; 3]) -> Option<(f32, [f32; 2])> {
     (found.0.is_finite() && sum.is_finite()).then_some(found)
 }
 
-/// True if some ray can see the geometry and it has primitives.
+/// True if the geometry has primitives and is visible to some ray.
 fn can_be_met(set: &GeometrySet, id: GeometryId) -> bool {
     let geometry = &set.geometries[id as usize];
     let count = match &geometry.shape {

@@ -30,6 +30,8 @@ fn the_closed_form_is_the_mean_of_the_walk() {
         (warp::direction(0.3, 0.0), warp::direction(0.8, 3.0)),
         (warp::direction(0.15, 0.0), warp::direction(0.4, 1.0)),
     ];
+
+    // η, roughness, reflectance of the base, maximum depth
     let cases = [
         (1.5, ggx(0.0, 0.0), 0.9, 10),
         (1.5, ggx(0.0, 0.0), 1.0, 3),
@@ -47,6 +49,8 @@ fn the_closed_form_is_the_mean_of_the_walk() {
         let table = CoatTable::for_roughness(eta, 0.01, distribution);
         let closed = CoatedDiffuse::new(&table, distribution, Rgb::splat(rho), max_depth);
         let walk = over_lambert(Dielectric { eta, distribution }, rho, max_depth);
+
+        // Random walks against the closed form
         for (wo, wi) in pairs {
             let w = walk_moments(&walk, wo, wi, 256_000);
             let f = f64::from(Bsdf::CoatedDiffuse(closed).f(wo, wi).r);

@@ -91,6 +91,7 @@ fn samples_follow_their_density_by_chi_squared() {
     let mut failures = Vec::new();
     for (i, (name, b)) in zoo.iter().enumerate() {
         for (j, &wo) in directions.iter().enumerate() {
+            // Expected and observed counts
             let probabilities = expected(&|wi| b.pdf(wo, wi));
             let total: f64 = probabilities[..thetas() * phis()].iter().sum();
             let expected: Vec<f64> = probabilities.iter().map(|p| p * samples() as f64).collect();

@@ -54,6 +54,8 @@ pub(super) fn zoo<'a>(tables: &'a [CoatTable]) -> Vec<(String, Bsdf<'a>)> {
         ("no interface".into(), Bsdf::Dielectric(glass(1.0, 0.3))),
         ("thin".into(), Bsdf::ThinDielectric(ThinDielectric { eta: 1.5 })),
     ];
+
+    // Coats
     for (i, table) in tables.iter().enumerate() {
         let coated = CoatedDiffuse::new(table, distributions()[i], RED, 10);
         zoo.push((format!("coated {:?}", distributions()[i]), Bsdf::CoatedDiffuse(coated)));
@@ -69,6 +71,8 @@ pub(super) fn zoo<'a>(tables: &'a [CoatTable]) -> Vec<(String, Bsdf<'a>)> {
         layered(glass(1.5, 0.0), lambert, 0.9, 0.7),
     ];
     zoo.extend(layers.iter().enumerate().map(|(i, &l)| (format!("layered {i}"), Bsdf::Layered(l))));
+
+    // Models with tests of their own
     zoo.extend(principled().map(|(name, b)| (format!("principled {name}"), Bsdf::Principled(b))));
     zoo.extend(hair().map(|(name, b)| (format!("hair {name}"), Bsdf::Hair(b))));
     zoo.extend(measured::measured().map(|(name, b)| (format!("measured {name}"), Bsdf::Measured(b))));

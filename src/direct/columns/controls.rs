@@ -1,10 +1,11 @@
-//! Control variates of the estimates of a batch: what each component of the mixture has of the samples, less its share.
+//! Control variates of the estimates of a batch: means of r_j = h_j/p_α minus their expectations, for every component j
+//! of the mixture.
 //!
-//! The means of r_j = h_j/p_α over the samples of a vertex, as in [`crate::direct::mixture`], for the groups of lights,
-//! and for the first of two lobes where the BSDF may have two: the other column of the BSDF depends on these. As there, a
-//! sample whose unshadowed integrand is zero belongs to the component that drew it, and the density of BSDF sampling is 0 for
-//! a light sample that another emitter hides. Columns do not depend on the weights of the techniques: a sample without a weight
-//! has the densities of both.
+//! The columns are defined in [`crate::direct::mixture`]. Here they cover the light groups, and the first of two lobes
+//! if BSDFs may have two; the column of the other lobe depends on these. As there, a sample with a zero unshadowed
+//! integrand belongs to the component that drew it, and the density of BSDF sampling is 0 for a light sample hidden by
+//! another emitter. Columns do not depend on MIS weights: a sample with the weight 0 has the densities of both
+//! techniques.
 
 use super::emitters::EmitterRays;
 use super::samples::{SampleColumns, Traced};
@@ -20,9 +21,9 @@ use lumiris_numbers::math::Vec3;
 pub(super) struct Controls {
     /// Groups, then the lobe.
     sums: Vec<[f32; MAX_COMPONENTS]>,
-    /// The place of the lobe, if BSDFs may have two.
+    /// Index of the lobe, if BSDFs may have two.
     lobe: Option<usize>,
-    /// What the last sample of each vertex has of light sampling.
+    /// r_j/N of light sampling of the last sample of each vertex.
     parts: Vec<f32>,
     is_hidden: Vec<bool>,
     /// Rows without control variates.
@@ -33,12 +34,15 @@ pub(super) struct Controls {
 }
 
 impl Controls {
-    /// Begins vertices, with their columns at the negative of the expectation. `scratch` has begun with them.
+    /// Begins a batch: sets the columns of each vertex to the negative expectation. `scratch` must have begun the same
+    /// batch.
     pub(super) fn begin(&mut self, job: &RenderJob, vertices: &Vertices<'_>, scratch: &mut Scratch) {
         self.sums.clear();
         self.sums.resize(vertices.len(), [0.0; MAX_COMPONENTS]);
         self.is_left_out.clear();
         self.is_left_out.resize(vertices.len(), false);
+
+        // Light groups
         let (lights, at) = (&job.lights, vertices.surface.lit_points());
         if let Some(light) = lights.sampler.only_light() {
             let group = lights.groups.group_of(light).unwrap_or(0);
@@ -49,6 +53,8 @@ impl Controls {
                 sums.iter_mut().zip(pmfs).for_each(|(sum, pmf)| *sum = -pmf);
             }
         }
+
+        // Lobe
         self.lobe = job.has_two_lobes().then(|| lights.groups.len());
         if let Some(lobe) = self.lobe {
             for (i, bsdf) in vertices.bsdfs.iter().enumerate() {
@@ -57,7 +63,7 @@ impl Controls {
         }
     }
 
-    /// Adds a traced light sample of each vertex; there are `n_light` and `n_bsdf` of both techniques.
+    /// Adds a traced light sample of each vertex. `n_light` and `n_bsdf` are the sample counts of the techniques.
     pub(super) fn add_light_samples(
         &mut self,
         job: &RenderJob,
@@ -70,6 +76,8 @@ impl Controls {
         for (&i, _) in self.hidden_of.iter().zip(&self.occluded).filter(|(_, occluded)| **occluded) {
             self.parts[i as usize] = 1.0 / n_light;
         }
+
+        // Light groups
         let groups = &job.lights.groups;
         let group_of_only = job.lights.sampler.only_light().map(|light| groups.group_of(light));
         for (i, (sums, part)) in self.sums.iter_mut().zip(&self.parts).enumerate() {
@@ -77,6 +85,8 @@ impl Controls {
                 sums[group] += part;
             }
         }
+
+        // Lobe
         let Some(lobe) = self.lobe else { return };
         for (i, bsdf) in vertices.bsdfs.iter().enumerate() {
             let (p_light, p_bsdf) = (samples.light.pdf[i], samples.bsdf.pdf[i]);
@@ -109,8 +119,8 @@ impl Controls {
         self.add_lobes([n_light, n_bsdf], samples, vertices);
     }
 
-    /// Sets the parts of light sampling in samples of one technique whose integrand is not zero; all others are their own
-    /// technique's alone.
+    /// Sets the parts of light sampling in samples of one technique. A sample with a zero integrand belongs to its own
+    /// technique.
     fn divide(&mut self, [n_light, n_bsdf]: [f32; 2], samples: &SampleColumns, by_light: bool) {
         let n = self.sums.len();
         self.parts.resize(n, 0.0);
@@ -122,7 +132,7 @@ impl Controls {
         }
     }
 
-    /// Adds the part of the first lobe in a BSDF sample of each vertex.
+    /// Adds the column of the first lobe for a BSDF sample of each vertex.
     fn add_lobes(&mut self, [n_light, n_bsdf]: [f32; 2], samples: &SampleColumns, vertices: &Vertices<'_>) {
         let Some(lobe) = self.lobe else { return };
         for (i, bsdf) in vertices.bsdfs.iter().enumerate() {
@@ -139,17 +149,17 @@ impl Controls {
         }
     }
 
-    /// Has no control variates for these rows, whose samples are others.
+    /// Excludes rows with a different allocation from control variates.
     pub(super) fn leave_out(&mut self, rows: impl Iterator<Item = usize>) {
         rows.for_each(|i| self.is_left_out[i] = true);
     }
 
-    /// The controls of a vertex, of which the first ones are there.
+    /// The controls of a vertex; only the first components are used.
     pub(super) fn of(&self, i: usize) -> &[f32; MAX_COMPONENTS] {
         if self.is_left_out[i] { &[0.0; MAX_COMPONENTS] } else { &self.sums[i] }
     }
 
-    /// Determines which samples of light that BSDF sampling could draw as well are hidden by another emitter.
+    /// Determines which light samples that BSDF sampling could draw as well are hidden by another emitter.
     fn find_hidden(&mut self, job: &RenderJob, samples: &SampleColumns, traced: &Traced) {
         self.is_hidden.clear();
         self.is_hidden.resize(self.sums.len(), false);

@@ -1,4 +1,4 @@
-//! What BSDF samples point at.
+//! Emitters in the directions of BSDF samples.
 
 use super::samples::SampleColumns;
 use crate::accel::RayBatch;
@@ -10,7 +10,7 @@ use crate::scene::{EmitterHit, EmitterScratch, RenderJob};
 use lumiris_lanes::columns::padded;
 use lumiris_numbers::math::Ray;
 
-/// Directions of BSDF sampling among the emitters.
+/// Rays of BSDF samples, traced against emitters only.
 #[derive(Debug, Default)]
 pub(super) struct EmitterRays {
     /// Rows of their vertices.
@@ -18,15 +18,15 @@ pub(super) struct EmitterRays {
     rays: RayBatch,
     scratch: EmitterScratch,
     emitter_hits: Vec<Option<EmitterHit>>,
-    /// The light that each sample points at, if there is one that is no infinite light.
+    /// The light that each sample hits; `None` for infinite lights or no light.
     pub(super) lights: Vec<Option<LightId>>,
-    /// Those of them that meet nothing.
+    /// Rows whose rays hit nothing.
     far: Vec<u32>,
 }
 
 impl EmitterRays {
-    /// Looks up what the BSDF samples of the first `n` vertices point at; those that point at nothing get the density 0. Returns the
-    /// number of rays among the emitters.
+    /// Finds the emitters of the BSDF samples of the first `n` vertices. Samples without an emitter get the density 0.
+    /// Returns the number of emitter rays.
     pub(super) fn find(
         &mut self,
         job: &RenderJob,
@@ -55,7 +55,7 @@ impl EmitterRays {
             Ray { o, d, t_max: f32::INFINITY, time: time[i] }
         };
 
-        // The emitters: among a few in lanes, else by rays
+        // A few emitters are intersected in lanes, many by the ray tracer
         let (o, d) = (samples.o.get(len), samples.light.wi.get(len));
         if let Some(hit) = job.world.intersect_few_emitters(o, d, scratch) {
             for i in rows.iter().map(|&i| i as usize) {
@@ -69,7 +69,7 @@ impl EmitterRays {
             rows.iter().zip(&*emitter_hits).for_each(|(&i, hit)| add(samples, i as usize, *hit));
         }
 
-        // Infinite lights, where there is none
+        // Infinite lights for rays without a hit
         let SampleColumns { light: LightSamples { wi, li, pdf, is_far, is_delta, .. }, bsdf, .. } = samples;
         let p_bsdf = &mut bsdf.pdf;
         let directions = wi;
@@ -89,7 +89,7 @@ impl EmitterRays {
     }
 }
 
-/// What BSDF sample `i` points at.
+/// Sets the emitter of BSDF sample `i`.
 fn set_emitter(samples: &mut LightSamples, i: usize, found: &EmitterInDirection) {
     samples.li.set_rgb(i, found.li);
     samples.pdf[i] = if samples.is_delta[i] { 0.0 } else { found.p_light };

@@ -1,4 +1,4 @@
-//! Direct light of vertices in columns, by estimators that trace every sample that they draw: `mc`, `mis`, and `ocv` over
+//! Direct light at vertices, in columns, for estimators that trace all their samples: `mc`, `mis`, and `ocv` over
 //! pixels.
 //!
 //! ```text
@@ -6,12 +6,12 @@
 //!          └BSDF samples──▶ emitters among which they are looked up ─▶ f·cos, weights ─segments─▶ T2 ─▶ radiance
 //! ```
 //!
-//! Each step is a loop over rows, for one sample of each. The first rows may have other numbers of samples than most: where all
-//! lobes are specular, light samples are of no use, and where the path cannot continue by a BSDF sample, its own are drawn.
-//! Samples beyond those of most rows are made for the first rows only.
+//! Each step is a loop over rows, for one sample of each row. The first rows may have a different allocation than most
+//! rows. If all lobes are specular, light samples are useless; if the path cannot continue by the BSDF sample, BSDF
+//! samples are drawn here. Samples beyond the allocation of most rows are made for the first rows only.
 //!
-//! Reading order: [`techniques`] (how many samples), [`samples`] (columns), [`emitters`] (what BSDF samples point at),
-//! [`controls`] (control variates, for `ocv`); this file goes through the steps.
+//! Reading order: [`techniques`] (number of samples), [`samples`] (columns), [`emitters`] (emitters hit by BSDF
+//! samples), [`controls`] (control variates of `ocv`); this file has the steps.
 
 mod controls;
 mod emitters;
@@ -42,28 +42,28 @@ use lumiris_numbers::samplers::{SampleStream, Split};
 use samples::{SampleColumns, Traced};
 use std::time::Instant;
 
-/// The part of a light sample that is left, where light paths bring the rest: of the sample of a row, that of a point on a
-/// light with its normal, in a direction.
+/// MIS weight of a light sample against light paths. Arguments: row, light, normal at the point on the light, and
+/// direction.
 pub type Rest<'a> = dyn Fn(usize, LightId, Vec3, Vec3) -> f32 + 'a;
 
-/// Takes the row, the light (`None`: all infinite ones), the direction and the contribution of a visible sample.
+/// Receives row, light (`None`: all infinite lights), direction and contribution of a visible sample.
 pub type Visible<'a> = dyn FnMut(usize, Option<LightId>, Vec3, Rgb) + 'a;
 
-/// What else the samples are asked for, and told to.
+/// Callbacks of the samples.
 #[derive(Default)]
 pub struct Sinks<'a> {
-    /// Factor of light samples.
+    /// MIS weight of light samples against light paths.
     pub rest: Option<&'a Rest<'a>>,
-    /// Takes the samples that are visible.
+    /// Receives the visible samples.
     pub visible: Option<&'a mut Visible<'a>>,
-    /// Takes copies of the segments.
+    /// Receives copies of the segments.
     pub segments: Option<&'a mut Vec<RayBatch>>,
 }
 
-/// Estimates direct light of vertices in columns; holds the buffers of one worker.
+/// Estimates direct light at vertices in columns; holds the buffers of one worker.
 #[derive(Debug, Default)]
 pub struct ColumnStage {
-    /// Numbers of samples of the rows that differ from the others, which are the first ones.
+    /// Allocations of the first rows, which may differ from [`Batch::usual`].
     allocations: Vec<SampleAllocation>,
     samples: SampleColumns,
     drawn: Vec<SampleStream>,
@@ -79,28 +79,28 @@ pub struct ColumnStage {
 /// A sample of each vertex.
 #[derive(Clone, Copy, Debug)]
 struct Draw {
-    /// Of light sampling; else of BSDF sampling.
+    /// True for light sampling, false for BSDF sampling.
     by_light: bool,
-    /// Its number among the samples of the technique.
+    /// Index among the samples of the technique.
     index: u32,
-    /// The first rows, which have so many samples: all, or those with other numbers than most.
+    /// Number of rows to sample: all, or only the first rows with a different allocation.
     rows: usize,
-    /// Most rows have so many.
+    /// True if most rows have this sample.
     is_usual: bool,
 }
 
-/// What all steps read.
+/// Common input of all steps.
 #[derive(Clone, Copy)]
 struct Batch<'a, 'w> {
     job: &'a RenderJob,
     techniques: &'a Techniques,
     vertices: &'a Vertices<'w>,
-    /// Numbers of samples of most rows.
+    /// The allocation of most rows.
     usual: SampleAllocation,
 }
 
 impl Batch<'_, '_> {
-    /// A sample of the rows that have so many; `unusual` rows have other numbers than most.
+    /// Sample `index` of a technique. The first `unusual` rows may have a different allocation.
     fn draw(&self, by_light: bool, index: u32, unusual: usize) -> Draw {
         let usual = if by_light { self.usual.light_draws } else { self.usual.bsdf_draws };
         let is_usual = index < usual;
@@ -115,7 +115,7 @@ impl ColumnStage {
         self.radiance.rgb(row)
     }
 
-    /// The control variates of a row, where there are some.
+    /// The control variates of a row.
     pub fn controls(&self, job: &RenderJob, row: usize) -> &[f32] {
         &self.controls.of(row)[..job.controls()]
     }
@@ -132,10 +132,14 @@ impl ColumnStage {
         if vertices.is_empty() {
             return;
         }
+
+        // Allocations
         let start = Instant::now();
         let batch = Batch { job, techniques, vertices, usual: techniques.usual() };
         let [light, bsdf] = self.begin(&batch, stats);
         stats.select += start.elapsed();
+
+        // Light samples
         for index in 0..light {
             let start = Instant::now();
             let draw = batch.draw(true, index, self.allocations.len());
@@ -144,6 +148,8 @@ impl ColumnStage {
             stats.t1_light += proposed - start;
             self.add_controls(&batch, draw);
         }
+
+        // BSDF samples
         for index in 0..bsdf {
             let start = Instant::now();
             let draw = batch.draw(false, index, self.allocations.len());
@@ -153,7 +159,7 @@ impl ColumnStage {
         }
     }
 
-    /// Begins vertices without light; returns how many samples of each technique some of them draw.
+    /// Begins a batch with black radiance. Returns the maximum number of samples of each technique.
     fn begin(&mut self, batch: &Batch<'_, '_>, stats: &mut DirectStats) -> [u32; 2] {
         let Batch { job, techniques, vertices, usual } = *batch;
         let (n, len) = (vertices.len(), padded(vertices.len()));
@@ -161,7 +167,7 @@ impl ColumnStage {
         self.radiance.reserve(len);
         self.radiance.get_mut(len).into_iter().for_each(|c| c.fill(0.0));
 
-        // Numbers of samples
+        // Allocations
         let unusual = if techniques.are_drawn() { n } else { vertices.bsdfs.len() };
         self.allocations.clear();
         self.allocations
@@ -176,7 +182,7 @@ impl ColumnStage {
         stats.light_proposals += sum(light);
         stats.proposals += sum(light) + sum(bsdf);
 
-        // The choice of lights
+        // Choice of lights
         self.scratch.begin(&job.lights, n, vertices.surface.lit_points());
         if techniques.has_controls {
             self.controls.begin(job, vertices, &mut self.scratch);
@@ -186,8 +192,8 @@ impl ColumnStage {
         [most(light), most(bsdf)]
     }
 
-    /// Adds the last sample of each vertex to its control variates, if there are any: rows with other numbers of samples have
-    /// none.
+    /// Adds the last sample of each vertex to its control variates, if they are enabled. Rows with a different
+    /// allocation have no control variates.
     fn add_controls(&mut self, batch: &Batch<'_, '_>, draw: Draw) {
         if !batch.techniques.has_controls || !draw.is_usual {
             return;
@@ -201,7 +207,7 @@ impl ColumnStage {
         }
     }
 
-    /// Draws the numbers of a sample of each vertex.
+    /// Draws the random numbers of a sample of each vertex.
     fn draw(&mut self, batch: &Batch<'_, '_>, draw: Draw) {
         let of = |a: &SampleAllocation| if draw.by_light { a.light_draws } else { a.bsdf_draws };
         let key = if draw.by_light { domain::LIGHT } else { domain::BSDF };
@@ -216,7 +222,7 @@ impl ColumnStage {
         sampler::draw(level(), &self.drawn, self.samples.u.each_mut().map(|u| &mut u[..n]));
     }
 
-    /// Leaves out the samples of rows that have fewer of them.
+    /// Removes the sample at rows with fewer samples.
     fn leave_out(&mut self, draw: Draw) {
         for (i, allocation) in self.allocations.iter().enumerate() {
             let draws = if draw.by_light { allocation.light_draws } else { allocation.bsdf_draws };
@@ -226,12 +232,12 @@ impl ColumnStage {
         }
     }
 
-    /// The light that the light sample of a row is of.
+    /// The light of the light sample of a row.
     fn light_of(&self, job: &RenderJob, row: usize) -> LightId {
         job.lights.sampler.only_light().unwrap_or_else(|| self.scratch.chosen(row))
     }
 
-    /// A light sample of each vertex, with its contribution.
+    /// Draws a light sample of each vertex, with its contribution.
     fn sample_lights(&mut self, batch: &Batch<'_, '_>, draw: Draw, rest: Option<&Rest<'_>>) {
         let Batch { job, techniques, vertices, .. } = *batch;
         let n = draw.rows;
@@ -241,7 +247,7 @@ impl ColumnStage {
         self.leave_out(draw);
         self.leave_out_glows(batch, draw);
 
-        // Their values and the densities of BSDF sampling
+        // BSDF values and densities of BSDF sampling
         let SampleColumns { light, bsdf: BsdfSamples { f_cos, pdf, .. }, .. } = &mut self.samples;
         vertices.evaluate(n, &light.wi, f_cos, pdf);
         if let Some(rest) = rest {
@@ -260,8 +266,8 @@ impl ColumnStage {
         self.weigh(batch, draw);
     }
 
-    /// Leaves out light samples of media where the path does not continue by its BSDF sample: near by, what media send out
-    /// would have no other technique, and the next segment finds it.
+    /// Removes light samples of emitting media if the BSDF sample is not the next path segment. Nearby, no other
+    /// technique would sample the emission of media, and the next segment receives it.
     fn leave_out_glows(&mut self, batch: &Batch<'_, '_>, draw: Draw) {
         let Batch { job, techniques, vertices, .. } = *batch;
         if !job.world.scene.media.is_emissive() {
@@ -276,12 +282,13 @@ impl ColumnStage {
         }
     }
 
-    /// A BSDF sample of each vertex and the emitter in its direction, with its contribution. Returns the number of rays
-    /// among the emitters.
+    /// Draws a BSDF sample of each vertex with its emitter and contribution. Returns the number of emitter rays.
     fn sample_bsdfs(&mut self, batch: &Batch<'_, '_>, draw: Draw) -> u64 {
         let Batch { job, techniques, vertices, .. } = *batch;
         let n = draw.rows;
         self.draw(batch, draw);
+
+        // Directions
         let SampleColumns { u, light, bsdf, .. } = &mut self.samples;
         vertices.sample(n, u, bsdf);
         std::mem::swap(&mut light.wi, &mut bsdf.wi);
@@ -293,13 +300,14 @@ impl ColumnStage {
         }
         self.leave_out(draw);
 
+        // Emitters
         self.samples.make_origins(&vertices.surface, padded(n));
         let count = self.emitter_rays.find(job, (vertices, n), &mut self.samples);
         self.weigh(batch, draw);
         count
     }
 
-    /// The contributions of the samples of one technique.
+    /// Computes the contributions of the samples of one technique.
     fn weigh(&mut self, batch: &Batch<'_, '_>, Draw { by_light, rows, .. }: Draw) {
         let (len, Batch { techniques, usual, .. }) = (padded(rows), *batch);
         let SampleColumns { light, bsdf: BsdfSamples { f_cos, pdf: p_bsdf, .. }, c, .. } = &mut self.samples;
@@ -317,8 +325,8 @@ impl ColumnStage {
         }
     }
 
-    /// Traces the segments of the samples that contribute, and adds the contributions of those that are visible. Returns when
-    /// tracing began; sampling did at `start`.
+    /// Traces the segments of contributing samples, and adds the visible contributions. `start` is the start time of
+    /// sampling. Returns the start time of tracing.
     fn trace(
         &mut self,
         batch: &Batch<'_, '_>,
@@ -327,7 +335,7 @@ impl ColumnStage {
         (stats, start): (&mut DirectStats, Instant),
     ) -> Instant {
         let Batch { job, techniques, vertices, .. } = *batch;
-        // Without a weight, a light sample that an emitter hides has control variates of its own all the same
+        // Control variates of a light sample need its occlusion by emitters, even if its weight is 0
         let hides = draw.by_light && techniques.has_controls && job.world.emitters_hide();
         let is_traced = |samples: &SampleColumns, i: usize| {
             !samples.c.rgb(i).is_black() || hides && samples.bsdf.pdf[i] > 0.0 && samples.has_integrand(i, true)
@@ -359,14 +367,19 @@ impl ColumnStage {
         proposed
     }
 
-    /// Whether the segments are occluded. Contributions of those that may pass surfaces or media are multiplied by an
-    /// estimate of the transmittance: without surfaces to pass, segments that begin in empty space stay there.
+    /// Determines the occlusion of the segments. Contributions of segments that may pass surfaces or media are
+    /// multiplied by an estimate of the transmittance. Without passable surfaces, segments that begin in empty space
+    /// stay there.
     fn occlude(&mut self, batch: &Batch<'_, '_>, draw: Draw, stats: &mut DirectStats) {
         let Batch { job, vertices, .. } = *batch;
         let Traced { rows, rays, occluded, crossing, crossing_rays } = &mut self.traced;
+
+        // Segments that may pass surfaces or media
         let crosses = |row: u32| job.shadows_pass() || vertices.media(row as usize) != Sides::default();
         crossing.clear();
         crossing.extend((0..rows.len() as u32).filter(|&k| crosses(rows[k as usize])));
+
+        // Occlusion of the others
         if crossing.len() < rows.len() {
             job.world.accel.occluded(rays, Coherence::Packets, occluded);
             stats.segments += (rays.len() - crossing.len()) as u64;
@@ -377,15 +390,19 @@ impl ColumnStage {
         if crossing.is_empty() {
             return;
         }
+
+        // Transmittance
         crossing_rays.clear();
         crossing.iter().for_each(|&k| crossing_rays.push(&rays.get(k as usize)));
         self.cross(batch, draw, stats);
     }
 
-    /// Lets segments pass surfaces and media.
+    /// Estimates the transmittance of segments that may pass surfaces or media.
     fn cross(&mut self, batch: &Batch<'_, '_>, draw: Draw, stats: &mut DirectStats) {
         let Batch { job, vertices, .. } = *batch;
         let mut crossing = std::mem::take(&mut self.crossing);
+
+        // Light, medium and random numbers of each segment
         let row = |traced: &Traced, k: usize| traced.rows[traced.crossing[k] as usize] as usize;
         let departure = |k: usize, d: Vec3| {
             let i = row(&self.traced, k);
@@ -398,6 +415,8 @@ impl ColumnStage {
             let medium = vertices.media(i).towards(vertices.surface.n.vec3(i).dot(d));
             Departure { light, medium, stream: vertices.direct[i].domain(domain::TRANSMITTANCE + index) }
         };
+
+        // Trace, and multiply the contributions
         crossing.start(job, &self.traced.crossing_rays, departure);
         stats.segments += crossing.trace(job);
         stats.collisions += crossing.collisions();
@@ -410,7 +429,7 @@ impl ColumnStage {
     }
 }
 
-/// The factor w/(n·p) of a sample of the first technique, of which n and p are given.
+/// The factor w/(n·p) of a sample of the first technique, given n and p of both techniques.
 fn factor(heuristic: Heuristic, [n, p]: [f32; 2], [n_other, p_other]: [f32; 2]) -> f32 {
     heuristic.factor(Technique { n, p }, Technique { n: n_other, p: p_other })
 }

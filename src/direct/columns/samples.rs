@@ -1,4 +1,4 @@
-//! Columns of samples: one sample of a technique for each vertex, and the segments of those that are traced.
+//! Columns of samples: one sample of a technique for each vertex, and shadow segments.
 
 use crate::accel::RayBatch;
 use crate::direct::vertices::{BsdfSamples, Surface};
@@ -11,10 +11,10 @@ use lumiris_lanes::vertex::{self as kernels, Ends, Rays};
 #[derive(Debug, Default)]
 pub(super) struct SampleColumns {
     pub(super) u: [Column; 3],
-    /// Directions and the light that comes along them, with the density of light sampling.
+    /// Directions with incident radiance and the density of light sampling.
     pub(super) light: LightSamples,
-    /// Values, and the density of BSDF sampling. The density of the technique is 0 where there is no sample, and the density of
-    /// the other one where only this one can draw it.
+    /// Values of the BSDF, and the density of BSDF sampling. The density of a technique is 0 if there is no sample. The
+    /// density of the other technique is 0 if only this one can sample the direction.
     pub(super) bsdf: BsdfSamples,
     /// Contributions.
     pub(super) c: Columns3,
@@ -25,7 +25,7 @@ pub(super) struct SampleColumns {
 }
 
 impl SampleColumns {
-    /// Lengthens the columns if they are shorter.
+    /// Extends the columns to at least `len`.
     pub(super) fn reserve(&mut self, len: usize) {
         let SampleColumns { u: [u0, u1, u2], light, bsdf, c, o, d, t_max } = self;
         light.reserve(len);
@@ -34,27 +34,27 @@ impl SampleColumns {
         reserve(&mut [u0, u1, u2, t_max], len);
     }
 
-    /// True if sample `i`, of light or of BSDF sampling, has an unshadowed integrand f·|cos θ|·L that is not zero, whatever
-    /// its weight is.
+    /// True if the unshadowed integrand f·|cos θ|·L of sample `i` is not zero, regardless of its weight. `by_light`
+    /// selects the density of light sampling or of BSDF sampling.
     #[inline]
     pub(super) fn has_integrand(&self, i: usize, by_light: bool) -> bool {
         let p = if by_light { self.light.pdf[i] } else { self.bsdf.pdf[i] };
         (p > 0.0) & !(self.bsdf.f_cos.rgb(i) * self.light.li.rgb(i)).is_black()
     }
 
-    /// Leaves out the sample of light or of BSDF sampling of a vertex.
+    /// Removes the light sample or the BSDF sample of a vertex.
     #[inline]
     pub(super) fn leave_out(&mut self, i: usize, by_light: bool) {
         let p = if by_light { &mut self.light.pdf } else { &mut self.bsdf.pdf };
         p[i] = 0.0;
     }
 
-    /// Origins of rays that leave the first `len` vertices in the directions of the samples.
+    /// Computes the ray origins at the first `len` vertices, in the directions of the samples.
     pub(super) fn make_origins(&mut self, from: &Surface, len: usize) {
         kernels::origins(level(), &from.ends(len), self.light.wi.get(len), &mut self.o.get_mut(len));
     }
 
-    /// Segments from the first `len` vertices to the ends of the samples.
+    /// Computes the segments from the first `len` vertices to the ends of the samples.
     pub(super) fn make_segments(&mut self, from: &Surface, len: usize) {
         let SampleColumns { light, o, d, t_max, .. } = self;
         let to = Ends { p: light.p.get(len), p_error: light.p_error.get(len), n: light.n.get(len) };
@@ -63,21 +63,21 @@ impl SampleColumns {
     }
 }
 
-/// Segments of the samples that are traced.
+/// Shadow segments of the samples.
 #[derive(Debug, Default)]
 pub(super) struct Traced {
     /// Rows of their vertices.
     pub(super) rows: Vec<u32>,
     pub(super) rays: RayBatch,
     pub(super) occluded: Vec<bool>,
-    /// Which of them may pass surfaces or media, and copies of these.
+    /// Indices of the segments that may pass surfaces or media, and copies of these segments.
     pub(super) crossing: Vec<u32>,
     /// See [`Self::crossing`].
     pub(super) crossing_rays: RayBatch,
 }
 
 impl Traced {
-    /// Takes the segments of these rows, whose times are given.
+    /// Collects the segments of the given rows; `time` is a column.
     pub(super) fn gather(
         &mut self,
         rows: impl Iterator<Item = u32>,
@@ -89,6 +89,8 @@ impl Traced {
         index.clear();
         index.extend(rows);
         rays.clear();
+
+        // Compact each column
         let ([ox, oy, oz], [dx, dy, dz]) = (samples.o.get(len), samples.d.get(len));
         let columns = [
             (&mut rays.ox, ox),
@@ -105,7 +107,7 @@ impl Traced {
         }
     }
 
-    /// Rows of the segments that are unoccluded.
+    /// Rows of the unoccluded segments.
     pub(super) fn visible(&self) -> impl Iterator<Item = usize> {
         self.rows.iter().zip(&self.occluded).filter(|(_, occluded)| !**occluded).map(|(&i, _)| i as usize)
     }

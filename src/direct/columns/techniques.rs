@@ -1,4 +1,4 @@
-//! How many samples of each technique a vertex has.
+//! Number of samples per technique at a vertex.
 
 use crate::bsdfs::Bsdf;
 use crate::direct::Estimator;
@@ -10,15 +10,15 @@ use crate::settings::OcvForm;
 use lumiris_numbers::estimators::mis::Heuristic;
 use lumiris_numbers::samplers::SampleStream;
 
-/// The samples of light and of BSDF sampling at the vertices of a batch, which are all traced.
+/// Light and BSDF samples at the vertices of a batch, for estimators that trace all samples.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Techniques {
     samples: Samples,
     /// Weights of the techniques.
     pub heuristic: Heuristic,
-    /// The only BSDF sample is the next segment of the path, which finds the emitter.
+    /// True if the only BSDF sample is the next segment of the path, which hits the emitter.
     by_path: bool,
-    /// Control variates are determined as well.
+    /// True if control variates are computed as well.
     pub has_controls: bool,
 }
 
@@ -29,11 +29,11 @@ enum Samples {
 }
 
 impl Techniques {
-    /// Those of an estimator, at vertices where paths may continue; `None` if it selects among its samples, or is fitted to
-    /// them.
+    /// The techniques of an estimator. `continues` is true if paths may continue from the vertices. Returns `None` for
+    /// estimators that select among their samples or are fitted to them.
     pub fn of(estimator: &Estimator, continues: bool) -> Option<Self> {
         let (samples, has_controls) = match *estimator {
-            // A single technique has the weight 1 by any heuristic
+            // A single technique has the weight 1 with any heuristic
             Estimator::Mc(mc) => {
                 return Some(Techniques {
                     samples: Samples::Mc(mc),
@@ -54,14 +54,14 @@ impl Techniques {
         Some(Techniques { samples: Samples::Mis(samples), heuristic: samples.heuristic, by_path, has_controls })
     }
 
-    /// True if the path continues by the only BSDF sample of a vertex, unless its BSDF can only be evaluated. The sample
-    /// counts in the weights of light samples, and is not drawn here.
+    /// True if the only BSDF sample of a vertex is the next path segment, unless the BSDF can only be evaluated. The
+    /// sample counts in the weights of light samples, and is not drawn here.
     #[inline]
     pub fn are_by_path(&self) -> bool {
         self.by_path
     }
 
-    /// Number of light samples beside that BSDF sample.
+    /// Number of light samples at most vertices.
     pub fn light_samples(&self) -> f32 {
         self.usual().n_light
     }
@@ -71,12 +71,12 @@ impl Techniques {
         matches!(self.samples, Samples::Mc(_))
     }
 
-    /// True if a single sample draws its technique.
+    /// True if the technique of a single sample is chosen at random.
     pub(super) fn are_drawn(&self) -> bool {
         matches!(self.samples, Samples::Mis(Mis { samples: 1, .. }))
     }
 
-    /// Numbers of samples where they do not depend on the BSDF.
+    /// The allocation at most vertices, where it does not depend on the BSDF.
     pub(super) fn usual(&self) -> SampleAllocation {
         match self.samples {
             Samples::Mc(mc) => SampleAllocation::fixed(mc.samples, 0),
@@ -88,7 +88,7 @@ impl Techniques {
         }
     }
 
-    /// Numbers of samples at a vertex of this BSDF, with the random numbers of its direct light.
+    /// The allocation at a vertex with this BSDF; `stream` has the random numbers of direct light.
     pub(super) fn allocation(&self, bsdf: &Bsdf<'_>, stream: &SampleStream) -> SampleAllocation {
         match self.samples {
             Samples::Mc(mc) => mc::allocation(mc.samples, bsdf),

@@ -1,27 +1,27 @@
-//! Direct light sampled separately from the contributing lights 𝓛_con, which the visibility cache finds, and from all
-//! others [Keller and Wald 2000, §3].
+//! Separate sampling of the contributing lights 𝓛_con, given by the visibility cache, and of all other lights [Keller
+//! and Wald 2000, §3].
 //!
-//! S_con samples are taken on 𝓛_con in proportion to w_l = E_l·√V̂_l, the density of least variance: E_l is the light's
-//! irradiance without shadows, on glossy surfaces weighted by what is reflected, V̂_l its visibility as photons tell it
-//! ([`crate::lights::learned_visibility`]). With m_l = S_con·w_l/Σ w, light l gets ⌊m_l⌋ or ⌈m_l⌉ samples by systematic
-//! resampling. If m_l ≥ 1, it counts their mean; otherwise it has a sample with probability m_l, which counts 1/m_l times.
-//! Where there are more than [`MAX_WEIGHTED`] such lights, S_con of them are chosen in proportion to their numbers of
-//! photons.
+//! S_con samples are taken on 𝓛_con in proportion to w_l = E_l·√V̂_l, the density of minimum variance. E_l is the
+//! unshadowed irradiance of the light, on glossy surfaces weighted by the reflection. V̂_l is its visibility estimated
+//! from photons ([`crate::lights::learned_visibility`]). With m_l = S_con·w_l/Σ w, light l gets ⌊m_l⌋ or ⌈m_l⌉ samples
+//! by systematic resampling. If m_l ≥ 1, the light contributes the mean of its samples. Otherwise it has one sample
+//! with probability m_l, whose weight is 1/m_l. If there are more than [`MAX_WEIGHTED`] contributing lights, S_con
+//! lights are chosen in proportion to their photon counts.
 //!
-//! S_non samples are taken on the non-contributing lights, which a descent of the light tree chooses nearly in proportion
-//! to E_l·√V̂_l, where V̂_l is that of a light without photons: lights of which many photons were expected get few of these
-//! samples, and those beside lights with a single photon more. A contributing light that is chosen counts 0. A sample of
-//! the light l, chosen with probability p_l, survives Russian roulette with probability
-//! q_l = min(1, [`SURVIVAL`]·(E_l·√V̂_l/p_l)/Σ E·V̂), by what is expected of it relative to the contributing lights, and
-//! counts 1/(p_l·q_l) times. So every sum has the right expectation whatever the photons
-//! tell; without these samples (S_non = 0) the estimate is biased, and light samples are all that is taken.
+//! S_non samples are taken on the non-contributing lights. A descent of the light tree chooses them nearly in
+//! proportion to E_l·√V̂_l, where V̂_l is the visibility of a light without photons. So lights with many expected
+//! photons get few of these samples, and neighbours of lights with a single photon get more. A contributing light that
+//! is chosen counts 0. A sample of light l, chosen with probability p_l, survives Russian roulette with probability q_l
+//! = min(1, [`SURVIVAL`]·(E_l·√V̂_l/p_l)/Σ E·V̂), its expected contribution relative to the contributing lights. Its
+//! weight is 1/(p_l·q_l). So every sum has the right expectation for any photons. Without these samples (S_non = 0),
+//! the estimate is biased, and no BSDF samples are taken.
 //!
-//! Light samples alone leave bright spots on glossy surfaces. There S_b BSDF samples are combined with them by multiple
-//! importance sampling [Veach and Guibas 1995]: a direction that points at the light l has the density r_l·p_l of light
-//! samples, where p_l is that of the light's own samples, and r_l the number of them that is expected at the point.
+//! Light samples alone leave fireflies on glossy surfaces. There, S_b BSDF samples are combined with them by multiple
+//! importance sampling [Veach and Guibas 1995]. A direction towards light l has the light-sampling density r_l·p_l,
+//! where p_l is the density of the samples of the light, and r_l the expected number of its samples at the point.
 //!
-//! Where no light contributes, all S_con + S_non samples are taken on non-contributing lights, without roulette. Without
-//! a visibility cache, or one that is empty, they are drawn as by `mc`.
+//! If no light contributes, all S_con + S_non samples are taken on non-contributing lights, without roulette. Without a
+//! visibility cache, or with an empty one, light samples are drawn as by `mc`.
 
 use super::mc;
 use crate::bsdfs::Bsdf;
@@ -38,26 +38,27 @@ use lumiris_numbers::estimators::mis::Heuristic;
 use lumiris_numbers::math::cumulative;
 use std::ops::Range;
 
-/// Maximum number of contributing lights whose weights are compared at a point.
+/// Maximum number of contributing lights that are weighted at a point.
 pub const MAX_WEIGHTED: usize = 64;
-/// Survival probability of a sample of non-contributing lights, per part of the expected contribution of the others.
+/// Survival probability of a sample of non-contributing lights, per expected contribution relative to the contributing
+/// lights.
 const SURVIVAL: f32 = 3.0;
 
-/// Light sampling, separately of contributing and of non-contributing lights, and BSDF sampling of glossy surfaces.
+/// Separate light sampling of contributing and non-contributing lights, and BSDF sampling of glossy surfaces.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Contributing {
     /// Samples on contributing lights (S_con).
     pub samples: u32,
     /// Samples on non-contributing lights (S_non).
     pub noncontributing_samples: u32,
-    /// BSDF samples where the BSDF is not diffuse (S_b).
+    /// BSDF samples at BSDFs that are not diffuse (S_b).
     pub bsdf_samples: u32,
     /// Weights of light and BSDF samples.
     pub heuristic: Heuristic,
 }
 
 impl Contributing {
-    /// Number of BSDF samples that are combined with the light samples at a point.
+    /// Number of BSDF samples at a point that are combined with the light samples.
     fn bsdf_samples_at(&self, bsdf: &Bsdf<'_>) -> u32 {
         match bsdf {
             Bsdf::Diffuse(_) | Bsdf::DiffuseTransmission(_) | Bsdf::Evaluated(_) => 0,
@@ -65,7 +66,8 @@ impl Contributing {
         }
     }
 
-    /// Densities of light samples include their expected numbers.
+    /// The allocation at a point. The expected number of light samples is 1, since their densities include their
+    /// numbers.
     fn allocation(&self, point: &ShadingPoint<'_>) -> SampleAllocation {
         let only = mc::allocation_at(point);
         match self.bsdf_samples_at(&point.bsdf.bsdf) {
@@ -99,12 +101,12 @@ impl Contributing {
     }
 }
 
-/// What is kept from batch to batch, to save allocations.
+/// Buffers kept from batch to batch.
 #[derive(Debug, Default)]
 pub(super) struct Buffers {
     /// Weights of the contributing lights of a point.
     weights: Vec<f32>,
-    /// Expected numbers of samples of contributing lights, point by point.
+    /// Expected sample counts of contributing lights, point by point.
     rates: Vec<f32>,
     /// Contributing lights with one photon, by [`LearnedVisibility::find_singles`], point by point.
     singles: Vec<u32>,
@@ -115,30 +117,31 @@ struct Draws<'a, 'b> {
     estimator: Contributing,
     job: &'a RenderJob,
     buffers: &'b mut Buffers,
-    /// How they were drawn at each point that has BSDF samples; empty if none has.
+    /// Description of the draws at each point with BSDF samples; empty if there is none.
     of_points: Vec<Option<Drawn<'a>>>,
 }
 
-/// How the light samples of a point were drawn.
+/// Description of the light samples drawn at a point.
 #[derive(Clone, Debug)]
 struct Drawn<'a> {
     /// 𝓛_con with photon counts.
     seen: ContributingLights<'a>,
-    /// Samples on them (S_con).
+    /// Samples on 𝓛_con (S_con).
     n: u32,
-    /// The part of [`Buffers::rates`] that are theirs; none where they are chosen by their photons.
+    /// Range of their rates in [`Buffers::rates`]; empty if lights are chosen by photon counts.
     rates: Range<usize>,
-    /// The part of [`Buffers::singles`].
+    /// Range in [`Buffers::singles`].
     singles: Range<usize>,
     others: Others,
 }
 
-/// How lights that are not in 𝓛_con were sampled.
+/// Sampling of lights outside 𝓛_con.
 #[derive(Clone, Copy, Debug)]
 enum Others {
-    /// n times, and as many survive as their expected contribution times `scale` says.
+    /// n samples of lights without photons, which survive with a probability of their expected contribution times
+    /// `scale`.
     Unseen { n: u32, scale: f32 },
-    /// n times by the light sampler, as all lights were.
+    /// n samples of all lights by the light sampler.
     BySampler { n: u32 },
 }
 
@@ -162,7 +165,7 @@ impl Drawn<'_> {
         if pmf > 0.0 && unseen.importance > 0.0 { n * pmf * survival(&unseen, scale) } else { 0.0 }
     }
 
-    /// Expected number of samples of contributing light number `k`, where these are chosen by their photons.
+    /// Expected number of samples of contributing light number `k`, chosen in proportion to photon counts.
     #[inline]
     fn rate_by_photons(&self, k: usize) -> f32 {
         let total = self.seen.sums.last().map_or(1.0, |&total| total as f32);
@@ -170,14 +173,13 @@ impl Drawn<'_> {
     }
 }
 
-/// Survival probability of a sample of a light without photons, where that of one with the expected contribution 1 is
-/// `scale`.
+/// Survival probability of a sample of a light without photons; `scale` is the probability per expected contribution.
 #[inline]
 fn survival(unseen: &UnseenLight, scale: f32) -> f32 {
     (unseen.importance * unseen.visibility.sqrt() / unseen.choice.pmf * scale).min(1.0)
 }
 
-/// A point and the lights that are sampled from it.
+/// A point with its lights.
 struct At<'a, 'p> {
     lights: &'a LightSampling,
     learned: &'a LearnedVisibility,
@@ -188,12 +190,12 @@ struct At<'a, 'p> {
 }
 
 impl At<'_, '_> {
-    /// A sample of a light of which `rate` samples are expected.
+    /// The candidate of a light sample. `rate` is the expected number of samples of the light.
     fn sample(&self, light: LightId, rate: f32, u: [f32; 2], of_all: (&Drawn<'_>, &Buffers)) -> Option<Candidate> {
         let mut sample = self.lights.lights[light as usize].sample_li(&self.ctx, u)?;
         sample.pdf *= rate;
         if self.n_bsdf > 0.0 && self.overlaps(light) {
-            // A direction of BSDF sampling belongs to all of them together
+            // Infinite lights overlap: all of them contribute to a direction
             let rate = |ctx: &LightCtx, light| of_all.0.rate(self.lights, of_all.1, ctx, light);
             (sample.li, sample.pdf) = self.lights.infinite_in_direction_by(&self.ctx, sample.wi, rate);
         }
@@ -201,25 +203,25 @@ impl At<'_, '_> {
         unshadowed_candidate((self.index, self.point), &allocation, (light, sample))
     }
 
-    /// True if directions to the light are directions to others as well.
+    /// True if other infinite lights overlap with the light.
     fn overlaps(&self, light: LightId) -> bool {
         self.lights.infinite.len() > 1 && self.lights.infinite.contains(&light)
     }
 
-    /// Expected number of samples of a contributing light of which `wanted` would be best, where `count` are drawn.
+    /// Expected number of samples of a contributing light, with the ideal number `wanted` and the drawn number `count`.
     fn rate(&self, light: LightId, wanted: f32, count: u32) -> f32 {
-        // Numbers of two lights depend on the same random number
+        // The counts of overlapping lights depend on the same random number, so their drawn numbers cannot be used
         if wanted < 1.0 || self.n_bsdf > 0.0 && self.overlaps(light) { wanted } else { count as f32 }
     }
 }
 
-/// Numbers that are wanted, Σ weights·`scale`, and those that are drawn by systematic resampling with `offset` in [0, 1).
+/// Ideal sample counts weight·`scale`, and the counts drawn by systematic resampling with `offset` in [0, 1).
 fn systematic(weights: &[f32], scale: f32, offset: f32) -> impl Iterator<Item = (f32, u32)> {
     let (mut upto, mut given) = (offset, 0);
     weights.iter().map(move |&weight| {
         let wanted = weight * scale;
         upto += wanted;
-        // At least one sample where one or more are wanted, whatever rounding does
+        // Rounding must not remove the sample of a light with an ideal count of 1 or more
         let count = (upto as u32).saturating_sub(given).max(u32::from(wanted >= 1.0));
         given = upto as u32;
         (wanted, count)
@@ -227,7 +229,7 @@ fn systematic(weights: &[f32], scale: f32, offset: f32) -> impl Iterator<Item = 
 }
 
 impl Draws<'_, '_> {
-    /// Draws the light samples of a point. Returns their number.
+    /// Draws the light samples of a point. Returns the number of samples.
     fn draw(
         &mut self,
         (index, point): (u32, &ShadingPoint<'_>),
@@ -247,6 +249,8 @@ impl Draws<'_, '_> {
             singles: singles.len()..singles.len(),
             others: Others::BySampler { n: n + n_non },
         };
+
+        // By the visibility cache, or else by the light sampler
         let by_cache = lights.learned_visibility().and_then(|learned| {
             let ctx = point.light_ctx();
             let at = At { lights, learned, index, point, ctx, n_bsdf };
@@ -257,6 +261,8 @@ impl Draws<'_, '_> {
             let allocation = SampleAllocation { n_bsdf, ..SampleAllocation::fixed(n + n_non, 0) };
             light_samples::draw(self.job, (index, point), &allocation, records)
         });
+
+        // BSDF samples need the expected sample counts of the lights
         if n_bsdf > 0.0 {
             self.of_points.resize(index as usize, None);
             self.of_points.push(Some(drawn));
@@ -267,8 +273,8 @@ impl Draws<'_, '_> {
         count
     }
 
-    /// Draws the light samples of a point by what photons tell. Returns their number; `None`, and no samples, if they
-    /// tell of no contribution.
+    /// Draws the light samples of a point by the visibility cache. Returns the number of samples. Returns `None`,
+    /// without samples, if the expected contribution is 0 or not finite.
     fn draw_by_cache(
         &mut self,
         at: &At<'_, '_>,
@@ -281,11 +287,15 @@ impl Draws<'_, '_> {
             drawn.others = Others::Unseen { n: n + n_non, scale: f32::INFINITY };
             return Some(at.draw_unseen((drawn, self.buffers), records));
         }
+
+        // Expected contribution Σ E·V̂
         let expected = if seen.len() <= MAX_WEIGHTED {
             self.weigh(at, &drawn.seen)?
         } else {
             seen.iter().map(|&(light, count)| at.learned.irradiance_of(light, count)).sum()
         };
+
+        // Survival of samples of non-contributing lights
         at.learned.find_singles(&drawn.seen, &mut self.buffers.singles);
         drawn.singles.end = self.buffers.singles.len();
         drawn.others = Others::Unseen { n: n_non, scale: SURVIVAL / expected };
@@ -297,7 +307,7 @@ impl Draws<'_, '_> {
         Some(n + at.draw_unseen((drawn, self.buffers), records))
     }
 
-    /// Weighs the contributing lights by E·√V̂. Returns Σ E·V̂; `None` if it is not known.
+    /// Weights the contributing lights by E·√V̂. Returns Σ E·V̂; `None` if the sums are 0 or not finite.
     fn weigh(&mut self, at: &At<'_, '_>, seen: &ContributingLights<'_>) -> Option<f32> {
         let weights = &mut self.buffers.weights;
         weights.clear();
@@ -312,7 +322,7 @@ impl Draws<'_, '_> {
         (sum > 0.0 && sum.is_finite() && expected > 0.0).then_some(expected)
     }
 
-    /// Samples of the contributing lights, in proportion to their weights.
+    /// Draws samples of the contributing lights, in proportion to their weights.
     fn draw_weighted(&mut self, at: &At<'_, '_>, drawn: &mut Drawn<'_>, records: &mut Vec<Candidate>) {
         let Buffers { weights, rates, .. } = &mut *self.buffers;
         let [offset] = at.point.stream.domain(domain::COUNTS).draw::<1>();
@@ -332,7 +342,7 @@ impl Draws<'_, '_> {
         }
     }
 
-    /// Samples of contributing lights, chosen in proportion to their numbers of photons.
+    /// Draws samples of contributing lights, chosen in proportion to their photon counts.
     fn draw_by_photons(&self, at: &At<'_, '_>, drawn: &Drawn<'_>, records: &mut Vec<Candidate>) {
         let (ContributingLights { lights, sums }, n) = (drawn.seen, drawn.n);
         let Some(&total) = sums.last() else { return };
@@ -346,8 +356,8 @@ impl Draws<'_, '_> {
 }
 
 impl At<'_, '_> {
-    /// Samples of the lights without photons, of which as many survive as their expected contribution says. Returns how
-    /// many.
+    /// Draws samples of the lights without photons, with roulette by their expected contribution. Returns the number of
+    /// surviving samples.
     fn draw_unseen(&self, (drawn, buffers): (&Drawn<'_>, &Buffers), records: &mut Vec<Candidate>) -> u32 {
         let Others::Unseen { n, scale } = drawn.others else { return 0 };
         if drawn.seen.lights.len() == self.lights.lit.len() {

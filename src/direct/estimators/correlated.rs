@@ -1,24 +1,24 @@
-//! Combined correlated and importance sampling [Szécsi, Sbert and Szirmay-Kalos 2004]: all N samples of a point are
-//! drawn by one technique with density p, and are also samples of a control variate g whose integral G is known.
+//! Combined correlated and importance sampling [Szécsi, Sbert and Szirmay-Kalos 2004]. All N samples of a point are
+//! drawn by one technique with density p. They are also samples of a control variate g with the known integral G.
 //!
-//! g(wi) = (1/π) Σ L̄ cos θ over the lights that the ray towards wi crosses, G = E/π: the radiance that a Lambertian
-//! surface of albedo 1 would reflect to wo if all lights were unoccluded, even by one another, and had their mean
+//! g(wi) = (1/π) Σ L̄ cos θ over the lights crossed by the ray towards wi, and G = E/π. This is the radiance that a
+//! white Lambertian surface would reflect to wo if all lights were unoccluded, even by one another, and had their mean
 //! radiance L̄ everywhere. θ is measured from the shading normal on the side of wo, and g = 0 on the other side.
-//! [`crate::lights::irradiance`] decides which lights take part; the others do not contribute to g. The estimate is ȳ −
-//! λ c̄ with y = f·V/p and c = g/p − G, see [`lumiris_numbers::estimators::correlated`].
+//! [`crate::lights::irradiance`] decides which lights contribute to g. The estimate is ȳ − λ c̄ with y = f·V/p and c =
+//! g/p − G, see [`lumiris_numbers::estimators::correlated`].
 //!
-//! * **BSDF sampling.** g is summed over all lights along the ray. E(c) = 0 requires p > 0 wherever g > 0, and a useful
+//! * **BSDF sampling.** g is summed over all lights along the ray. E(c) = 0 requires p > 0 wherever g > 0, and a low
 //!   variance requires a bounded g/p. Both hold for BSDFs that sample a cosine or uniform lobe on the side of wo with a
-//!   probability of at least [`MIN_WIDE_LOBE`] ([`crate::bsdfs::Bsdf::wide_lobe`]): diffuse, most coated and layered
-//!   ones, and those that can only be evaluated. Mirror directions of a smooth coat are samples with g = 0. All other
-//!   BSDFs (metal, glass) have a negligible density over most of the hemisphere; for them g = 0 everywhere, which
+//!   probability of at least [`MIN_WIDE_LOBE`] ([`crate::bsdfs::Bsdf::wide_lobe`]): diffuse BSDFs, most coated and
+//!   layered ones, and BSDFs that can only be evaluated. Mirror directions of a smooth coat are samples with g = 0. All
+//!   other BSDFs (metal, glass) have a negligible density over most of the hemisphere. For them g = 0 everywhere, which
 //!   leaves importance sampling. Delta lights have separate samples, one in four and at least one, whose estimate is
-//!   added; a single sample chooses at random which of the two it is.
-//! * **Light sampling.** The domain is the set of points on lights: a sample has the g of its own light, and p includes
-//!   the choice of that light. It is positive wherever g is, whatever the BSDF. Delta lights are samples with g = 0.
-//!   Specular lobes get one additional BSDF sample; BSDFs with specular lobes only are sampled by the BSDF.
+//!   added. If N = 1, the sample is of a delta light or of the BSDF at random.
+//! * **Light sampling.** The domain is the set of points on lights. A sample has the g of its own light, and p includes
+//!   the choice of that light, so p is positive wherever g is, for any BSDF. Delta lights are samples with g = 0.
+//!   Specular lobes get one additional BSDF sample. BSDFs with specular lobes only are sampled by the BSDF.
 //!
-//! Zero-valued samples count with their g like any others.
+//! Zero-valued samples count with their g like all others.
 
 use crate::accel::{Hit, RayBatch};
 use crate::direct::bsdf_samples::{EmitterInDirection, PendingBsdf, bsdf_candidate, find_emitters};
@@ -37,34 +37,34 @@ use lumiris_numbers::math::{Ray, Rgb, Vec3};
 use std::f32::consts::FRAC_1_PI;
 use std::time::Instant;
 
-/// Minimum probability of a wide lobe for which BSDF samples have a control variate.
+/// Minimum probability of a wide lobe for a control variate of BSDF samples.
 pub const MIN_WIDE_LOBE: f32 = 0.01;
 /// One in this many samples is drawn for delta lights.
 pub const DELTA_DIVISOR: u32 = 4;
 
-/// Samples of one technique, which are samples of a control variate as well.
+/// Samples of one technique with a control variate.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Correlated {
     /// Samples (N).
     pub samples: u32,
-    /// What draws the samples.
+    /// Technique of the samples.
     pub technique: SamplingTechnique,
 }
 
-/// How the samples of a point are drawn.
+/// Allocation of the samples of a point.
 #[derive(Clone, Copy, Debug)]
 struct Plan {
     technique: SamplingTechnique,
-    /// Samples of the combination.
+    /// Samples of the combined estimate.
     n: u32,
-    /// Samples drawn by the technique; one less if the only one is of a delta light.
+    /// Samples drawn by the technique; 0 if the only sample is of a delta light.
     draws: u32,
-    /// Probability that a sample of the combination is drawn by the technique.
+    /// Probability that a sample of the combined estimate is drawn by the technique.
     probability: f32,
-    /// Samples of delta lights, and how many are expected.
+    /// Samples of delta lights, and their expected number.
     delta_draws: u32,
     n_delta: f32,
-    /// BSDF samples for specular lobes, outside the combination.
+    /// BSDF samples of specular lobes, outside the combined estimate.
     specular_draws: u32,
 }
 
@@ -88,18 +88,18 @@ impl Plan {
         }
     }
 
-    /// Expected number of samples that the technique draws.
+    /// Expected number of samples drawn by the technique.
     fn n_technique(&self) -> f32 {
         self.n as f32 * self.probability
     }
 
-    /// True if samples of delta lights are samples of the combination.
+    /// True if samples of delta lights belong to the combined estimate.
     fn has_delta_inside(&self) -> bool {
         self.probability < 1.0
     }
 }
 
-/// The estimate of a point while it is computed.
+/// Intermediate state of the estimate of a point.
 #[derive(Clone, Copy, Debug)]
 struct Estimate {
     plan: Plan,
@@ -108,7 +108,7 @@ struct Estimate {
     /// Shading normal on the side of wo.
     n: Vec3,
     sums: [f32; SUMS],
-    /// Estimate of the light outside the combination.
+    /// Estimate of the light outside the combined estimate.
     outside: Rgb,
 }
 
@@ -135,7 +135,7 @@ impl Estimate {
         !self.integral.is_black() && self.n.dot(wi) > 0.0
     }
 
-    /// c of a sample towards `wi`, drawn with the density `pdf` by the technique, of lights whose L̄ sum to `l`.
+    /// c of a sample towards `wi`, drawn with the density `pdf` by the technique. `l` is Σ L̄ of its lights.
     fn control(&self, l: Rgb, wi: Vec3, pdf: f32) -> [f32; 3] {
         if !self.has_g(wi) {
             return self.without_g();
@@ -149,13 +149,13 @@ impl Estimate {
     }
 }
 
-/// The estimates of a batch.
+/// The estimates of a batch, and buffers.
 #[derive(Debug, Default)]
 pub(super) struct Buffers {
     estimates: Vec<Estimate>,
-    /// c of each candidate; `None` outside the combination.
+    /// c of each candidate; `None` outside the combined estimate.
     controls: Vec<Option<[f32; 3]>>,
-    /// BSDF samples, with the sum of L̄ along their rays, and with what each is a candidate for.
+    /// BSDF samples, Σ L̄ along their rays, and their candidates.
     pending: Vec<PendingBsdf>,
     crossed: Vec<Rgb>,
     found: Vec<Option<Candidate>>,
@@ -170,7 +170,7 @@ pub(super) struct Buffers {
 }
 
 impl Correlated {
-    /// Zero-valued samples are counted, the others become candidates.
+    /// T1. Zero-valued samples are added to the sums; all others become candidates.
     pub(super) fn propose(&self, t1: &mut T1<'_>, b: &mut Buffers) {
         let T1 { job, points, candidates, .. } = t1;
         b.controls.clear();
@@ -179,6 +179,7 @@ impl Correlated {
         b.estimates.clear();
         b.estimates.extend(points.iter().map(|point| Estimate::new(job, self.technique, point)));
 
+        // Light samples
         let start = Instant::now();
         for (index, point) in points.iter().enumerate() {
             b.draw_delta(job, (index, point), candidates);
@@ -188,6 +189,7 @@ impl Correlated {
         }
         candidates.stats.t1_light += start.elapsed();
 
+        // BSDF samples, and their emitters
         for (index, point) in points.iter().enumerate() {
             b.draw_bsdf((index, point), candidates);
         }
@@ -199,7 +201,7 @@ impl Correlated {
         candidates.weigh(Candidate::own_factor);
     }
 
-    /// `out[i]` belongs to `points[i]`.
+    /// Computes the estimates from the traced candidates; `out[i]` belongs to point `i`.
     pub(super) fn resolve(candidates: &Candidates, segments: &Segments, b: &mut Buffers, out: &mut [Rgb]) {
         let are_free = segments.are_free(&candidates.contributions);
         let traced = candidates.records.iter().zip(&candidates.contributions).zip(are_free);
@@ -220,7 +222,7 @@ impl Correlated {
 }
 
 impl Buffers {
-    /// Samples of delta lights.
+    /// Draws samples of delta lights.
     fn draw_delta(&mut self, job: &RenderJob, (index, point): (usize, &ShadingPoint<'_>), candidates: &mut Candidates) {
         let estimate = self.estimates[index];
         let Plan { delta_draws, n_delta, .. } = estimate.plan;
@@ -230,6 +232,8 @@ impl Buffers {
         let ctx = point.light_ctx();
         candidates.stats.proposals += u64::from(delta_draws);
         candidates.stats.light_proposals += u64::from(delta_draws);
+
+        // Samples with g = 0
         for i in 0..delta_draws {
             let [u_choice, u0, u1] = point.stream.split(domain::DELTA, delta_draws, i).draw::<3>();
             let candidate = sampler
@@ -240,7 +244,7 @@ impl Buffers {
         }
     }
 
-    /// Samples of the combination by light sampling.
+    /// Draws light samples of the combined estimate.
     fn draw_light(&mut self, job: &RenderJob, (index, point): (usize, &ShadingPoint<'_>), candidates: &mut Candidates) {
         let estimate = self.estimates[index];
         let n = estimate.plan.draws;
@@ -250,6 +254,8 @@ impl Buffers {
         candidates.stats.light_proposals += u64::from(n);
         for i in 0..n {
             let [u_choice, u0, u1] = point.stream.split(domain::LIGHT, n, i).draw::<3>();
+
+            // Sample, c, and candidate
             let drawn = job.lights.sample(&ctx, u_choice, [u0, u1]);
             let drawn = drawn.map(|drawn| with_infinite(job, &ctx, drawn));
             let control = match &drawn {
@@ -263,7 +269,7 @@ impl Buffers {
         }
     }
 
-    /// BSDF samples, before it is known which lights they point at.
+    /// Draws BSDF samples without their emitters.
     fn draw_bsdf(&mut self, (index, point): (usize, &ShadingPoint<'_>), candidates: &mut Candidates) {
         let estimate = self.estimates[index];
         let plan = estimate.plan;
@@ -274,12 +280,16 @@ impl Buffers {
         candidates.stats.proposals += u64::from(n);
         for i in 0..n {
             let [uc, u0, u1] = point.stream.split(domain::BSDF, n, i).draw::<3>();
+
+            // Light sampling only keeps samples of specular lobes
             let is_inside = plan.technique == SamplingTechnique::Bsdf;
             let sample = point.bsdf.sample_direction(point.wo, uc, [u0, u1]);
             let Some(s) = sample.filter(|s| is_inside || s.lobe.is_specular()) else {
                 self.add(index, None, is_inside.then_some(estimate.without_g()), candidates);
                 continue;
             };
+
+            // The ray, to be traced with all others
             let f_cos = s.f * point.bsdf.cos(s.wi);
             self.rays.push(&point.ray(s.wi));
             self.pending.push(PendingBsdf {
@@ -294,7 +304,7 @@ impl Buffers {
         }
     }
 
-    /// Finds what BSDF samples point at: the first emitter for the integrand, and all of them for g.
+    /// Finds the emitters along the rays of BSDF samples: the first one for the integrand, and all of them for g.
     fn follow(&mut self, job: &RenderJob, points: &[ShadingPoint<'_>], candidates: &mut Candidates) {
         self.found.clear();
         self.crossed.clear();
@@ -302,7 +312,7 @@ impl Buffers {
         self.ray_of.clear();
         self.ray_of.extend(0..self.pending.len() as u32);
         let lights = &job.lights;
-        // A ray meets a light at most twice
+        // A ray crosses a light at most twice
         for crossing in 0..=2 * lights.lights.len() {
             if self.rays.is_empty() {
                 break;
@@ -335,7 +345,7 @@ impl Buffers {
                     let at = (point.p, estimate.n);
                     self.crossed[i as usize] += job.irradiances.l(lights, light, at, pending.wi, surface.n);
                 }
-                // Nothing behind an emitter that cannot be hidden contributes here
+                // If emitters never hide each other, there is nothing behind the first one
                 if job.world.emitters_hide() {
                     let o = offset_origin(surface.p, surface.p_error, surface.n, pending.wi);
                     self.next_rays.push(&Ray { o, d: pending.wi, t_max: f32::INFINITY, time: point.time });
@@ -347,7 +357,7 @@ impl Buffers {
         }
     }
 
-    /// Adds BSDF samples by what they point at.
+    /// Adds the BSDF samples with their emitters.
     fn add_bsdf(&mut self, candidates: &mut Candidates) {
         for i in 0..self.pending.len() {
             let pending = &self.pending[i];
@@ -362,7 +372,8 @@ impl Buffers {
         }
     }
 
-    /// Adds a sample of a point, zero-valued if it is no candidate, with its c; `None` outside the combination.
+    /// Adds a sample of a point. Without a candidate it is zero-valued. `control` is its c, or `None` outside the
+    /// combined estimate.
     fn add(
         &mut self,
         index: usize,
@@ -381,7 +392,7 @@ impl Buffers {
     }
 }
 
-/// Σ L̄ of a light sample: that of its light or, at infinity, of all lights in its direction.
+/// Σ L̄ of a light sample: L̄ of its light, or the sum of all infinite lights.
 fn sampled_l(job: &RenderJob, estimate: &Estimate, p: Vec3, light: LightId, sample: &LightSample) -> Rgb {
     let lights = &job.lights;
     if !estimate.has_g(sample.wi) {

@@ -1,4 +1,4 @@
-//! `mc`: light sampling alone. Specular lobes, whose directions no light sample has, get one BSDF sample.
+//! `mc`: light sampling only. Specular lobes, which light samples cannot hit, get one BSDF sample.
 
 use crate::bsdfs::Bsdf;
 use crate::direct::candidates::{Candidates, Drawn, SampleAllocation};
@@ -19,7 +19,8 @@ impl Mc {
     }
 }
 
-/// All samples are light samples, unless every lobe is specular.
+/// Allocation of `n` samples: light samples, and one BSDF sample if there are specular lobes. If all lobes are
+/// specular, only BSDF samples.
 pub(in crate::direct) fn allocation(n: u32, bsdf: &Bsdf<'_>) -> SampleAllocation {
     if bsdf.has_non_specular() {
         SampleAllocation::fixed(n, u32::from(bsdf.has_specular()))
@@ -33,7 +34,7 @@ pub(super) fn allocation_at(point: &ShadingPoint<'_>) -> SampleAllocation {
     allocation(point.sample_counts.samples, &point.bsdf.bsdf)
 }
 
-/// A BSDF sample counts for specular lobes only.
+/// Contributions. BSDF samples count for specular lobes only.
 pub(super) fn select(candidates: &mut Candidates) {
     candidates.weigh(|c| match c.drawn {
         Drawn::Bsdf => 0.0,

@@ -21,7 +21,7 @@ pub struct Mis {
 }
 
 impl Mis {
-    /// At a path vertex, counted from 0.
+    /// The estimator at a path vertex, counted from 0.
     pub(super) fn at_vertex(settings: &IntegratorSettings, vertex: u32) -> Self {
         let (samples, bsdf_fraction) = (settings.sample_counts_at(vertex).samples, settings.bsdf_fraction());
         Mis { samples, heuristic: settings.heuristic(), bsdf_fraction }
@@ -32,14 +32,14 @@ impl Mis {
         bsdf_samples(n, self.bsdf_fraction)
     }
 
-    /// True if an estimate of `n` samples has one of BSDF sampling, which the path can continue by.
+    /// True if an estimate of `n` samples has exactly one BSDF sample, which can be the next path segment.
     pub fn has_one_bsdf_sample(&self, n: u32) -> bool {
         n >= 2 && self.bsdf_samples(n) == 1
     }
 
-    /// Allocates the `n` samples of a point of this BSDF to the techniques; `stream` has the random numbers of its direct light.
+    /// Allocates `n` samples to the techniques at a point with this BSDF. `stream` has the random numbers of direct
+    /// light.
     pub(in crate::direct) fn allocation(&self, n: u32, bsdf: &Bsdf<'_>, stream: &SampleStream) -> SampleAllocation {
-        // Of one sample, half of a point has none
         if n == 0 {
             return SampleAllocation::fixed(0, 0);
         }

@@ -1,14 +1,14 @@
-//! The estimators of direct light: each is a value with its settings, and a file with what it does in each stage.
+//! The estimators of direct light. Each is a struct of its settings, and a file with its part in each stage.
 //!
 //! | file | propose (T1) | select | resolve |
 //! |---|---|---|---|
 //! | [`mc`] | light samples | 1/(n·p) | sum |
 //! | [`mis`] | light and BSDF samples | weights of a heuristic | sum |
-//! | [`ris`] | many of both, in chunks | draws from each chunk | sum |
-//! | [`ocv`] | those of `mis`, by groups of lights | those of `mis` | control variates |
-//! | [`optimal_mis`] | those of `mis`, by groups of lights | those of `mis` | optimal weights |
+//! | [`ris`] | many light and BSDF samples, in chunks | draws from each chunk | sum |
+//! | [`ocv`] | like `mis`, by light group | like `mis` | control variates |
+//! | [`optimal_mis`] | like `mis`, by light group | like `mis` | optimal weights |
 //! | [`correlated`] | samples of one technique | 1/(n·p) | two estimates combined |
-//! | [`contributing`] | light samples, separately by what the visibility cache finds, and BSDF samples | those of `mis` | sum |
+//! | [`contributing`] | light samples by contribution, and BSDF samples | like `mis` | sum |
 
 pub mod contributing;
 pub mod correlated;
@@ -41,7 +41,7 @@ use std::time::Instant;
 /// An estimator of direct light with its settings.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Estimator {
-    /// Light sampling only (and the specular lobes of BSDFs).
+    /// Light sampling, and BSDF sampling of specular lobes.
     Mc(Mc),
     /// Light and BSDF sampling, combined by multiple importance sampling.
     Mis(Mis),
@@ -51,13 +51,13 @@ pub enum Estimator {
     Ocv(Ocv),
     /// Optimal weights of multiple importance sampling.
     OptimalMis(OptimalMis),
-    /// Importance sampling by one technique, combined with correlated sampling.
+    /// Correlated sampling combined with importance sampling by one technique.
     Correlated(Correlated),
-    /// Light sampling, separately of contributing and of all other lights.
+    /// Separate light sampling of contributing and of all other lights.
     Contributing(Contributing),
 }
 
-/// The candidates and segments of a batch, and what estimators keep from batch to batch.
+/// Candidates and segments of a batch, and the buffers of estimators.
 #[derive(Debug, Default)]
 pub(super) struct Batch {
     pub(super) candidates: Candidates,
@@ -75,9 +75,9 @@ impl Estimator {
         if vertex == 0 { Self::new(settings, 0) } else { Self::new(&Self::without_fits(settings, 1), vertex) }
     }
 
-    /// The settings with an estimator that is not fitted, of as many samples as the path vertex `vertex` has: that of later vertices,
-    /// and of pilots. Progressive estimators are fitted to the first vertices of a pixel, which are close together; at later ones,
-    /// which lie anywhere, `mis` is used.
+    /// The settings with an estimator without fits, for later vertices and pilots. Progressive estimators are fitted to
+    /// the first vertices of a pixel, which are close together. Later vertices lie anywhere, so `mis` is used there,
+    /// with the sample count of the path vertex `vertex`.
     #[must_use]
     pub fn without_fits(settings: &IntegratorSettings, vertex: u32) -> IntegratorSettings {
         let estimator = Self::new(settings, 0);
@@ -105,7 +105,7 @@ impl Estimator {
             }
             EstimatorKind::Contributing => {
                 let noncontributing_samples = settings.contributing.noncontributing_samples();
-                // They would find the lights that are left out
+                // Without samples of non-contributing lights, BSDF samples would hit lights that are left out
                 let bsdf_samples = if noncontributing_samples > 0 { settings.contributing.bsdf_samples() } else { 0 };
                 let heuristic = settings.heuristic();
                 Estimator::Contributing(Contributing { samples, noncontributing_samples, bsdf_samples, heuristic })
@@ -137,7 +137,7 @@ impl Estimator {
         }
     }
 
-    /// True if the estimates of a pixel are corrected by what was fitted to other pixels.
+    /// True if the estimates of a pixel are corrected by coefficients fitted to other pixels.
     pub fn is_over_pixels(&self) -> bool {
         match self {
             Estimator::Ocv(ocv) => ocv.form == OcvForm::Pixels,
@@ -145,7 +145,7 @@ impl Estimator {
         }
     }
 
-    /// True if only what is visible has been selected, so that segments need not be traced.
+    /// True if all selected candidates are visible, so that segments need not be traced.
     pub(super) fn selects_visible(&self) -> bool {
         matches!(self, Estimator::Ris(ris) if ris.target.has_visibility())
     }
@@ -181,7 +181,7 @@ impl Estimator {
         }
     }
 
-    /// Select: what each candidate contributes if its segment is unoccluded.
+    /// Select: the unshadowed contribution of each candidate.
     pub(super) fn select(&self, candidates: &mut Candidates) {
         match self {
             Estimator::Mc(_) => mc::select(candidates),
@@ -190,12 +190,12 @@ impl Estimator {
                 mis.select(candidates)
             }
             Estimator::Correlated(_) => Correlated::select(candidates),
-            // Drawn from each chunk of proposals
+            // Already drawn from each chunk of proposals
             Estimator::Ris(_) => {}
         }
     }
 
-    /// Resolve: the estimates from the traced candidates. `out` has as many zeros as there are estimates.
+    /// Resolve: the estimates from the traced candidates. `out` has a zero for each point.
     pub(super) fn resolve(
         &self,
         job: &RenderJob,
@@ -206,6 +206,8 @@ impl Estimator {
     ) {
         let Batch { candidates, segments, components, correlated, ris, .. } = batch;
         let start = Instant::now();
+
+        // The time of normal equations counts as `solve`
         match self {
             Estimator::Mc(_) | Estimator::Mis(_) | Estimator::Contributing(_) => segments.resolve(out),
             Estimator::Ris(_) => {

@@ -1,8 +1,8 @@
 //! `ocv`: optimizing control variates [Fan et al. 2006].
 //!
-//! After T2, the samples of a point are accumulated into normal equations in the columns c_j = h_j/p_α − I_j, whose
-//! expectation is 0, and y = f·V/p_α. The estimate is ȳ − Σ_j β_j c̄_j [Eq. 7 of the paper]; the forms differ in what β
-//! is fitted to.
+//! After T2, the samples of a point are accumulated into normal equations with the columns c_j = h_j/p_α − I_j, whose
+//! expectation is 0, and y = f·V/p_α. The estimate is ȳ − Σ_j β_j c̄_j [Eq. 7 of the paper]. The forms differ in the
+//! samples that β is fitted to.
 
 use super::mis::Mis;
 use crate::direct::candidates::Candidates;
@@ -25,7 +25,7 @@ pub struct Ocv {
 }
 
 impl Ocv {
-    /// `out[i]` belongs to `points[i]`.
+    /// Computes the estimates; `out[i]` belongs to `points[i]`.
     pub(super) fn resolve(
         &self,
         job: &RenderJob,
@@ -41,7 +41,7 @@ impl Ocv {
             form.finish(equations, sums, &mixture.integrals);
         }
 
-        // β of the form that fits it to these samples
+        // The paper's form fits β to the same samples
         if self.form == OcvForm::Paper {
             let systems = sums.len() / len;
             beta.clear();
@@ -50,6 +50,7 @@ impl Ocv {
             candidates.stats.ill_conditioned += equations.solve(form.system(), sums, beta) as u64;
         }
 
+        // Estimates
         for (i, (out, sums)) in out.iter_mut().zip(sums.chunks(len)).enumerate() {
             let integrals = &mixtures[i].integrals;
             let estimate = match self.form {
@@ -59,7 +60,7 @@ impl Ocv {
                 },
                 OcvForm::Pixels => {
                     let (value, mut controls) = (equations.mean(sums), means_of_columns(equations, sums));
-                    // Groups, then the first lobe
+                    // Reorder: groups, then the first lobe
                     controls[..equations.components()].rotate_left(job.lobes());
                     let value = job.world.scene.film.balanced(Rgb::from_array(value)).to_array();
                     fits.set_controls(points[i].sample, value, &controls[..job.controls()]);
@@ -75,7 +76,7 @@ impl Ocv {
     }
 }
 
-/// The form as the numerics call it.
+/// The form in `lumiris_numbers`.
 fn numeric(form: OcvForm) -> Form {
     match form {
         OcvForm::Paper => Form::Paper,
@@ -92,7 +93,7 @@ fn means_of_columns(equations: NormalEquations, sums: &[f32]) -> [f32; MAX_COMPO
     )
 }
 
-/// Fits the coefficients of all fits to their sums. Returns how many systems are ill-conditioned.
+/// Fits the coefficients of all fits to their sums. Returns the number of ill-conditioned systems.
 pub(super) fn solve(equations: NormalEquations, sums: &[f32], beta: &mut [f32]) -> u64 {
     equations.solve(Form::Progressive.system(), sums, beta) as u64
 }

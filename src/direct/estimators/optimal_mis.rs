@@ -1,6 +1,6 @@
-//! `optimal-mis`: the weights of multiple importance sampling that have least variance [Kondapaneni et al. 2019].
+//! `optimal-mis`: MIS weights of minimum variance [Kondapaneni et al. 2019].
 //!
-//! The systems have the columns r_j = h_j/p_α, those of the paper's form r_j/I_j.
+//! The linear systems use the columns r_j = h_j/p_α, where the paper uses r_j/I_j.
 
 use super::mis::Mis;
 use crate::direct::candidates::Candidates;
@@ -32,8 +32,11 @@ impl OptimalMis {
         fits: &mut Fits,
         out: &mut [Rgb],
     ) {
+        // Normal equations
         let equations = components.sum(job, candidates, segments);
         let sums = components.sums.chunks(equations.len());
+
+        // Solve them, or use the coefficients of the fit
         for (((out, point), sums), mixture) in out.iter_mut().zip(points).zip(sums).zip(&components.mixtures) {
             let estimate = match (self.form, fits.beta(point.fit)) {
                 (OptimalForm::Progressive, None) => equations.mean(sums),
@@ -53,7 +56,7 @@ impl OptimalMis {
     }
 }
 
-/// Fits the coefficients of all fits to their sums. Returns how many systems are ill-conditioned.
+/// Fits the coefficients of all fits to their sums. Returns the number of ill-conditioned systems.
 pub(super) fn solve(equations: NormalEquations, sums: &[f32], beta: &mut [f32]) -> u64 {
     let fits = sums.chunks(equations.len()).zip(beta.chunks_mut(equations.coefficients().max(1)));
     // Pixels without a surface have nothing to solve

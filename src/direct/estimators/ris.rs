@@ -1,20 +1,21 @@
 //! Resampled importance sampling of direct light [Talbot et al. 2005; Talbot 2005].
 //!
-//! T1 makes M proposals per point by light and BSDF sampling, which multiple importance sampling weights into one set
-//! [Talbot 2005, §4.6.1] with the luminance of f·G·L as target q̂. N of them are drawn in proportion to q̂·r, and only
-//! these are evaluated in colour and traced. This is unbiased for any M ≥ N ≥ 1: given the proposals, the expectation
-//! over the draws is the estimate that would trace all of them.
+//! T1 makes M proposals per point by light and BSDF sampling. Multiple importance sampling weights them into one set
+//! [Talbot 2005, §4.6.1]; the target q̂ is the luminance of f·G·L. N proposals are drawn in proportion to q̂·r. Only
+//! these are evaluated in colour and traced. The estimate is unbiased for any M ≥ N ≥ 1: given the proposals, its
+//! expectation over the draws is the estimate that traces all proposals.
 //!
-//! The target `visibility` multiplies q̂ by √V̂, where V̂ > 0 is an estimate of the visibility of each light by its
-//! photons ([`crate::lights::learned_visibility`]): if V is 1 with probability V̂ and 0 otherwise, the density of least variance
-//! is proportional to q̂·√V̂. Fewer occluded samples are drawn, and the estimate is unbiased for any V̂.
+//! The target `visibility` multiplies q̂ by √V̂, where V̂ > 0 is the visibility of each light estimated from its
+//! photons ([`crate::lights::learned_visibility`]). If V is 1 with probability V̂ and 0 otherwise, the density of
+//! minimum variance is proportional to q̂·√V̂. Fewer occluded samples are drawn, and the estimate is unbiased for any
+//! V̂.
 //!
-//! With the target `visibility-control`, V̂ is a control variate as well: what is known of the light, Σ c_j V̂_j over all
-//! proposals, is added without a ray, and samples are drawn where V̂ is in doubt, for the difference
+//! With the target `visibility-control`, V̂ is a control variate as well. The expected light Σ c_j V̂_j over all
+//! proposals is added without a ray. Samples of the difference are drawn where V̂ is uncertain
 //! ([`lumiris_numbers::estimators::ris::control`]).
 //!
-//! Targets with visibility reverse the order: proposals are traced, and N of the visible ones are shaded; light samples
-//! do not need the BSDF before that.
+//! The targets with traced visibility (`gv`, `gvl`) reverse the order: all proposals are traced, and N of the visible
+//! ones are shaded. Light samples do not need the BSDF before that.
 
 use crate::bsdfs::Bsdf;
 use crate::direct::candidates::{Candidate, Candidates, SampleAllocation};
@@ -32,7 +33,7 @@ use lumiris_numbers::math::Rgb;
 use lumiris_numbers::math::hash::{pcg4d, unit_f32};
 use std::time::Instant;
 
-/// Proposals that are generated before samples are drawn from them: few enough to stay in the processor's cache.
+/// Proposals per chunk: few enough to stay in the cache.
 const CHUNK: usize = 2048;
 /// |g| below which a phase function is wide.
 const WIDE: f32 = 0.5;
@@ -42,7 +43,7 @@ const WIDE: f32 = 0.5;
 pub struct Ris {
     /// Samples (N) and proposals (M).
     pub sample_counts: SampleCounts,
-    /// Weights of the techniques that propose.
+    /// Weights of the proposal techniques.
     pub heuristic: Heuristic,
     /// Distribution of the proposals over the lights.
     pub points: ProposalPoints,
@@ -53,28 +54,28 @@ pub struct Ris {
 }
 
 impl Ris {
-    /// Resampling at a path vertex, counted from 0: later ones have fewer samples.
+    /// The estimator at a path vertex, counted from 0. Later vertices have fewer samples.
     pub(super) fn at_vertex(settings: &IntegratorSettings, vertex: u32) -> Self {
         let RisSettings { points, target, strata, .. } = settings.ris;
         let sample_counts = settings.sample_counts_at(vertex);
         Ris { sample_counts, heuristic: settings.heuristic(), points, target, strata }
     }
 
-    /// True if an estimate of visibility is a control variate.
+    /// True if the estimated visibility is a control variate.
     pub fn has_control(&self) -> bool {
         self.target == Target::VisibilityControl
     }
 
-    /// How the proposals of a point are weighted.
+    /// Allocation and weights of the proposals of a point.
     fn techniques(&self, point: &ShadingPoint<'_>) -> Techniques {
         let SampleAllocation { n_light, n_bsdf, .. } = allocation(point);
         Techniques { n_light, n_bsdf, heuristic: self.heuristic, target: self.target }
     }
 
-    /// T1 and select by turns: makes the proposals of a chunk of points and draws the samples of these points from
-    /// them. Only the samples drawn become candidates, with their contributions.
+    /// T1 and select, alternately: makes the proposals of a chunk of points and draws samples from them. Only the
+    /// samples become candidates, with their contributions.
     pub(super) fn propose_and_draw(&self, t1: &mut T1<'_>, b: &mut Buffers) {
-        // BSDF samples of all points; light samples, which are counted here, are made in chunks
+        // BSDF samples of all points. Light samples are only counted here, and made in chunks
         t1.propose(allocation, |_, _, allocation, _| allocation.light_draws);
         let T1 { job, points, candidates, .. } = t1;
         let bsdf_samples = std::mem::replace(&mut candidates.records, std::mem::take(&mut b.bsdf_samples));
@@ -96,11 +97,13 @@ impl Ris {
         b.bsdf_samples = bsdf_samples;
     }
 
-    /// T1: takes a chunk from the points that are left, and makes its proposals.
+    /// T1: takes a chunk from the remaining points, and makes its proposals.
     fn propose_chunk<'a>(&self, job: &RenderJob, rest: &mut Chunk<'a>, b: &mut Buffers) -> Chunk<'a> {
         b.proposals.clear();
         b.numbers.clear();
         let Chunk { first, points, bsdf } = *rest;
+
+        // Add points until the chunk is full; `bsdf` is sorted by point
         let (mut count, mut next) = (0, 0);
         while count < points.len() && (b.proposals.count() < CHUNK || count == 0) {
             let point = &points[count];
@@ -114,6 +117,8 @@ impl Ris {
             b.proposals.add(job, point, &self.techniques(point), positions, &bsdf[begin..next]);
             count += 1;
         }
+
+        // Weights of the light samples
         b.proposals.evaluate(job, &points[..count], |point| self.techniques(point));
         *rest = Chunk { first: first + count, points: &points[count..], bsdf: &bsdf[next..] };
         Chunk { first, points: &points[..count], bsdf: &bsdf[..next] }
@@ -124,9 +129,13 @@ impl Ris {
         let mut bsdf = chunk.bsdf;
         for (i, point) in chunk.points.iter().enumerate() {
             let range = b.proposals.points()[i];
+
+            // Draw from the proposals
             self.draw(point, range, b.numbers[i][1], b);
             let (own, rest) = bsdf.split_at(range.end - range.bsdf_start);
             bsdf = rest;
+
+            // Evaluate the samples. With a control variate, `known` gets the part without visibility
             let mut known = self.has_control().then(|| b.proposals.known(range, own));
             for draw in &b.draws {
                 let place = range.start + draw.index as usize;
@@ -153,6 +162,8 @@ impl Ris {
     /// Draws N proposals of a point.
     fn draw(&self, point: &ShadingPoint<'_>, range: PointProposals, u: f32, b: &mut Buffers) {
         let weights = &b.proposals.weight[range.start..range.end];
+
+        // The number u is used directly for systematic sampling; other methods derive independent numbers from it
         let n = point.sample_counts.samples as usize;
         match self.strata {
             Strata::Systematic => systematic(weights, n as u32, u, &mut b.draws),
@@ -176,11 +187,13 @@ impl Ris {
     }
 }
 
-/// The proposals of a point by light and by BSDF sampling: M together, unless the BSDF is all specular.
+/// Allocation of the M proposals of a point to light and BSDF sampling. If the BSDF has specular lobes only, N BSDF
+/// samples.
 ///
-/// A BSDF sample costs as much as ten light samples, which are made many at a time, and a wide BSDF says little of
-/// where the light is: it gets one proposal in sixteen, one with a peak two; but where there are few proposals for each
-/// sample, one BSDF sample for every two samples, or four if it is wide.
+/// A BSDF sample costs as much as ten light samples, which are made many at a time. A wide BSDF, which says little
+/// about the direction of the light, gets one proposal in sixteen; a BSDF with a peak gets two in sixteen. If there are
+/// few proposals per sample, there is at least one BSDF sample per two samples, or per four samples if the BSDF is
+/// wide.
 fn allocation(point: &ShadingPoint<'_>) -> SampleAllocation {
     let (m, n) = (point.sample_counts.proposals, point.sample_counts.samples);
     let bsdf = &point.bsdf.bsdf;
@@ -202,7 +215,7 @@ fn allocation(point: &ShadingPoint<'_>) -> SampleAllocation {
         | Bsdf::Principled(_) => (0.125, 0.5),
     };
     let by_bsdf = (m as f32 * of_proposals).max(n as f32 * of_samples);
-    // A power of two, for which the points of a Sobol' sequence are best distributed
+    // A power of two, for the best distribution of a Sobol' sequence
     let by_bsdf = 1 << (by_bsdf.log2().round().max(0.0) as u32);
     let by_bsdf = if by_bsdf < m { by_bsdf } else { 1 };
     if m == 1 { SampleAllocation::one_of_both(&point.stream) } else { SampleAllocation::fixed(m - by_bsdf, by_bsdf) }
@@ -218,7 +231,7 @@ struct Chunk<'a> {
     bsdf: &'a [Candidate],
 }
 
-/// What is kept from batch to batch.
+/// Buffers kept from batch to batch.
 #[derive(Debug, Default)]
 pub(super) struct Buffers {
     bsdf_samples: Vec<Candidate>,
@@ -227,17 +240,19 @@ pub(super) struct Buffers {
     ends: Vec<u32>,
     u: Vec<f32>,
     probes: Segments,
-    /// Per point, what is known of its light without visibility, if that is a control variate.
+    /// Per point: the part of the estimate without visibility, if V̂ is a control variate.
     pub(super) known: Vec<Rgb>,
-    /// Per point of the chunk, the numbers for the places of proposals and for the draws: well distributed over the
-    /// samples of a pixel.
+    /// Per point of the chunk: random numbers for the positions of proposals and for the draws, well distributed over
+    /// the samples of a pixel.
     numbers: Vec<[f32; 2]>,
 }
 
 impl Buffers {
-    /// Traces all proposals and sets the weights of those that are not visible to 0. Returns the number of segments.
+    /// Traces all proposals, and sets the weights of occluded ones to 0. Returns the number of segments.
     fn probe(&mut self, job: &RenderJob, chunk: &Chunk<'_>) -> u64 {
         self.probes.clear();
+
+        // Segments of the proposals with a weight
         let mut bsdf = chunk.bsdf.iter();
         let mut probed = Vec::new();
         for (i, point) in chunk.points.iter().enumerate() {
@@ -260,6 +275,8 @@ impl Buffers {
                 }
             }
         }
+
+        // Occluded proposals have no weight
         self.probes.trace(job, chunk.points);
         for (&place, &occluded) in probed.iter().zip(self.probes.occluded()) {
             if occluded {
@@ -270,7 +287,7 @@ impl Buffers {
     }
 }
 
-/// `count` independent numbers, the first of which is `u` itself.
+/// `count` independent numbers; the first one is `u`.
 fn independent_numbers(u: f32, count: usize, out: &mut Vec<f32>) {
     out.clear();
     let other = |i: usize| unit_f32(pcg4d([u.to_bits(), i as u32, 0x9e37_79b9, 1])[0]);

@@ -1,9 +1,10 @@
-//! The vertices of a batch of paths, in columns: row k of every column is vertex k.
+//! The vertices of a batch of paths, in columns. Row k of every column is vertex k.
 //!
-//! Rows come in runs of equal work ([`Run`]). The first ones have a [`SurfaceBsdf`] of their own, sorted by the kernel that
-//! evaluates them; all others are one run of Lambertian surfaces, of which columns know the reflectance. Whatever is known of a vertex when it is added goes straight into
-//! the columns, but points of meshes in world space: their corners are collected, and one kernel determines the points of
-//! all of them at the end ([`Vertices::finish`]).
+//! Rows form runs of equal work ([`Run`]). The first rows have their own [`SurfaceBsdf`], sorted by the kernel that
+//! evaluates them. All other rows are one run of Lambertian surfaces, with their reflectance in columns. The data of a
+//! vertex go straight into the columns, except for the points of meshes in world space: their corners are collected,
+//! and one kernel computes all of these points at the end ([`Vertices::finish`]). `scattering` evaluates and samples
+//! the BSDFs of all rows.
 
 mod scattering;
 
@@ -29,7 +30,7 @@ use std::ops::Range;
 /// The vertices of a batch, at most one per path.
 #[derive(Debug, Default)]
 pub struct Vertices<'w> {
-    /// Index of the path of each.
+    /// Index of the path of each vertex.
     pub path: Vec<u32>,
     /// Time (0 to 1).
     pub time: Vec<f32>,
@@ -45,22 +46,22 @@ pub struct Vertices<'w> {
     runs: Vec<Run>,
     /// Parameters of the kernels of the first rows.
     params: [Column; MAX_PARAMS],
-    /// x of their shading frames.
+    /// x axes of the shading frames of the first rows.
     tangents: Columns3,
-    /// Media of the first rows; around all others, rays stay in empty space.
+    /// Media of the first rows; all other rows are in empty space.
     media: Vec<Sides>,
     first_plain: usize,
-    /// Vertices that have not got their rows yet.
+    /// Vertices without a row yet.
     singles: Vec<Single<'w>>,
     plain: Vec<Plain>,
-    /// Corners of the plain ones, as many at a time as lanes.
+    /// Corners of the plain vertices, one item per vector of lanes.
     hits: Vec<TriangleHits>,
 }
 
 /// Rows that are evaluated together.
 #[derive(Clone, Debug)]
 struct Run {
-    /// What evaluates them; `None`: one by one.
+    /// Kernel of the rows; `None`: they are evaluated one by one.
     kernel: Option<Kernel>,
     rows: Range<usize>,
 }
@@ -72,21 +73,21 @@ pub struct Surface {
     pub p: Columns3,
     /// Bounds of their rounding errors.
     pub p_error: Columns3,
-    /// Geometric normals; zero where there is no surface.
+    /// Geometric normals; zero if there is no surface.
     pub n: Columns3,
-    /// The normal on the side that is lit; zero if both are.
+    /// Normals on the lit side; zero if both sides are lit.
     pub lit: Columns3,
     /// Shading normals.
     pub ns: Columns3,
     /// Unit directions to the viewer.
     pub wo: Columns3,
-    /// Reflectance; black where the BSDF is another.
+    /// Reflectances; black if the BSDF is not Lambertian.
     pub rho: Columns3,
-    /// Lobes that lights are chosen by; none if no choice depends on them.
+    /// Lobes used by the choice of lights; empty if it does not use them.
     pub lobes: Vec<GlossyLobe>,
 }
 
-/// A vertex that is determined by itself.
+/// A vertex with all its data.
 #[derive(Clone, Copy, Debug)]
 pub struct Single<'w> {
     /// Index of its path.
@@ -99,11 +100,11 @@ pub struct Single<'w> {
     pub wo: Vec3,
     /// Scattering.
     pub bsdf: SurfaceBsdf<'w>,
-    /// What rays that leave it go through.
+    /// The media on both sides of the surface.
     pub media: Sides,
 }
 
-/// A vertex on a mesh in world space, whose point is found by a kernel.
+/// A vertex on a mesh in world space, whose point is computed by a kernel.
 #[derive(Clone, Copy, Debug)]
 struct Plain {
     path: u32,
@@ -111,18 +112,20 @@ struct Plain {
 }
 
 impl Single<'_> {
-    /// True if all that direct light and the path need to know of it is in the columns of a Lambertian row.
+    /// True if the vertex fits into a Lambertian row.
     fn is_lambertian(&self) -> bool {
         matches!(self.bsdf.bsdf, Bsdf::Diffuse(_)) && self.media == Sides::default()
     }
 }
 
 impl<'w> Vertices<'w> {
-    /// Without vertices, in the memory of `old`, whose vertices may be of another scene.
+    /// Empty columns in the memory of `old`, whose vertices may belong to another scene.
     pub fn emptied(mut old: Vertices<'_>) -> Self {
         old.clear();
         let (bsdfs, singles) =
             (in_memory_of(std::mem::take(&mut old.bsdfs)), in_memory_of(std::mem::take(&mut old.singles)));
+
+        // Reuse all other columns
         let Vertices { path, time, streams, direct, surface, runs, params, tangents, media, .. } = old;
         let (first_plain, plain, hits) = (0, old.plain, old.hits);
         Vertices {
@@ -163,30 +166,32 @@ impl<'w> Vertices<'w> {
         self.path.len()
     }
 
-    /// True if there is none.
+    /// True if there are no rows.
     pub fn is_empty(&self) -> bool {
         self.path.is_empty()
     }
 
-    /// The rows on plain meshes, which are the last ones.
+    /// The rows on plain meshes: the last ones.
     pub fn plain(&self) -> Range<usize> {
         self.first_plain..self.len()
     }
 
-    /// Adds a vertex that is determined already.
+    /// Adds a vertex with all its data.
     #[inline]
     pub fn push(&mut self, vertex: Single<'w>) {
         self.singles.push(vertex);
     }
 
-    /// Adds the vertex where a ray of direction `d` has met a mesh in world space that reflects `rho` everywhere: at the
-    /// point of `triangle` with the weights `uv` of the second and the third corner.
+    /// Adds the hit of a ray of direction `d` on a mesh in world space with the constant reflectance `rho`. `uv` are
+    /// the weights of the second and the third corner of `triangle`.
     #[inline]
     pub fn push_plain(&mut self, path: u32, (mesh, triangle, uv): (&TriangleMesh, u32, [f32; 2]), d: Vec3, rho: Rgb) {
         let (block, k) = (self.plain.len() / LANES, self.plain.len() % LANES);
         if block == self.hits.len() {
             self.hits.push(TriangleHits::default());
         }
+
+        // Corners and vertex normals
         let hits = &mut self.hits[block];
         let vertices = mesh.indices[triangle as usize];
         for (rows, p) in hits.corners.iter_mut().zip(mesh.corners(vertices)) {
@@ -199,14 +204,16 @@ impl<'w> Vertices<'w> {
                 set_lane(rows, k, mesh.normals[v as usize]);
             }
         }
+
+        // Weights, orientation and ray direction
         [hits.b[0][k], hits.b[1][k]] = uv;
         hits.orientation[k] = if mesh.flip_normal { -1.0 } else { 1.0 };
         set_lane(&mut hits.d, k, d);
         self.plain.push(Plain { path, rho });
     }
 
-    /// Gives all vertices that were added their rows: those with BSDFs of their own first. Their times and random numbers
-    /// are left to the caller.
+    /// Assigns rows to all vertices added; vertices with their own BSDFs come first. Times and random numbers are set
+    /// by the caller.
     pub fn finish(&mut self, lights: &LightSampling) {
         let (singles, plain) = (std::mem::take(&mut self.singles), std::mem::take(&mut self.plain));
         // The kernel writes whole vectors from the first plain row on
@@ -224,9 +231,11 @@ impl<'w> Vertices<'w> {
         self.plain.clear();
     }
 
-    /// Adds the rows that have BSDFs of their own, kernel by kernel.
+    /// Adds the rows with their own BSDFs, kernel by kernel.
     fn add_runs(&mut self, singles: &[Single<'w>]) {
         let kernel = |single: &Single<'w>| if single.is_lambertian() { None } else { Some(single.bsdf.bsdf.kernel()) };
+
+        // Kernels in use
         let mut kinds: Vec<Option<Kernel>> = Vec::new();
         for kind in singles.iter().filter_map(kernel) {
             if !kinds.contains(&kind) {
@@ -234,6 +243,8 @@ impl<'w> Vertices<'w> {
             }
         }
         kinds.sort_by_key(|kind| kind.map(|kernel| kernel as u32));
+
+        // One run for each kernel
         for kind in kinds {
             let first = self.len();
             for single in singles.iter().filter(|single| kernel(single) == Some(kind)) {
@@ -246,7 +257,7 @@ impl<'w> Vertices<'w> {
         self.set_params();
     }
 
-    /// The parameters of kernels.
+    /// Sets the parameters of kernels.
     fn set_params(&mut self) {
         let len = padded(self.bsdfs.len());
         self.tangents.reserve(len);
@@ -291,7 +302,7 @@ impl<'w> Vertices<'w> {
         kernels::points(level(), &self.hits[..len / LANES], &mut Points { p, p_error, n, facing, ns, wo });
     }
 
-    /// The lobes that lights are chosen by.
+    /// Sets the lobes used by the choice of lights.
     fn find_lobes(&mut self, lights: &LightSampling) {
         let lobes = &mut self.surface.lobes;
         lobes.clear();
@@ -316,13 +327,13 @@ impl<'w> Vertices<'w> {
         }
     }
 
-    /// What rays that leave a row go through.
+    /// The media on both sides of a row.
     #[inline]
     pub fn media(&self, i: usize) -> Sides {
         self.media.get(i).copied().unwrap_or_default()
     }
 
-    /// A row by itself, with these counts of samples and the fit of index `fit`; `sample` is its camera sample.
+    /// A row as a shading point. `sample` is the index of its camera sample, `fit` the index of its fit.
     pub fn point(&self, i: usize, sample_counts: SampleCounts, [sample, fit]: [u32; 2]) -> ShadingPoint<'w> {
         ShadingPoint {
             p: self.surface.p.vec3(i),
@@ -339,7 +350,7 @@ impl<'w> Vertices<'w> {
         }
     }
 
-    /// Adds the rows of other vertices that `bsdf` has an answer for, with this BSDF.
+    /// Adds the rows of `other` for which `bsdf` returns a BSDF, with this BSDF.
     pub fn select(
         &mut self,
         other: &Vertices<'w>,
@@ -355,6 +366,8 @@ impl<'w> Vertices<'w> {
             self.push(Single { path: other.path[i], p, p_error, wo, bsdf, media: other.media(i) });
         }
         self.finish(lights);
+
+        // Times and random numbers
         let Vertices { path, time, streams, direct, .. } = self;
         let rows = || path.iter().map(|&path| row_of[path as usize]);
         time.extend(rows().map(|row| other.time[row]));
@@ -369,12 +382,12 @@ impl Surface {
         [p, p_error, n, lit, ns, wo, rho].into_iter().for_each(|c| c.reserve(len));
     }
 
-    /// The points, for the choice of lights.
+    /// The points as input of light sampling.
     pub fn lit_points(&self) -> LitPoints<'_> {
         LitPoints { p: &self.p, n: &self.lit, ns: &self.ns, lobes: &self.lobes }
     }
 
-    /// The first `len` points, as ends of segments.
+    /// The first `len` points as ends of segments.
     pub fn ends(&self, len: usize) -> Ends<'_> {
         Ends { p: self.p.get(len), p_error: self.p_error.get(len), n: self.n.get(len) }
     }
@@ -446,13 +459,13 @@ mod tests {
             vertices.direct.push(stream(path, 1));
         }
 
-        // One by one, by the kernel with a medium around, and Lambertian
+        // Without a kernel, by kernel in a medium, and Lambertian
         assert_rows(&vertices, &[2, 0, 5, 1, 4]);
         let runs: Vec<_> = vertices.runs.iter().map(|run| (run.kernel, run.rows.clone())).collect();
         assert_eq!(runs, [(None, 0..1), (Some(Kernel::Diffuse), 1..2), (Some(Kernel::Diffuse), 2..5)]);
         assert_eq!((vertices.media(1).front, vertices.media(2).front), (Some(3), None));
 
-        // Chosen rows get others, by their new BSDFs
+        // Selected rows are sorted by their new BSDFs
         let mut chosen = Vertices::default();
         chosen.select(&vertices, &lights, |row| match vertices.path[row] {
             4 => Some(in_medium),

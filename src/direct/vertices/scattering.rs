@@ -1,4 +1,4 @@
-//! Scattering at all rows: values and densities for one direction of each, and directions by BSDF sampling.
+//! Scattering at all rows: values and densities for one direction per row, and BSDF sampling.
 
 use super::Vertices;
 use lumiris_lanes::columns::{Column, Columns3, reserve};
@@ -11,9 +11,9 @@ use std::ops::Range;
 pub struct BsdfSamples {
     /// Unit directions.
     pub wi: Columns3,
-    /// f·|cos θ| (1/sr); of deltas, their weights times `pdf`.
+    /// f·|cos θ| (1/sr); for specular lobes, weight times `pdf`.
     pub f_cos: Columns3,
-    /// Density (1/sr); of deltas, their probability; 0 where there is no sample.
+    /// Density (1/sr); for specular lobes, the probability; 0 if there is no sample.
     pub pdf: Column,
     /// Sums of the flags of [`crate::bsdfs::Lobe`].
     pub lobe: Column,
@@ -22,7 +22,7 @@ pub struct BsdfSamples {
 }
 
 impl BsdfSamples {
-    /// Lengthens the columns if they are shorter.
+    /// Extends the columns to at least `len`.
     pub fn reserve(&mut self, len: usize) {
         let BsdfSamples { wi, f_cos, pdf, lobe, eta } = self;
         [wi, f_cos].into_iter().for_each(|c| c.reserve(len));
@@ -30,12 +30,12 @@ impl BsdfSamples {
     }
 }
 
-/// The rows of three columns.
+/// A range of rows of three columns.
 fn part<'a>(columns: &'a Columns3, rows: &Range<usize>) -> [&'a [f32]; 3] {
     columns.get(rows.end).map(|c| &c[rows.start..])
 }
 
-/// The same, to be written.
+/// The same, mutable.
 fn part_mut<'a>(columns: &'a mut Columns3, rows: &Range<usize>) -> [&'a mut [f32]; 3] {
     columns.get_mut(rows.end).map(|c| &mut c[rows.start..])
 }
@@ -62,7 +62,7 @@ impl Vertices<'_> {
         self.runs.iter().filter(move |run| run.rows.start < n).map(|run| (run.kernel, run.rows.clone()))
     }
 
-    /// f·|cos θ| and the density of BSDF sampling (1/sr) for a direction of each of the first `n` rows.
+    /// f·|cos θ| and the density of BSDF sampling (1/sr) for one direction at each of the first `n` rows.
     pub fn evaluate(&self, n: usize, wi: &Columns3, f_cos: &mut Columns3, pdf: &mut Column) {
         for (kernel, rows) in self.runs(n) {
             let Some(kernel) = kernel else {
@@ -80,10 +80,11 @@ impl Vertices<'_> {
         }
     }
 
-    /// A BSDF sample of each of the first `n` rows by three numbers.
+    /// Draws a BSDF sample at each of the first `n` rows by three random numbers.
     pub fn sample(&self, n: usize, u: &[Column; 3], out: &mut BsdfSamples) {
         let BsdfSamples { wi, f_cos, pdf, lobe, eta } = out;
         for (kernel, rows) in self.runs(n) {
+            // BSDFs without a kernel, one by one
             let Some(kernel) = kernel else {
                 for i in rows {
                     let drawn = self.bsdfs[i].sample(self.surface.wo.vec3(i), u[0][i], [u[1][i], u[2][i]]);
@@ -95,6 +96,8 @@ impl Vertices<'_> {
                 }
                 continue;
             };
+
+            // Kernel
             self.with_rows(&rows, kernel, |of| {
                 let mut directions = Directions {
                     wi: part_mut(wi, &rows),

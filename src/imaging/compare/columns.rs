@@ -1,4 +1,4 @@
-//! Metrics by name: the columns of tables, the entries of JSON, and the limits of `--fail-above` and `--fail-below`.
+//! Metrics by name: table columns, JSON entries, and the limits of `--fail-above` and `--fail-below`.
 
 use super::metric::Metric;
 use super::scores::Scores;
@@ -6,35 +6,35 @@ use crate::imaging::heat::significant;
 use std::collections::BTreeSet;
 use strum::IntoStaticStr;
 
-/// Which values are good.
+/// Direction of improvement of a metric.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, IntoStaticStr)]
 #[strum(serialize_all = "lowercase")]
 pub enum Better {
-    /// Small ones.
+    /// Small values are better.
     Lower,
-    /// Large ones.
+    /// Large values are better.
     Higher,
-    /// No order of merit: a bias within its interval is as good as any other.
+    /// No order: a bias within its interval is as good as any other.
     #[strum(serialize = "none")]
     Neither,
 }
 
-/// A number that each image has.
+/// A number computed for each image.
 #[derive(Clone, Copy, Debug)]
 pub struct Column {
     /// Name on the command line and in JSON.
     pub key: &'static str,
-    /// Heading.
+    /// Heading of the table column.
     pub title: &'static str,
-    /// What it is.
+    /// Description.
     pub help: &'static str,
-    /// The metric that it belongs to; what has none is always known, and shown if it is not 0.
+    /// The metric of the column. Columns without a metric are always computed, and shown if not 0.
     pub metric: Option<Metric>,
-    /// Which values are good.
+    /// Direction of improvement.
     pub better: Better,
     /// The number, if it was computed.
     pub value: fn(&Scores) -> Option<f64>,
-    /// How tables write it.
+    /// Formatting in tables.
     pub text: fn(f64) -> String,
 }
 
@@ -203,7 +203,7 @@ pub const COLUMNS: [Column; 17] = [
     },
 ];
 
-/// The columns of a table of `scores`: the selected metrics that some image has, and counts that are not 0.
+/// The columns of a table of `scores`: selected metrics that some image has, and counts other than 0.
 pub fn shown_columns(metrics: &BTreeSet<Metric>, scores: &[&Scores]) -> Vec<&'static Column> {
     let is_shown = |c: &&Column| match c.metric {
         Some(metric) => metrics.contains(&metric) && scores.iter().any(|s| (c.value)(s).is_some()),
@@ -212,7 +212,7 @@ pub fn shown_columns(metrics: &BTreeSet<Metric>, scores: &[&Scores]) -> Vec<&'st
     COLUMNS.iter().filter(is_shown).collect()
 }
 
-/// The column called `key`.
+/// The column with the name `key`.
 pub fn column(key: &str) -> Option<&'static Column> {
     COLUMNS.iter().find(|c| c.key.eq_ignore_ascii_case(key))
 }

@@ -1,8 +1,8 @@
-//! Loads files as images of one size.
+//! Loads files as images of a common size.
 //!
-//! Values are linear Rec.709 radiance; 8-bit and 16-bit files are decoded by the sRGB curve. The images must have
-//! display windows of one size; what is compared is the rectangle for which all of them have pixels, so that a crop can
-//! be compared with a whole reference.
+//! Values are linear Rec.709 radiance; 8-bit and 16-bit files are decoded by the sRGB curve. The display windows must
+//! have the same size. The comparison covers the rectangle in which all images have pixels, so a crop can be compared
+//! with a whole reference.
 
 use crate::imaging::color_layers::{choose, remark};
 use crate::imaging::metrics::Pixel;
@@ -10,7 +10,7 @@ use crate::imaging::metrics::flip::MAX_PIXELS;
 use crate::imaging::oiio::{ReadImage, ReadLimits, Window, read_headers, read_part};
 use std::path::{Path, PathBuf};
 
-/// A rectangle of pixels of the display window.
+/// A rectangle of pixels in the display window.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Region {
     /// First column.
@@ -41,44 +41,44 @@ impl Region {
     }
 }
 
-/// An image cut to the region that is compared.
+/// An image cut to the compared region.
 #[derive(Clone, Debug)]
 pub struct Shown {
     /// The file.
     pub path: PathBuf,
-    /// The file's name, or the path where two files have one name.
+    /// The file name, or the path if another file has the same name.
     pub name: String,
-    /// What was read as colour.
+    /// Name of the layer that was read as colour.
     pub layer: String,
-    /// What a person should know of how it was read.
+    /// Remarks for the user on the choice of channels.
     pub remarks: Vec<String>,
     /// Linear colour, row-major from the top left.
     pub pixels: Vec<Pixel>,
-    /// Variance of each pixel's mean.
+    /// Variance of each pixel mean.
     pub variance: Option<Vec<Pixel>>,
-    /// The file stores 16-bit floats.
+    /// True if the file stores 16-bit floats.
     pub is_half: bool,
 }
 
-/// Images of one size; the last one is the reference.
+/// Images of the same size and their reference.
 #[derive(Clone, Debug)]
 pub struct ImageSet {
     /// Images in the order of the command line.
     pub images: Vec<Shown>,
-    /// What they are compared with.
+    /// The reference.
     pub reference: Shown,
-    /// What is compared.
+    /// The compared region.
     pub region: Region,
     /// Columns and rows of the display windows.
     pub display: [usize; 2],
 }
 
-/// Everything that keeps the images from being compared, a line each.
+/// All errors that prevent the comparison, one per line.
 #[derive(Debug, thiserror::Error)]
 #[error("{}", .0.join("\n"))]
 pub struct LoadError(pub Vec<String>);
 
-/// An image as read.
+/// An image as read, before it is cut.
 #[derive(Clone, Debug)]
 pub struct Raw {
     shown: Shown,
@@ -86,8 +86,7 @@ pub struct Raw {
     display: [usize; 2],
 }
 
-/// Reads images and their reference; all that is wrong is said at once. `layer` names the channels to read instead of
-/// the image itself.
+/// Reads images and their reference, and reports all errors at once. `layer` selects a layer instead of the image.
 pub fn load(images: &[PathBuf], reference: &Path, layer: Option<&str>) -> Result<ImageSet, LoadError> {
     let all = images.iter().map(PathBuf::as_path).chain([reference]);
     let (mut raws, mut errors) = (Vec::new(), Vec::new());
@@ -103,8 +102,9 @@ pub fn load(images: &[PathBuf], reference: &Path, layer: Option<&str>) -> Result
 }
 
 impl ImageSet {
-    /// The region that all images have. All that is wrong is said at once.
+    /// Cuts the images to the region that all have. Reports all errors at once.
     pub fn new(raws: Vec<Raw>, truth: Raw) -> Result<ImageSet, LoadError> {
+        // Check sizes and regions
         let mut errors = Vec::new();
         errors.extend(raws.iter().filter(|r| r.display != truth.display).map(|r| {
             let of = |raw: &Raw| format!("{} is {}×{}", raw.shown.path.display(), raw.display[0], raw.display[1]);
@@ -117,6 +117,8 @@ impl ImageSet {
         if !errors.is_empty() {
             return Err(LoadError(errors));
         }
+
+        // Cut to the common region
         let display = truth.display;
         let cut = |raw: Raw| raw.cut(region);
         let mut images: Vec<Shown> = raws.into_iter().map(cut).collect();
@@ -126,7 +128,7 @@ impl ImageSet {
     }
 }
 
-/// Names images by their files, or by their paths where two have one name.
+/// Sets the names of images: the file names, or the paths where file names are equal.
 fn name(mut all: Vec<&mut Shown>) {
     let short = |path: &Path| path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned();
     let names: Vec<String> = all.iter().map(|s| short(&s.path)).collect();
@@ -136,7 +138,7 @@ fn name(mut all: Vec<&mut Shown>) {
     }
 }
 
-/// Reads the colours of a file, or the layer named.
+/// Reads the colours of a file, or the given layer.
 pub fn read(path: &Path, layer: Option<&str>) -> Result<Raw, String> {
     let headers = read_headers(path).map_err(|e| e.to_string())?;
     let chosen = choose(&headers, layer).map_err(|reason| format!("{}: {reason}", path.display()))?;
@@ -153,7 +155,7 @@ pub fn read(path: &Path, layer: Option<&str>) -> Result<Raw, String> {
     let layer = chosen.title().to_owned();
     let shown =
         Shown { path: path.to_owned(), name: String::new(), layer, remarks, pixels, variance, is_half: read.is_half };
-    // Pixels in the display window alone
+    // Cut to the display window
     let whole = Region { x: 0, y: 0, width: read.image.width, height: read.image.height };
     let offset: [i64; 2] =
         std::array::from_fn(|a| i64::from(read.window.origin[a]) - i64::from(read.window.full_origin[a]));
@@ -165,7 +167,8 @@ pub fn read(path: &Path, layer: Option<&str>) -> Result<Raw, String> {
     Ok(Raw { shown: shown.cut(whole, inside), region, display })
 }
 
-/// The part of the data that lies in the display window, in its coordinates, and the size of the display window.
+/// The intersection of data window and display window, in coordinates of the display window, and the size of the
+/// display window.
 fn visible(window: &Window, size: [usize; 2]) -> (Region, [usize; 2]) {
     let full = if window.full_size.contains(&0) { size } else { window.full_size };
     let span = |a: usize| {
@@ -178,14 +181,14 @@ fn visible(window: &Window, size: [usize; 2]) -> (Region, [usize; 2]) {
     (Region { x, y, width, height }, full)
 }
 
-/// Channels at one or three positions as colour.
+/// Colours from one or three channels.
 fn pixels(read: &ReadImage, positions: &[usize]) -> Vec<Pixel> {
     let at = |c: usize| positions[c.min(positions.len() - 1)];
     let stride = read.image.channels.len();
     read.image.data.chunks_exact(stride).map(|p| [p[at(0)], p[at(1)], p[at(2)]]).collect()
 }
 
-/// Variances of the pixels' means, which Lumiris writes. None if they are all zero, as with one sample per pixel.
+/// Variances of the pixel means, as written by Lumiris. `None` if they are all zero, as with one sample per pixel.
 fn variance(read: &ReadImage) -> Option<Vec<Pixel>> {
     let position = |name: &str| read.image.channel(name);
     let positions = [position("variance.R")?, position("variance.G")?, position("variance.B")?];
@@ -193,14 +196,14 @@ fn variance(read: &ReadImage) -> Option<Vec<Pixel>> {
     variance.iter().flatten().any(|v| *v > 0.0).then_some(variance)
 }
 
-/// The pixels of `part` of an image of which `pixels` holds `whole`.
+/// The pixels of `part`, where `pixels` covers `whole`.
 fn rows(pixels: &[Pixel], whole: Region, part: Region) -> Vec<Pixel> {
     let first = |row: usize| (part.y - whole.y + row) * whole.width + part.x - whole.x;
     (0..part.height).flat_map(|row| &pixels[first(row)..first(row) + part.width]).copied().collect()
 }
 
 impl Shown {
-    /// The pixels of `part`, if `whole` is what there is.
+    /// Cuts to `part`; the image covers `whole`.
     fn cut(mut self, whole: Region, part: Region) -> Shown {
         if whole == part {
             return self;
@@ -212,7 +215,7 @@ impl Shown {
 }
 
 impl Raw {
-    /// An image in memory, of which `window` is the place in a larger one. `variance` is that of the means of pixels.
+    /// An image in memory. `window` is its position in a larger image, `variance` the variance of its pixel means.
     pub fn of_pixels(
         name: &str,
         window: &Window,
@@ -251,7 +254,7 @@ mod tests {
         names(&["R", "G", "B"])
     }
 
-    /// Pixel values 1000·x + y in display coordinates.
+    /// Pixel values 1000·x + y, in display coordinates.
     fn crop(x: usize, y: usize, width: usize, height: usize) -> Part {
         let value = |i: usize| (1000 * (x + i / 3 % width) + y + i / 3 / width) as f32;
         Part::linear(width, height, rgb(), (0..width * height * 3).map(value).collect()).with_window([x, y], [20, 10])
@@ -287,6 +290,7 @@ mod tests {
 
     #[test]
     fn all_bad_files_and_sizes_are_said_at_once() {
+        // Missing and damaged files
         let folder = tempfile::tempdir().unwrap();
         let path = |name: &str| folder.path().join(name);
         std::fs::write(path("broken.exr"), b"not an image").unwrap();

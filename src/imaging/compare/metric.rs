@@ -2,13 +2,13 @@
 
 use strum::{EnumString, IntoStaticStr, VariantNames};
 
-/// A metric that can be asked for.
+/// A metric that can be requested.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, EnumString, IntoStaticStr, VariantNames)]
 #[strum(serialize_all = "lowercase")]
 pub enum Metric {
     /// Mean squared error.
     Mse,
-    /// Its root.
+    /// Root of the mean squared error.
     Rmse,
     /// Mean of squared errors relative to the squared reference.
     RelMse,
@@ -16,11 +16,11 @@ pub enum Metric {
     Nmse,
     /// Peak signal-to-noise ratio.
     Psnr,
-    /// ꟻLIP on a display.
+    /// ꟻLIP at one exposure.
     Flip,
     /// ꟻLIP over all exposures.
     HdrFlip,
-    /// Error in thresholds of vision.
+    /// Luminance error in units of visual thresholds.
     Tvi,
     /// Mean difference.
     Bias,
@@ -29,7 +29,7 @@ pub enum Metric {
 }
 
 impl Metric {
-    /// All, in the order of tables.
+    /// All metrics, in the order of tables.
     pub const ALL: [Metric; 10] = [
         Metric::Mse,
         Metric::Rmse,

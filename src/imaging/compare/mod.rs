@@ -1,7 +1,7 @@
-//! Comparison of images with a reference: files and arrays to pixels of one size, and all metrics by name.
+//! Comparison of images with a reference: loading of files and arrays, and all metrics by name.
 //!
-//! Reading order: [`mod@load`] (images of one size), [`metric`] (names of metrics), [`scores`] (metrics), [`columns`]
-//! (metrics by name).
+//! Reading order: [`mod@load`] (images of a common size), [`metric`] (names), [`scores`] (values), [`columns`]
+//! (tables).
 
 pub mod columns;
 pub mod load;

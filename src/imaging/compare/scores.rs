@@ -12,18 +12,18 @@ use crate::imaging::metrics::{
 use std::collections::BTreeSet;
 use strum::IntoStaticStr;
 
-/// What is computed, and how.
+/// Parameters of a comparison.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Settings {
     /// Metrics to compute.
     pub metrics: BTreeSet<Metric>,
-    /// Exposure (stops) of the display that LDR-ꟻLIP looks at.
+    /// Exposure (stops) of the display for LDR-ꟻLIP.
     pub exposure: f32,
     /// ε of relMSE.
     pub epsilon: f64,
-    /// The largest value, for PSNR.
+    /// Peak value for PSNR.
     pub peak: f64,
-    /// Luminance (cd/m²) of a pixel of luminance 1, for the perceptual error.
+    /// Luminance (cd/m²) of a pixel with luminance 1, for the perceptual error.
     pub candelas: f64,
     /// Pixels per degree of the visual field, for ꟻLIP.
     pub pixels_per_degree: f32,
@@ -42,7 +42,7 @@ impl Default for Settings {
     }
 }
 
-/// The metrics of an image. `None`: not selected, or not possible.
+/// The metrics of an image; `None` if not selected or not possible.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Scores {
     /// Squared differences and counts.
@@ -53,50 +53,50 @@ pub struct Scores {
     pub flip: Option<f64>,
     /// Mean of HDR-ꟻLIP.
     pub hdr_flip: Option<f64>,
-    /// Exposures of HDR-ꟻLIP: least, greatest (stops), count.
+    /// Exposures of HDR-ꟻLIP: minimum, maximum (stops), count.
     pub hdr_exposures: Option<(f64, f64, usize)>,
     /// Perceptual error.
     pub tvi: Option<f64>,
     /// Mean difference.
     pub bias: Option<Bias>,
-    /// Tests against the variances; `None` also if the image has none.
+    /// Tests against the variances; also `None` if the image has no variance.
     pub significance: Option<Significance>,
 }
 
-/// Values per pixel; NaN where a pixel takes no part.
+/// Values per pixel; NaN for excluded pixels.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Maps {
     /// LDR-ꟻLIP.
     pub flip: Option<Vec<f32>>,
     /// HDR-ꟻLIP.
     pub hdr_flip: Option<Vec<f32>>,
-    /// Difference of luminance in thresholds.
+    /// Difference of luminance in units of thresholds.
     pub tvi: Option<Vec<f32>>,
     /// Difference in standard deviations.
     pub z: Option<Vec<f32>>,
 }
 
-/// What came out for an image.
+/// Result for an image.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Compared {
-    /// Numbers.
+    /// Metrics.
     pub scores: Scores,
-    /// Maps of what was computed per pixel.
+    /// Per-pixel metrics.
     pub maps: Maps,
-    /// Which variances the tests used, if any.
+    /// Variances that the tests used.
     pub noise: Noise,
 }
 
-/// Which of the two images have variances.
+/// Availability of variances.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, IntoStaticStr)]
 #[strum(serialize_all = "lowercase")]
 pub enum Noise {
-    /// Both.
+    /// The image and the reference have variances.
     Both,
-    /// The image alone: the reference is taken as exact.
+    /// Only the image has variances; the reference is taken as exact.
     #[strum(serialize = "image")]
     ImageOnly,
-    /// Not the image.
+    /// The image has no variances.
     #[strum(serialize = "none")]
     Unknown,
 }
@@ -107,16 +107,20 @@ pub fn compare(set: &ImageSet, settings: &Settings) -> Vec<Compared> {
 }
 
 fn compare_one(image: &Shown, reference: &Shown, region: Region, settings: &Settings) -> Compared {
+    // Differences and variances
     let wants = |metric: Metric| settings.metrics.contains(&metric);
     let (x, r, size) = (&image.pixels, &reference.pixels, region.size());
     let (noise, variance) = variance_of_difference(image, reference);
     let differences = differences(x, r, settings.epsilon);
     let both = variance.as_deref().filter(|_| noise == Noise::Both);
 
+    // Maps whose means are scores
     let flip = wants(Metric::Flip).then(|| ldr_flip(x, r, size, settings.exposure.exp2(), settings.pixels_per_degree));
     let hdr = wants(Metric::HdrFlip).then(|| hdr_flip(x, r, size, settings.pixels_per_degree));
     let tested = variance.as_deref().filter(|_| wants(Metric::Z));
     let rounding = if image.is_half || reference.is_half { HALF_ROUNDING } else { F32_ROUNDING };
+
+    // Scores, and maps of the selected metrics
     let scores = Scores {
         psnr: differences.psnr(settings.peak),
         differences,
@@ -136,7 +140,7 @@ fn compare_one(image: &Shown, reference: &Shown, region: Region, settings: &Sett
     Compared { scores, maps, noise }
 }
 
-/// Variance of x − r per pixel, if that of the image is known.
+/// Variance of x − r per pixel; `None` if the image has no variance.
 fn variance_of_difference(image: &Shown, reference: &Shown) -> (Noise, Option<Vec<Pixel>>) {
     match (&image.variance, &reference.variance) {
         (Some(a), Some(b)) => {

@@ -1,11 +1,11 @@
-//! Is the image too bright or too dark overall?
+//! Bias: overall difference in brightness.
 //!
 //! The bias is the mean of x − r over pixels and channels. Its standard error is computed in one of two ways:
 //! - from the variances of the pixels, if available: σ_c² = Σ variance / n² per channel c, for independent pixels. The
-//!   correlation between the channels of a pixel is unknown; the standard error of their mean is at most
+//!   correlation between the channels of a pixel is unknown. The standard error of their mean is at most
 //!   (σ_R + σ_G + σ_B) / 3, which is used;
 //! - from the standard deviation of x − r over the pixels, s / √n. This works for any image, but counts errors that
-//!   vary over the image as noise, and is too small where the errors of neighbouring pixels are correlated.
+//!   vary over the image as noise, and is too small if the errors of neighbouring pixels are correlated.
 
 use super::{Pixel, finite_pairs};
 use lumiris_numbers::estimators::stats::Welford;
@@ -14,7 +14,7 @@ use strum::IntoStaticStr;
 /// Two-sided 95 % point of the normal distribution.
 pub const Z_95: f64 = 1.959_963_984_540_054;
 
-/// What a standard error was computed from.
+/// Source of a standard error.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, IntoStaticStr)]
 #[strum(serialize_all = "lowercase")]
 pub enum ErrorSource {
@@ -35,7 +35,7 @@ pub struct Bias {
     pub channels: [f64; 3],
     /// Standard errors of `channels`.
     pub channel_errors: [f64; 3],
-    /// Where the standard errors are from.
+    /// Source of the standard errors.
     pub source: ErrorSource,
 }
 
@@ -51,9 +51,10 @@ impl Bias {
     }
 }
 
-/// The bias of `image`. `variance` holds the variances of the differences x − r per pixel; where it is not finite, the
-/// pixel takes no part. Panics if the lengths differ.
+/// The bias of `image`. `variance` holds the variances of the differences x − r per pixel. Pixels without a finite
+/// variance are excluded. Panics if the lengths differ.
 pub fn bias(image: &[Pixel], reference: &[Pixel], variance: Option<&[Pixel]>) -> Bias {
+    // Accumulate differences and variances
     let mut channels = [Welford::new(); 3];
     let mut together = Welford::new();
     let mut variances = [0.0; 3];
@@ -69,6 +70,8 @@ pub fn bias(image: &[Pixel], reference: &[Pixel], variance: Option<&[Pixel]>) ->
             variances[c] += v[c];
         }
     }
+
+    // Standard errors from variances, or from the spread
     let n = together.count().max(1) as f64;
     let (source, channel_errors, standard_error) = if variance.is_some() {
         let errors = variances.map(|v| v.sqrt() / n);
@@ -90,7 +93,7 @@ mod tests {
         let spread = bias(&image, &reference, None);
         assert_eq!((spread.channels, spread.source), ([0.5, 0.0, 0.0], ErrorSource::Spread));
         assert!((spread.mean - 0.5 / 3.0).abs() < 1e-15);
-        // Deviations 0 1 −1 0: variance ⅔, of the mean ⅙.
+        // Deviations 0 1 −1 0: variance ⅔, variance of the mean ⅙
         assert!((spread.channel_errors[0] - (1.0_f64 / 6.0).sqrt()).abs() < 1e-15);
         assert!((spread.standard_error - (1.0_f64 / 6.0).sqrt() / 3.0).abs() < 1e-15);
         assert!((spread.half_width() - 1.96 * spread.standard_error).abs() < 1e-4);
@@ -103,7 +106,7 @@ mod tests {
 
     #[test]
     fn the_interval_covers_zero_as_often_as_it_says() {
-        // Uniform noise of known variance 1/12 per pixel, the same in all channels: the worst case, which is exact.
+        // Uniform noise of variance 1/12 per pixel, equal in all channels: the worst case, for which the bound is exact
         let mut state = 7_u64;
         let mut uniform = || {
             state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
@@ -118,7 +121,7 @@ mod tests {
                 covered[i] += usize::from(b.mean.abs() <= b.half_width());
             }
         }
-        // 95 % of 2000 ± 4 standard deviations (9.7).
+        // 95 % of 2000 ± 4 standard deviations (9.7)
         assert!(covered.iter().all(|c| (1861..=1939).contains(c)), "{covered:?}");
     }
 

@@ -8,10 +8,10 @@
 
 use super::{Pixel, finite_pairs, is_finite};
 
-/// The ε of relMSE that the field uses.
+/// The usual ε of relMSE.
 pub const DEFAULT_EPSILON: f64 = 0.01;
 
-/// Mean squared differences and what they are means of.
+/// Mean squared differences, means and counts.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Differences {
     /// Mean of (x − r)².
@@ -24,7 +24,7 @@ pub struct Differences {
     pub mean: [f64; 3],
     /// Mean of each channel of the reference.
     pub reference_mean: [f64; 3],
-    /// Pixels that took part.
+    /// Pixels that are finite in both images.
     pub pixels: usize,
     /// Pixels of the image that are not finite.
     pub nonfinite: usize,
@@ -44,7 +44,7 @@ impl Differences {
     }
 }
 
-/// Compares two images; all means are 0 if no pixel is finite in both. Panics if the lengths differ.
+/// Compares two images. All means are 0 if no pixel is finite in both. Panics if the lengths differ.
 pub fn differences(image: &[Pixel], reference: &[Pixel], epsilon: f64) -> Differences {
     let (mut squares, mut relative, mut power) = (0.0, 0.0, 0.0);
     let (mut sum, mut reference_sum) = ([0.0; 3], [0.0; 3]);
@@ -54,7 +54,7 @@ pub fn differences(image: &[Pixel], reference: &[Pixel], epsilon: f64) -> Differ
         for c in 0..3 {
             let square = (x[c] - r[c]).powi(2);
             squares += square;
-            // 0 / 0 is no difference.
+            // 0/0 is no difference
             relative += if square == 0.0 { 0.0 } else { square / (r[c] * r[c] + epsilon) };
             power += r[c] * r[c];
             sum[c] += x[c];
@@ -85,7 +85,7 @@ mod tests {
     #[test]
     fn values_are_those_by_hand() {
         let d = differences(&IMAGE, &REFERENCE, 0.25);
-        // Squares 0 1 0 ¼ 0 ¼; divided by r² + ε: 1 / 1.25, ¼ / ¼, ¼ / 1.25.
+        // Squares 0 1 0 ¼ 0 ¼; divided by r² + ε: 1/1.25, ¼/¼, ¼/1.25
         assert!((d.mse - 1.5 / 6.0).abs() < 1e-15);
         assert!((d.relmse - (0.8 + 1.0 + 0.2) / 6.0).abs() < 1e-15);
         assert!((d.nmse - 1.5 / 3.25).abs() < 1e-15);
@@ -111,7 +111,7 @@ mod tests {
         };
         let (one, eight) = (by(1.0), by(8.0));
         assert!((eight.mse / one.mse - 64.0).abs() < 1e-12 && (eight.rmse() / one.rmse() - 8.0).abs() < 1e-12);
-        // With ε scaled along, relative errors stay.
+        // With ε scaled as well, relative errors stay the same
         assert!((eight.relmse / one.relmse - 1.0).abs() < 1e-6 && (eight.nmse / one.nmse - 1.0).abs() < 1e-12);
         assert!((one.psnr(1.0) - eight.psnr(8.0)).abs() < 1e-9);
     }

@@ -1,10 +1,10 @@
-//! ꟻLIP: the perceived difference when two images are flipped in place [Andersson et al. 2020], by its authors'
-//! library, and its form for high dynamic range [Andersson et al. 2021].
+//! ꟻLIP: the perceived difference between two images that are flipped in place [Andersson et al. 2020], computed by its
+//! authors' library, and its variant for high dynamic range [Andersson et al. 2021].
 //!
-//! LDR-ꟻLIP compares both images as displayed: radiance times a gain, clipped to 0..1, through the sRGB curve, in 8
-//! bits. HDR-ꟻLIP is the maximum of LDR-ꟻLIP over exposures: between the one that maps the maximum luminance of the
-//! reference and the one that maps its median to 0.85 of the display, at most one stop apart, tone-mapped by the ACES
-//! approximation (a x² + b x) / (c x² + d x + e) with the constants of the paper.
+//! LDR-ꟻLIP compares both images as displayed: radiance times a gain, clipped to 0..1, sRGB-encoded, in 8 bits.
+//! HDR-ꟻLIP is the maximum of LDR-ꟻLIP over exposures, tone-mapped by the ACES approximation
+//! (a x² + b x) / (c x² + d x + e) with the constants of the paper. The first exposure maps the maximum luminance of
+//! the reference to 0.85 of the display, the last one the median. The others lie between, at most one stop apart.
 
 use super::{Pixel, is_finite};
 use crate::imaging::color::linear_to_srgb;
@@ -13,27 +13,27 @@ use lumiris_numbers::math::Rgb;
 use nv_flip::FlipImageRgb8;
 use rayon::prelude::*;
 
-/// Pixels per degree of a display 0.7 m away, 3840 pixels on 0.7 m.
+/// Pixels per degree of a display with 3840 pixels on 0.7 m at a distance of 0.7 m.
 pub const DEFAULT_PIXELS_PER_DEGREE: f32 = nv_flip::DEFAULT_PIXELS_PER_DEGREE;
 
 /// Maximum number of pixels that the library supports.
 pub const MAX_PIXELS: usize = (u32::MAX / 3) as usize;
 
-/// Outcome of [`hdr_flip`].
+/// Result of [`hdr_flip`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct HdrFlip {
-    /// Maximum over the exposures per pixel, 0..1; NaN where a pixel is not finite.
+    /// Maximum over the exposures per pixel, 0..1; NaN if a pixel is not finite.
     pub map: Vec<f32>,
-    /// The minimum exposure (stops).
+    /// Minimum exposure (stops).
     pub start: f64,
-    /// The maximum exposure (stops).
+    /// Maximum exposure (stops).
     pub stop: f64,
     /// Number of exposures, equally spaced from minimum to maximum.
     pub count: usize,
 }
 
-/// LDR-ꟻLIP per pixel, 0..1, of radiance times `gain`; NaN where a pixel is not finite. `size` is columns and rows.
-/// Panics if the lengths are not those of the size, or exceed [`MAX_PIXELS`].
+/// LDR-ꟻLIP per pixel, 0..1, of radiance times `gain`; NaN if a pixel is not finite. `size` is columns and rows. Panics
+/// if the lengths do not match the size, or exceed [`MAX_PIXELS`].
 pub fn ldr_flip(image: &[Pixel], reference: &[Pixel], size: [usize; 2], gain: f32, pixels_per_degree: f32) -> Vec<f32> {
     let display = |v: f32| linear_to_srgb((v * gain).clamp(0.0, 1.0));
     let mut map = displayed(image, reference, size, &display, pixels_per_degree);
@@ -41,10 +41,10 @@ pub fn ldr_flip(image: &[Pixel], reference: &[Pixel], size: [usize; 2], gain: f3
     map
 }
 
-/// HDR-ꟻLIP. Panics as [`ldr_flip`].
+/// HDR-ꟻLIP. Panics like [`ldr_flip`].
 pub fn hdr_flip(image: &[Pixel], reference: &[Pixel], size: [usize; 2], pixels_per_degree: f32) -> HdrFlip {
     let [start, stop] = exposure_range(reference);
-    // A range that is turned over, as of an image of one colour, is one exposure seen twice.
+    // An empty range, such as for an image of one colour, becomes two equal exposures
     let count = (stop - start).ceil().max(2.0) as usize;
     let at = |i: usize| start + (stop - start) * i as f64 / (count - 1) as f64;
     let of_exposure = |i: usize| {
@@ -67,7 +67,7 @@ const ACES: [f64; 5] = [0.36 * 2.51, 0.6 * 0.03, 0.36 * 2.43, 0.6 * 0.59, 0.14];
 /// The tone curve, clipped to 0..1.
 fn aces(v: f32) -> f32 {
     let [a, b, c, d, e] = ACES.map(|k| k as f32);
-    // Beyond it squares overflow, and the display is white.
+    // Larger values would overflow when squared; the display is white there
     let v = v.clamp(0.0, 1e9);
     ((a * v + b) * v / ((c * v + d) * v + e)).clamp(0.0, 1.0)
 }
@@ -79,8 +79,8 @@ fn aces_inverse(t: f64) -> f64 {
     half + (half * half - constant).sqrt()
 }
 
-/// Exposures (stops) of the brightest and of the median pixel of a reference. Black pixels count in the median only
-/// if it is not black then; a black reference has the exposure 0.
+/// Exposures (stops) of the brightest and of the median pixel of a reference. If the median is black, it is taken over
+/// the other pixels. A black reference has the exposure 0.
 fn exposure_range(reference: &[Pixel]) -> [f64; 2] {
     let luminances = reference.iter().filter(|p| is_finite(p)).map(|p| f64::from(Rgb::from_array(*p).luminance()));
     let mut sorted: Vec<f64> = luminances.collect();
@@ -92,7 +92,7 @@ fn exposure_range(reference: &[Pixel]) -> [f64; 2] {
     [greatest, if of_all > 0.0 { of_all } else { median(lit.iter().copied()) }].map(|l| (white / l).log2())
 }
 
-/// LDR-ꟻLIP of what `display` makes of the values. Pixels that are not finite are black in both images.
+/// LDR-ꟻLIP of the values converted by `display`. Pixels that are not finite are black in both images.
 fn displayed(
     image: &[Pixel],
     reference: &[Pixel],
@@ -100,11 +100,14 @@ fn displayed(
     display: &dyn Fn(f32) -> f32,
     pixels_per_degree: f32,
 ) -> Vec<f32> {
+    // Check the sizes
     let pixels = size[0] * size[1];
     assert!(image.len() == pixels && reference.len() == pixels && pixels <= MAX_PIXELS, "images of the size told");
     if pixels == 0 {
         return Vec::new();
     }
+
+    // Convert to bytes
     let byte = |v: f32| (display(v) * 255.0 + 0.5) as u8;
     let shown = |this: &[Pixel], other: &[Pixel]| {
         let pairs = this.iter().zip(other);
@@ -112,6 +115,8 @@ fn displayed(
             pairs.flat_map(|(a, b)| if is_finite(a) && is_finite(b) { a.map(byte) } else { [0; 3] }).collect();
         FlipImageRgb8::with_data(size[0] as u32, size[1] as u32, &bytes)
     };
+
+    // Compare
     let (test, truth) = (shown(image, reference), shown(reference, image));
     nv_flip::flip(truth, test, pixels_per_degree).to_vec()
 }
@@ -161,12 +166,12 @@ mod tests {
 
     #[test]
     fn the_library_gives_the_published_difference_of_two_flat_colours() {
-        // Flat fields have no edges: ΔE is the HyAB distance to the power 0.7, compressed above 0.4 of its maximum.
+        // Flat fields have no edges: ΔE is the HyAB distance to the power 0.7, compressed above 0.4 of its maximum
         let size = [16, 16];
         let grey = |byte: f32| vec![[crate::imaging::color::srgb_to_linear(byte / 255.0); 3]; 256];
         let map = ldr_flip(&grey(120.0), &grey(100.0), size, 1.0, PPD);
-        // L* is 50.43 and 42.37. Green and blue are farthest apart: 55.4 in L*, and with the Hunt effect (−75.6, 72.9)
-        // and (25.6, −34.8) in a* and b*.
+        // L* is 50.43 and 42.37. Green and blue have the largest distance: 55.4 in L*, and with the Hunt effect (−75.6,
+        // 72.9) and (25.6, −34.8) in a* and b*
         let farthest = 55.4 + 101.2_f64.hypot(107.7);
         let expected = (50.43_f64 - 42.37).powf(0.7) * 0.95 / (0.4 * farthest.powf(0.7));
         assert!((mean_of_map(&map) - expected).abs() < 0.002, "{} {expected}", mean_of_map(&map));

@@ -1,7 +1,8 @@
-//! Metrics of the difference between an image and its reference: numbers for the whole, maps for the pixels.
+//! Metrics of the difference between an image and its reference: numbers for the image, maps for the pixels.
 //!
 //! Images are linear Rec.709 radiance, row-major from the top left. **Pixels that are not finite in either image are
-//! excluded from all means**; [`Differences`] counts them, maps are NaN there, and ꟻLIP sees black in both images.
+//! excluded from all means.** [`Differences`] counts them, maps are NaN there, and ꟻLIP treats them as black in both
+//! images.
 //!
 //! Reading order: [`difference`] (MSE, relative MSE, PSNR), [`mod@bias`], [`mod@significance`] (z-tests),
 //! [`perceptual`] (visual thresholds), [`flip`].
@@ -21,7 +22,7 @@ pub use significance::{Significance, significance, z_map};
 /// Linear red, green and blue.
 pub type Pixel = [f32; 3];
 
-/// All components are finite.
+/// True if all components are finite.
 #[inline]
 fn is_finite(pixel: &Pixel) -> bool {
     pixel.iter().all(|v| v.is_finite())
@@ -37,7 +38,7 @@ fn finite_pairs<'a>(
     finite.map(|(i, (x, r))| (i, x.map(f64::from), r.map(f64::from)))
 }
 
-/// Mean of the values of a map that are finite; 0 if none is.
+/// Mean of the finite values of a map; 0 if there are none.
 pub fn mean_of_map(map: &[f32]) -> f64 {
     let (sum, count) =
         map.iter().filter(|v| v.is_finite()).fold((0.0, 0_usize), |(s, n), &v| (s + f64::from(v), n + 1));

@@ -1,16 +1,16 @@
 //! Differences in units of the just noticeable difference.
 //!
-//! E = √(mean ((L − L_true) / tvi(L_true))²) over the pixels [Fan et al. 2006, Eq. 12], with L the luminance and tvi
-//! the threshold versus intensity of [Ferwerda et al. 1996, Sec. 3.1], piecewise in log₁₀ of the luminance (cd/m²):
+//! E = √(mean ((L − L_true) / tvi(L_true))²) over the pixels [Fan et al. 2006, Eq. 12]. L is the luminance. tvi is the
+//! threshold versus intensity of [Ferwerda et al. 1996, Sec. 3.1], piecewise in log₁₀ of the luminance (cd/m²):
 //!
 //! | | lowest | between | highest |
 //! |---|---|---|---|
 //! | cones, log t_p | −0.72 below −2.6 | (0.249 log L + 0.65)^2.7 − 0.72 | log L − 1.255 from 1.9 |
 //! | rods, log t_s | −2.86 below −3.94 | (0.405 log L + 1.6)^2.18 − 2.86 | log L − 0.395 from −1.44 |
 //!
-//! The paper does not say which function it uses: here tvi is the smaller of the two thresholds, that of the more
-//! sensitive system. They cross near 1 cd/m², rods below. Both use the photopic luminance, since an RGB image does not
-//! contain the scotopic one.
+//! The paper does not specify its function. Here tvi is the smaller of the two thresholds, i.e. the threshold of the
+//! more sensitive system. The thresholds cross near 1 cd/m²; below, rods are more sensitive. Both use the photopic
+//! luminance, since an RGB image does not contain the scotopic one.
 
 use super::{Pixel, finite_pairs, is_finite};
 use lumiris_numbers::math::Rgb;
@@ -37,16 +37,16 @@ fn rod_threshold(log: f64) -> f64 {
     })
 }
 
-/// The difference of luminance (cd/m²) that is just noticed at `luminance` (cd/m²). Darkness and what lies below it,
-/// or NaN, has the threshold of darkness.
+/// The just noticeable difference of luminance (cd/m²) at `luminance` (cd/m²). Values that are not positive, and NaN,
+/// have the absolute threshold.
 pub fn tvi(luminance: f64) -> f64 {
-    // The greater of NaN and a number is the number.
+    // The maximum of NaN and a number is the number
     let log = luminance.max(f64::MIN_POSITIVE).log10();
     cone_threshold(log).min(rod_threshold(log))
 }
 
-/// (L − L_true) / tvi(L_true) per pixel, where a luminance of 1 in the images is `candelas` cd/m²; NaN where a pixel
-/// is not finite. Panics if the lengths differ.
+/// (L − L_true) / tvi(L_true) per pixel, where a luminance of 1 in the images is `candelas` cd/m²; NaN if a pixel is
+/// not finite. Panics if the lengths differ.
 pub fn perceptual_map(image: &[Pixel], reference: &[Pixel], candelas: f64) -> Vec<f32> {
     assert_eq!(image.len(), reference.len(), "images of one size");
     let thresholds = |(x, r): (&Pixel, &Pixel)| {
@@ -55,13 +55,13 @@ pub fn perceptual_map(image: &[Pixel], reference: &[Pixel], candelas: f64) -> Ve
     image.iter().zip(reference).map(thresholds).collect()
 }
 
-/// The error E of the module's header, where a luminance of 1 in the images is 1 cd/m². 0 if no pixel is finite in
-/// both images. Panics if the lengths differ.
+/// The error E of the module header, where a luminance of 1 in the images is 1 cd/m². 0 if no pixel is finite in both
+/// images. Panics if the lengths differ.
 pub fn perceptual_error(image: &[Pixel], reference: &[Pixel]) -> f64 {
     perceptual_error_at(image, reference, 1.0)
 }
 
-/// [`perceptual_error`] where a luminance of 1 in the images is `candelas` cd/m².
+/// Like [`perceptual_error`], where a luminance of 1 in the images is `candelas` cd/m².
 pub fn perceptual_error_at(image: &[Pixel], reference: &[Pixel], candelas: f64) -> f64 {
     let (mut sum, mut count) = (0.0, 0_usize);
     for (i, ..) in finite_pairs(image, reference) {
@@ -85,12 +85,12 @@ mod tests {
 
     #[test]
     fn thresholds_are_those_of_the_published_curves() {
-        // Absolute threshold of the rods; Weber's law of the cones with the fraction 10^-1.255 = 5.56 %.
+        // Absolute threshold of the rods; Weber's law of the cones with the fraction 10^-1.255 = 5.56 %
         assert!((tvi(0.0) - 1.380_384e-3).abs() < 1e-9 && (tvi(1e-5) - tvi(0.0)).abs() < 1e-15);
         assert!((tvi(1000.0) / 1000.0 - 0.055_590).abs() < 1e-6 && (tvi(100.0) - 5.559_04).abs() < 1e-5);
-        // 1 cd/m²: cones 10^(0.65^2.7 − 0.72), rods 10^-0.395.
+        // 1 cd/m²: cones 10^(0.65^2.7 − 0.72), rods 10^-0.395
         assert!((cone_threshold(0.0) - 0.391_302).abs() < 1e-5 && (rod_threshold(0.0) - 0.402_72).abs() < 1e-5);
-        // 0.01 cd/m²: rods 10^(0.79^2.18 − 2.86), cones 10^(0.152^2.7 − 0.72).
+        // 0.01 cd/m²: rods 10^(0.79^2.18 − 2.86), cones 10^(0.152^2.7 − 0.72)
         assert!((tvi(0.01) - 0.005_472_3).abs() < 1e-6, "{}", tvi(0.01));
         assert!((cone_threshold(-2.0) - 0.193_277).abs() < 1e-5);
         assert!((tvi(10.0) - cone_threshold(1.0)).abs() < 1e-15 && (tvi(0.1) - rod_threshold(-1.0)).abs() < 1e-15);
@@ -100,7 +100,7 @@ mod tests {
     fn the_curves_join_and_rise() {
         for (curve, ends) in [(cone_threshold as fn(f64) -> f64, [-2.6, 1.9]), (rod_threshold, [-3.94, -1.44])] {
             for end in ends {
-                // As published, with three digits, the rods jump by 2.8 % at −1.44.
+                // With the published three digits, the rods jump by 2.8 % at −1.44
                 assert!((curve(end - 1e-9) / curve(end + 1e-9) - 1.0).abs() < 0.03, "{end}");
             }
         }

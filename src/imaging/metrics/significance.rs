@@ -1,53 +1,56 @@
-//! Can the difference of two images be noise?
+//! Significance of the difference of two images: tests whether it can be noise.
 //!
 //! Per value (pixel and channel) z = (x − r) / √(v_x + v_r) with the variances of the two means. If both images have
 //! the same expectation, the means are normal, and the variances are correct, z is standard normal. Three summaries:
-//! - the fraction of values with |z| > 3, of which 0.27 % are expected;
+//! - the fraction of values with |z| > 3; 0.27 % are expected;
 //! - the family-wise test: the smallest p-value p of n values rejects at the level α if it is below the Šidák level
-//!   1 − (1 − α)^(1/n); reported as 1 − (1 − p)^n. Channels of a pixel are not independent, which makes the test
+//!   1 − (1 − α)^(1/n). It is reported as 1 − (1 − p)^n. Channels of a pixel are not independent, which makes the test
 //!   conservative (Šidák's inequality);
-//! - χ² = Σ z² per channel with one degree of freedom per pixel; its upper tail, the smallest of three channels, again
-//!   by Šidák. It detects small deviations in many pixels.
+//! - χ² = Σ z² per channel with one degree of freedom per pixel. Reported is the upper tail, the smallest of three
+//!   channels, again by Šidák. It detects small deviations in many pixels.
 //!
-//! What violates the assumptions: variances estimated from few samples (z has the tails of Student's t, and where
-//! bright samples are rare, the variance is low exactly where the mean is), variances of stratified samples that are
-//! stated as if they were independent (too large: z is too small, and the tests miss differences), and neighbouring
-//! pixels that share samples.
+//! The assumptions are violated by:
+//! - variances estimated from few samples: z has the tails of Student's t, and if bright samples are rare, the variance
+//!   is low exactly where the mean is low;
+//! - variances of stratified samples computed as if the samples were independent: they are too large, z is too small,
+//!   and the tests miss differences;
+//! - neighbouring pixels that share samples.
 
 use super::{Pixel, finite_pairs};
 use lumiris_numbers::estimators::stats::{chi_squared_tail, z_test};
 
-/// Outcome of the tests of [`significance`].
+/// Result of [`significance`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Significance {
-    /// Values tested: finite, with a variance or a difference.
+    /// Number of tested values: finite, with a variance or a difference.
     pub values: usize,
     /// Fraction of the values with |z| > 3.
     pub beyond: f64,
     /// The largest |z|; infinite if values without variance differ.
     pub max_z: f64,
-    /// Probability that the largest |z| of that many values is at least `max_z`.
+    /// Probability that the largest |z| of `values` values is at least `max_z`.
     pub family_p: f64,
-    /// Mean of z² over the finite z: about 1 if all is right.
+    /// Mean of z² over the finite z; the expected value is 1.
     pub mean_square: f64,
-    /// Probability of a χ² at least as large in one of the three channels.
+    /// Probability of a χ² at least this large in one of the three channels.
     pub chi_squared_p: f64,
-    /// Values that differ although neither has a variance: their z is infinite. They are in all but the χ².
+    /// Number of values that differ although neither has a variance. Their z is infinite. They count in all results
+    /// except χ².
     pub certain: usize,
 }
 
-/// Relative rounding of values that were computed and stored in f32.
+/// Relative rounding error of values computed and stored in f32.
 pub const F32_ROUNDING: f64 = 1.0 / (1_u32 << 22) as f64;
-/// Relative rounding of values that were stored as 16-bit floats.
+/// Relative rounding error of values stored as 16-bit floats.
 pub const HALF_ROUNDING: f64 = 1.0 / (1_u32 << 11) as f64;
 
-/// z of a value; `None` if there is neither a variance nor a difference beyond rounding, `rounding` being that of the
-/// coarser of the two files.
+/// z of a value; `None` if there is neither a variance nor a difference beyond rounding. `rounding` is the relative
+/// rounding error of the coarser file.
 fn z_of(x: f64, r: f64, variance: f64, rounding: f64) -> Option<f64> {
     let difference = x - r;
     let max = rounding * x.abs().max(r.abs());
     if variance > 0.0 {
-        // Rounding is uniform over ± `max`.
+        // The rounding error is uniform over ± `max`
         return Some(difference / (variance + max * max / 3.0).sqrt());
     }
     (difference.abs() > 2.0 * max).then_some(difference.signum() * f64::INFINITY)
@@ -61,9 +64,10 @@ fn p_of_minimum(p: f64, n: usize) -> f64 {
     -((-p).ln_1p() * n as f64).exp_m1()
 }
 
-/// Tests all values of an image. `variance` holds v_x + v_r per pixel; values whose variance is not finite take no
-/// part. `rounding` is [`F32_ROUNDING`] or [`HALF_ROUNDING`]. Panics if the lengths differ.
+/// Tests all values of an image. `variance` holds v_x + v_r per pixel; values without a finite variance are excluded.
+/// `rounding` is [`F32_ROUNDING`] or [`HALF_ROUNDING`]. Panics if the lengths differ.
 pub fn significance(image: &[Pixel], reference: &[Pixel], variance: &[Pixel], rounding: f64) -> Significance {
+    // Accumulate z of all values
     assert_eq!(image.len(), variance.len(), "a variance per pixel");
     let (mut beyond, mut certain, mut max_z) = (0_usize, 0_usize, 0.0_f64);
     let (mut squares, mut dof) = ([0.0; 3], [0_usize; 3]);
@@ -81,6 +85,8 @@ pub fn significance(image: &[Pixel], reference: &[Pixel], variance: &[Pixel], ro
             }
         }
     }
+
+    // p-values of the maximum and of χ²
     let finite: usize = dof.iter().sum();
     let values = finite + certain;
     let p_channels = (0..3).map(|c| chi_squared_tail(squares[c], dof[c]));
@@ -95,8 +101,8 @@ pub fn significance(image: &[Pixel], reference: &[Pixel], variance: &[Pixel], ro
     }
 }
 
-/// The z of largest magnitude among the channels of each pixel; NaN where a pixel takes no part, 0 where it has neither
-/// variance nor difference. Panics if the lengths differ.
+/// The z of largest magnitude among the channels of each pixel; NaN for excluded pixels, 0 without variance and
+/// difference. Panics if the lengths differ.
 pub fn z_map(image: &[Pixel], reference: &[Pixel], variance: &[Pixel], rounding: f64) -> Vec<f32> {
     assert_eq!(image.len(), variance.len(), "a variance per pixel");
     let mut map = vec![f32::NAN; image.len()];
@@ -123,12 +129,12 @@ mod tests {
         // z: 0 6 0 | 1 0 –
         let s = significance(&image, &reference, &variance, F32_ROUNDING);
         assert_eq!((s.values, s.beyond, s.certain), (5, 0.2, 0));
-        // The rounding of f32 adds next to nothing to the variance.
+        // The rounding of f32 adds almost nothing to the variance
         assert!((s.max_z - 6.0).abs() < 1e-9);
         assert!((s.mean_square - 37.0 / 5.0).abs() < 1e-9);
-        // Two-sided p of 6σ: 1.9732e-9, the least of five.
+        // Two-sided p of 6σ: 1.9732e-9, the smallest of five
         assert!((s.family_p / (5.0 * 1.973_175e-9) - 1.0).abs() < 1e-5, "{s:?}");
-        // χ² = 36 with 2 degrees of freedom: e^-18, the least of three.
+        // χ² = 36 with 2 degrees of freedom: e^-18, the smallest of three
         assert!((s.chi_squared_p / (3.0 * (-18.0_f64).exp()) - 1.0).abs() < 1e-6, "{s:?}");
         assert_eq!(z_map(&image, &reference, &variance, F32_ROUNDING), [6.0, 1.0]);
     }
@@ -148,7 +154,7 @@ mod tests {
         let test = |variance: f32, rounding| significance(&image, &reference, &[[variance; 3]], rounding);
         assert_eq!(test(0.0, HALF_ROUNDING).values, 0);
         assert_eq!(test(0.0, F32_ROUNDING).certain, 3);
-        // The variance of the rounding is (17 / 2048)² / 3 = (4.79e-3)².
+        // The variance of the rounding is (17 / 2048)² / 3 = (4.79e-3)²
         assert!((test(1e-9, HALF_ROUNDING).max_z - 0.0153 / 4.79e-3).abs() < 0.01);
         assert!(test(1e-9, F32_ROUNDING).max_z > 400.0);
     }

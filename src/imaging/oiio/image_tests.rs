@@ -1,4 +1,4 @@
-//! What is written is read again, and what cannot be is an error.
+//! Files are read as they were written, and failures are errors.
 
 use super::write::NO_DATE;
 use super::*;
@@ -31,7 +31,7 @@ fn exr_keeps_floats_metadata_and_windows() {
     assert_eq!(read.metadata.get("lumiris:seed").map(String::as_str), Some("7"));
     assert_eq!(read.encoding, ColorEncoding::Linear);
     assert_eq!(read.window, Window { origin: [4, 5], full_origin: [0, 0], full_size: [30, 20] });
-    // Nothing is left beside it.
+    // No temporary file is left
     assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
 }
 
@@ -84,7 +84,7 @@ fn an_exr_holds_parts_with_names_half_floats_and_values() {
     let error = read_part(&path, 2, &limits).unwrap_err();
     assert!(matches!(&error, ImageError::Unreadable { .. }) && error.to_string().contains("2 parts"), "{error}");
 
-    // The same parts give the same bytes.
+    // The same parts give the same bytes
     let again = folder.path().join("b.exr");
     write_image(&again, &[first, second]).unwrap();
     assert_eq!(std::fs::read(&path).unwrap(), std::fs::read(&again).unwrap());
@@ -109,7 +109,7 @@ fn damaged_and_refused_files_are_errors_in_every_format() {
             assert!(error.to_string().contains("whole."), "{error}");
         }
 
-        // Not a folder that can be written to; a folder in the file's place.
+        // A folder that cannot be written to; a folder with the name of the file
         let error = write_image(&path.join("below.exr"), std::slice::from_ref(&part)).unwrap_err();
         assert!(matches!(error, ImageError::Write { .. }), "{error}");
         let taken = folder.path().join(format!("taken.{extension}"));
@@ -136,11 +136,13 @@ fn png_keeps_eight_bits_and_is_taken_as_srgb() {
 
 #[test]
 fn failures_say_what_and_leave_nothing() {
+    // Missing files and folders
     let folder = tempfile::tempdir().unwrap();
     let limits = ReadLimits::default();
     assert!(matches!(read_image(&folder.path().join("no.exr"), &limits), Err(ImageError::NotFound { .. })));
     assert!(matches!(read_image(folder.path(), &limits), Err(ImageError::Unreadable { .. })));
 
+    // Too large and truncated files
     let path = folder.path().join("a.exr");
     write_image(&path, &[Part::linear(8, 8, names(&["Y"]), vec![0.5; 64])]).unwrap();
     assert!(matches!(read_image(&path, &ReadLimits { max_bytes: 100, ..limits }), Err(ImageError::TooLarge { .. })));
@@ -148,6 +150,7 @@ fn failures_say_what_and_leave_nothing() {
     std::fs::write(&path, &bytes[..bytes.len() / 2]).unwrap();
     assert!(matches!(read_image(&path, &limits), Err(ImageError::Unreadable { .. })));
 
+    // A failed write keeps the old file
     let good = std::fs::read(&path).unwrap();
     let wrong = Part::linear(8, 8, names(&["Y"]), vec![0.5; 3]);
     assert!(matches!(write_image(&path, &[wrong]), Err(ImageError::Write { .. })));
@@ -156,10 +159,11 @@ fn failures_say_what_and_leave_nothing() {
     assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
 }
 
-/// OpenEXR's threads were as many as each file asked for, and a file that was being written when another changed that was never
-/// complete.
+/// Regression test. OpenEXR's thread count was set for each file, and a file that was being written when another
+/// changed it was never completed.
 #[test]
 fn files_are_written_and_read_at_the_same_time() {
+    // Write and read small and large files in four threads
     let (done, all) = std::sync::mpsc::channel();
     for thread in 0..4_usize {
         let done = done.clone();
@@ -175,6 +179,8 @@ fn files_are_written_and_read_at_the_same_time() {
             done.send(()).unwrap();
         });
     }
+
+    // Wait for all threads
     for _ in 0..4 {
         all.recv_timeout(std::time::Duration::from_secs(300)).expect("a file is neither written nor refused");
     }

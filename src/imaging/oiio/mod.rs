@@ -1,11 +1,11 @@
-//! Image files, by OpenImageIO: the safe layer over the shim.
+//! Image files by OpenImageIO: safe wrapper of the shim.
 //!
-//! OpenImageIO is loaded when the first image is read or written. Reading refuses images whose header requests more
-//! memory than the caller allows; writing goes to a temporary file beside the target, which is renamed at the end, so
-//! that a failure never leaves a partial image under the name. Equal images give equal files: a date is written only if
-//! the caller gives one (`DateTime`), since OpenImageIO would fill in the current time.
+//! OpenImageIO is loaded when the first image is read or written. Images whose header requests more memory than the
+//! caller allows are rejected. Files are written under a temporary name and renamed at the end, so that a failure never
+//! leaves a partial image under the name. Equal images give equal files: a date is written only if the caller gives one
+//! (`DateTime`), since OpenImageIO would insert the current time.
 //!
-//! Reading order: [`part`] (what is written), [`shim`] (calls and strings), [`radiance`], [`read`], [`pyramid`], [`mod@write`], [`ocio`].
+//! Reading order: `part` (images to write), `shim` (calls and strings), `radiance`, `read`, `pyramid`, `write`, `ocio`.
 
 mod ocio;
 mod part;

@@ -1,4 +1,4 @@
-//! Colours for a display, by OpenColorIO.
+//! Display colours by OpenColorIO.
 #![allow(unsafe_code)]
 
 use super::shim::{api, c_text, call, text};
@@ -18,8 +18,8 @@ pub struct OcioView<'a> {
     pub looks: &'a str,
 }
 
-/// Turns RGB triples into the colours of a display, by the configuration that the environment variable OCIO names.
-/// Returns display and view.
+/// Converts RGB triples to the colours of a display, by the configuration in the environment variable OCIO. Returns
+/// display and view.
 pub fn ocio_display(pixels: &mut [f32], view: &OcioView<'_>) -> Result<[String; 2], ImageError> {
     let api = api()?;
     let [input, display, name, looks] =
@@ -27,7 +27,7 @@ pub fn ocio_display(pixels: &mut [f32], view: &OcioView<'_>) -> Result<[String; 
     let (input, display, name, looks) = (input?, display?, name?, looks?);
     let mut chosen = [0 as c_char; 512];
     let (data, count, chosen_size) = (pixels.as_mut_ptr(), pixels.len() as u64, chosen.len());
-    // SAFETY: the names end in a zero byte, `data` holds `count` floats, and `chosen` as many bytes as it says.
+    // SAFETY: the names end in a zero byte, `data` holds `count` floats, and `chosen` `chosen_size` bytes.
     call(|e, n| unsafe {
         let [input, display, name, looks] = [&input, &display, &name, &looks].map(|text| text.as_ptr());
         (api.ocio_display)(input, display, name, looks, data, count, chosen.as_mut_ptr(), chosen_size, e, n)

@@ -1,8 +1,8 @@
-//! Images to write: pixels, metadata, and how they are stored.
+//! Images to write: pixels, metadata and storage.
 
 use openimageio_sys as sys;
 
-/// How the values of a part are stored.
+/// Storage type of values.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Storage {
     /// 8-bit integers for 0..1.
@@ -22,7 +22,7 @@ impl Storage {
         }
     }
 
-    /// What holds the values of a format: a float, where it is none of the others.
+    /// The storage type for values of a format; `Float` for other formats.
     pub(super) fn of_format(format: i32) -> Self {
         match format {
             sys::OIIO_FORMAT_U8 => Storage::Bytes,
@@ -41,7 +41,7 @@ pub enum MetaValue {
     Integer(i32),
     /// A number.
     Number(f32),
-    /// A matrix for row vectors, row by row.
+    /// A 4 × 4 matrix for row vectors, row by row.
     Matrix([f32; 16]),
 }
 
@@ -53,7 +53,7 @@ pub struct Part {
     pub(super) channels: Vec<String>,
     pub(super) data: Vec<f32>,
     pub(super) metadata: Vec<(String, MetaValue)>,
-    /// Column and row of the first pixel inside the full image.
+    /// Column and row of the first pixel in the full image.
     pub(super) origin: [usize; 2],
     /// Size of the full image.
     pub(super) full: [usize; 2],
@@ -65,8 +65,8 @@ pub struct Part {
 }
 
 impl Part {
-    /// Linear values, stored as f32. `data` is row-major from the top left, channels interleaved; it is empty where
-    /// values are made while they are written.
+    /// Linear values, stored as f32. `data` is row-major from the top left, channels interleaved. It is empty if values
+    /// are computed while the file is written.
     pub fn linear(width: usize, height: usize, channels: Vec<String>, data: Vec<f32>) -> Self {
         Part {
             width,
@@ -88,7 +88,7 @@ impl Part {
         Part { storage: Storage::Bytes, ..Part::linear(width, height, channels, data) }
     }
 
-    /// Adds metadata that is text.
+    /// Adds text metadata.
     #[must_use]
     pub fn with_metadata(mut self, metadata: Vec<(String, String)>) -> Self {
         self.metadata.extend(metadata.into_iter().map(|(name, value)| (name, MetaValue::Text(value))));
@@ -102,21 +102,21 @@ impl Part {
         self
     }
 
-    /// Names the part, which files of several parts need.
+    /// Names the part. Required in files of several parts.
     #[must_use]
     pub fn named(mut self, name: &str) -> Self {
         self.name = Some(name.to_owned());
         self
     }
 
-    /// Chooses how all channels are stored.
+    /// Sets the storage of all channels.
     #[must_use]
     pub fn stored_as(mut self, storage: Storage) -> Self {
         (self.storage, self.channel_storage) = (storage, Vec::new());
         self
     }
 
-    /// Chooses how some channels are stored (EXR only). Unknown names are ignored.
+    /// Sets the storage of some channels (EXR only). Unknown names are ignored.
     #[must_use]
     pub fn channels_stored_as(mut self, names: &[&str], storage: Storage) -> Self {
         let found = self.channels.iter().enumerate().filter(|(_, name)| names.contains(&name.as_str()));
@@ -124,14 +124,14 @@ impl Part {
         self
     }
 
-    /// Chooses the compression, as OpenImageIO names it: `piz`, `dwaa:45`, `jpeg:90`. EXR files use `zip` by default.
+    /// Sets the compression by its OpenImageIO name: `piz`, `dwaa:45`, `jpeg:90`. EXR files use `zip` by default.
     #[must_use]
     pub fn compressed_by(mut self, compression: &str) -> Self {
         self.compression = Some(compression.to_owned());
         self
     }
 
-    /// Says which part of a larger image this is.
+    /// Sets the position in a larger image.
     #[must_use]
     pub fn with_window(mut self, origin: [usize; 2], full: [usize; 2]) -> Self {
         (self.origin, self.full) = (origin, full);

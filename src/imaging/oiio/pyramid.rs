@@ -1,4 +1,4 @@
-//! Files that hold a whole pyramid, such as the `.tx` files of texture converters.
+//! Files with a whole pyramid, such as the `.tx` files of texture converters.
 
 use super::read::{Input, read_failure, usual_encoding};
 use crate::imaging::ColorEncoding;
@@ -8,13 +8,13 @@ use openimageio_sys as sys;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
-/// Most pixels of a tile: the headers of damaged files ask for more, and OpenImageIO would allocate them.
+/// Maximum pixels of a tile: headers of damaged files can claim more, and OpenImageIO would allocate them.
 const MAX_TILE: u64 = 1 << 22;
 
-/// A file open for reading, whose image has all levels from the whole to one pixel, each of half the size of the one before,
-/// rounded down.
+/// A file open for reading, with all levels of its image down to one pixel. Each level has half the size of the
+/// previous one, rounded down.
 pub struct FilePyramid {
-    /// One thread at a time reads.
+    /// Locked, because one thread at a time may read.
     input: Mutex<Input>,
     path: PathBuf,
     sizes: Vec<[usize; 2]>,
@@ -32,7 +32,7 @@ impl std::fmt::Debug for FilePyramid {
 }
 
 impl FilePyramid {
-    /// Opens a file; `None` if it is an image without all levels. Reads no pixels.
+    /// Opens a file without reading pixels. Returns `None` if the image does not have all levels.
     pub fn open(path: &Path) -> Result<Option<Self>, ImageError> {
         let (input, layer) = Input::open_colors(path)?;
         let failed = |failure| read_failure(path, failure);
@@ -55,32 +55,32 @@ impl FilePyramid {
         &self.path
     }
 
-    /// Columns and rows of each level; the image itself is the first.
+    /// Columns and rows of each level, the full image first.
     pub fn sizes(&self) -> &[[usize; 2]] {
         &self.sizes
     }
 
-    /// Where the colours are among the channels.
+    /// The colour channels.
     pub fn layer(&self) -> &ColorLayer {
         &self.layer
     }
 
-    /// The usual encoding of such a file.
+    /// The default encoding of the file type.
     pub fn encoding(&self) -> ColorEncoding {
         self.encoding
     }
 
-    /// What the file says of its colour space: x and y of red, green, blue and white.
+    /// Colour space given in the file: x and y of red, green, blue and white.
     pub fn chromaticities(&self) -> Option<&str> {
         self.chromaticities.as_deref()
     }
 
-    /// All values are multiples of 1/255 in 0..1.
+    /// True if all values are multiples of 1/255 in 0..1.
     pub fn is_bytes(&self) -> bool {
         self.is_bytes
     }
 
-    /// Some channels of all pixels of a level, interleaved, the top row first.
+    /// Some channels of all pixels of a level, interleaved, top row first.
     pub fn level(&self, level: usize, channels: &[usize]) -> Result<Vec<f32>, ImageError> {
         let size = self.sizes[level];
         let bytes = size.iter().fold(4 * self.channels, |bytes, &n| bytes.saturating_mul(n as u64));
@@ -95,7 +95,7 @@ impl FilePyramid {
         self.region(level, [0; 2], size, channels)
     }
 
-    /// The same of the pixels from `origin` on, in `size` columns and rows, which the level must hold.
+    /// The same for a region of `size` columns and rows from `origin` on, which must lie inside the level.
     pub fn region(
         &self,
         level: usize,
@@ -103,7 +103,7 @@ impl FilePyramid {
         size: [usize; 2],
         channels: &[usize],
     ) -> Result<Vec<f32>, ImageError> {
-        // Sizes of a file fit, since that is how it tells them
+        // Sizes fit into an i32, because they come from one
         let int = |n: usize| i32::try_from(n).unwrap_or(i32::MAX);
         let begin = channels.iter().copied().min().unwrap_or(0);
         let end = channels.iter().copied().max().unwrap_or(0) + 1;
@@ -120,7 +120,7 @@ impl FilePyramid {
     }
 }
 
-/// Sizes of the levels, if there are several and these are all.
+/// Sizes of the levels. `None` if there is only one, or some are missing.
 fn all_levels(input: &Input) -> Option<Vec<[usize; 2]>> {
     let size = |level: usize| {
         let sys::OiioLevel { width, height, tile_width, tile_height } = input.level(i32::try_from(level).ok()?)?;

@@ -1,31 +1,32 @@
-//! Radiance pictures (`.hdr`): what OpenImageIO leaves to its callers, since it returns the numbers as they are stored.
+//! Radiance pictures (`.hdr`): orientation and exposure, which OpenImageIO does not apply.
 //!
-//! A header says in which of eight orders pixels are stored, `-Y height +X width` being rows from the top: the first axis is
-//! that of the lines, `-Y` goes down and `+X` to the right. `EXPOSURE` and `COLORCORR` are factors that have been applied to
-//! radiance, each as often as it is given [Ward 1991, "File formats" of the Radiance manual].
+//! The header gives one of eight pixel orders. The first axis is the direction from line to line, the second the
+//! direction within a line; `-Y` goes down and `+X` to the right, so `-Y height +X width` means rows from the top.
+//! `EXPOSURE` and `COLORCORR` are factors that were applied to the radiance, once per occurrence [Ward 1991, "File
+//! formats" of the Radiance manual].
 
 use std::fs::File;
 use std::io::Read;
 use std::path::Path;
 
-/// Bytes in which a header must end.
+/// Maximum bytes of a header.
 const MAX_HEADER: u64 = 1 << 16;
 
-/// How the pixels of a picture are stored.
+/// Pixel order and factors of a picture.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Storage {
-    /// Lines are columns.
+    /// True if lines are columns.
     pub is_by_columns: bool,
-    /// From the right to the left.
+    /// True if x runs from right to left.
     from_right: bool,
-    /// From the bottom up.
+    /// True if y runs from bottom to top.
     from_bottom: bool,
-    /// By which red, green and blue have been multiplied.
+    /// Factors that were applied to red, green and blue.
     factors: [f32; 3],
 }
 
 impl Storage {
-    /// Of a picture whose pixels are not as they should be; `None` for any other file.
+    /// The storage of a picture that has to be converted; `None` for all other files.
     pub(super) fn of(path: &Path) -> Option<Self> {
         let mut head = Vec::new();
         let mut file = File::open(path).ok()?;
@@ -48,7 +49,7 @@ impl Storage {
                 ("COLORCORR", [r, g, b]) => [*r, *g, *b],
                 _ => continue,
             };
-            // Some programs write 0 for what they do not know
+            // Some programs write 0 for unknown factors
             if applied.iter().all(|factor| *factor > 0.0 && factor.is_finite()) {
                 factors = std::array::from_fn(|c| factors[c] * applied[c]);
             }
@@ -61,7 +62,7 @@ impl Storage {
         Some(Storage { is_by_columns, from_right: x == "-X", from_bottom: y == "+Y", factors })
     }
 
-    /// Radiance, row by row from the top, of RGB pixels in lines of `length`, of which there are `count`.
+    /// Radiance, row by row from the top. `stored` are RGB pixels in `count` lines of `length` pixels.
     pub(super) fn arranged(&self, stored: &[f32], [length, count]: [usize; 2]) -> Vec<f32> {
         let [width, height] = if self.is_by_columns { [count, length] } else { [length, count] };
         let pixel = |i: usize| {
@@ -76,7 +77,7 @@ impl Storage {
 }
 
 impl Default for Storage {
-    /// Rows from the top, of radiance.
+    /// Rows from the top, without factors.
     fn default() -> Self {
         Storage { is_by_columns: false, from_right: false, from_bottom: false, factors: [1.0; 3] }
     }
@@ -86,7 +87,7 @@ impl Default for Storage {
 mod tests {
     use super::super::{ReadLimits, read_headers, read_image};
 
-    /// A picture of 3 × 2 pixels whose red is 1 + x and whose green is 1 + y, stored in an order.
+    /// A picture of 3 × 2 pixels whose red is 1 + x and whose green is 1 + y, in the given pixel order.
     fn picture(header: &str, [first, second]: [&str; 2]) -> Vec<u8> {
         let size = |axis: &str| if axis.ends_with('X') { 3 } else { 2 };
         let mut file = format!("#?RADIANCE\n{header}FORMAT=32-bit_rle_rgbe\n\n");
@@ -97,7 +98,7 @@ mod tests {
                 let (x, y) = if first.ends_with('X') { ((first, i), (second, j)) } else { ((second, j), (first, i)) };
                 let x = if x.0 == "+X" { x.1 } else { 2 - x.1 };
                 let y = if y.0 == "-Y" { y.1 } else { 1 - y.1 };
-                // An exponent of 136 leaves bytes as they are
+                // With the exponent 136, values equal the bytes
                 file.extend([1 + x as u8, 1 + y as u8, 7, 136]);
             }
         }

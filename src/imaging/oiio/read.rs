@@ -12,20 +12,20 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use std::ptr;
 
-/// An image as read.
+/// An image as read from a file.
 #[derive(Clone, Debug)]
 pub struct ReadImage {
-    /// The pixels: integers of the file are 0..1 here, and nothing is decoded.
+    /// The pixels, not decoded. Integers are scaled to 0..1.
     pub image: Image,
-    /// The usual encoding of such a file: sRGB for 8-bit and 16-bit integers, linear for everything else.
+    /// The default encoding of the file type: sRGB for 8-bit and 16-bit integers, linear for everything else.
     pub encoding: ColorEncoding,
     /// Metadata by name, as text.
     pub metadata: BTreeMap<String, String>,
     /// Number of parts in the file.
     pub parts: usize,
-    /// Where the pixels lie in the full image.
+    /// Position of the pixels in the full image.
     pub window: Window,
-    /// The values are stored as 16-bit floats.
+    /// True if the values are stored as 16-bit floats.
     pub is_half: bool,
 }
 
@@ -34,7 +34,7 @@ pub(in crate::imaging) struct Input {
     api: &'static sys::Api,
     handle: *mut sys::OiioInput,
     part: i32,
-    /// How the pixels of a Radiance picture are stored, if otherwise than others.
+    /// Storage of a Radiance picture that has to be converted.
     stored: Option<radiance::Storage>,
 }
 
@@ -62,7 +62,7 @@ impl Input {
         Ok(Input { api, handle, part, stored: radiance::Storage::of(path) })
     }
 
-    /// Opens a file at the part that is the image, and says where in it the colours are.
+    /// Opens a file at the part with the image, and returns the image's colour channels.
     pub(super) fn open_colors(path: &Path) -> Result<(Self, ColorLayer), ImageError> {
         let mut input = Input::open(path, 0)?;
         let headers = input.headers().map_err(|failure| read_failure(path, failure))?;
@@ -72,7 +72,7 @@ impl Input {
         Ok((input, layer))
     }
 
-    /// A level of the part, if there is one.
+    /// A level of the part; `None` if it does not exist.
     pub(super) fn level(&self, level: i32) -> Option<sys::OiioLevel> {
         let mut found = sys::OiioLevel::default();
         // SAFETY: the handle is live until drop, here and below.
@@ -80,7 +80,7 @@ impl Input {
         Some(found)
     }
 
-    /// The pixels of a level from `origin` on, in `size` columns and rows, of a range of channels.
+    /// The pixels of a region of a level, `size` columns and rows from `origin` on, for a range of channels.
     pub(super) fn region(
         &self,
         level: i32,
@@ -92,7 +92,7 @@ impl Input {
         let mut pixels = vec![0.0; counts.iter().product()];
         let ([x, y], [width, height], [begin, end]) = (origin, size, channels);
         let (out, count) = (pixels.as_mut_ptr(), pixels.len() as u64);
-        // SAFETY: as above; `out` holds `count` floats, and nothing is written unless these are as many as asked for.
+        // SAFETY: as above; `out` holds `count` floats, and nothing is written unless this is the requested number.
         call(|e, n| unsafe {
             (self.api.input_read_region)(
                 self.handle,
@@ -142,7 +142,7 @@ impl Input {
         (0..count).map(|i| self.channel(i).map(|(name, _)| name)).collect()
     }
 
-    /// How the channels of the part are stored.
+    /// Storage types of the channels of the part.
     pub(in crate::imaging) fn storage(&self) -> Result<Vec<Storage>, (i32, String)> {
         (0..self.spec()?.nchannels).map(|i| self.channel(i).map(|(_, storage)| storage)).collect()
     }
@@ -163,13 +163,13 @@ impl Input {
         Ok(headers)
     }
 
-    /// The metadata of the part whose types [`MetaValue`] has.
+    /// Metadata of the part with types that [`MetaValue`] supports.
     pub(in crate::imaging) fn values(&self) -> Result<Vec<(String, MetaValue)>, (i32, String)> {
         let value = |a: &sys::OiioAttribute| {
             let bytes: &[u8] = if a.data.is_null() {
                 &[]
             } else {
-                // SAFETY: the shim says that so many bytes are there; they are copied while the handle is live.
+                // SAFETY: the shim guarantees `bytes` bytes at `data`; they are copied while the handle is live.
                 unsafe { std::slice::from_raw_parts(a.data.cast(), a.bytes) }
             };
             let words: Vec<[u8; 4]> = bytes.as_chunks().0.to_vec();
@@ -194,7 +194,7 @@ impl Input {
         (0..count).filter_map(entry).collect()
     }
 
-    /// What `read` makes of an entry of metadata.
+    /// Calls `read` with a metadata entry.
     fn attribute<T>(&self, index: i32, read: impl FnOnce(&sys::OiioAttribute) -> Option<T>) -> Option<T> {
         let mut a = sys::OiioAttribute {
             name: ptr::null(),
@@ -203,7 +203,7 @@ impl Input {
             data: ptr::null(),
             bytes: 0,
         };
-        // SAFETY: as above; `read` copies what it needs while the handle is live.
+        // SAFETY: as above; `read` copies its values while the handle is live.
         call(|e, n| unsafe { (self.api.input_attribute)(self.handle, self.part, index, &mut a, e, n) }).ok()?;
         read(&a)
     }
@@ -234,14 +234,14 @@ pub fn read_image(path: &Path, limits: &ReadLimits) -> Result<ReadImage, ImageEr
     read_part(path, 0, limits)
 }
 
-/// Reads the part of a file that is the image, and says where in it the colours are: what is read wherever an image is
-/// asked for, and no layer. `Err` if that is not clear.
+/// Reads the part of a file with the image, and returns its colour channels. Used wherever no layer is selected. `Err`
+/// if the choice is ambiguous.
 pub fn read_colors(path: &Path, limits: &ReadLimits) -> Result<(ReadImage, ColorLayer), ImageError> {
     let (input, layer) = Input::open_colors(path)?;
     Ok((read(&input, path, layer.part, limits)?, layer))
 }
 
-/// Reads a part of an image, counted from 0.
+/// Reads a part of an image; the first is 0.
 pub fn read_part(path: &Path, part: usize, limits: &ReadLimits) -> Result<ReadImage, ImageError> {
     read(&Input::open(path, i32::try_from(part).unwrap_or(i32::MAX))?, path, part, limits)
 }
@@ -258,7 +258,7 @@ fn read(input: &Input, path: &Path, part: usize, limits: &ReadLimits) -> Result<
     let channels = input.channels(spec.nchannels).map_err(failed)?;
     let metadata = input.metadata(spec.attributes);
     let encoding = usual_encoding(&spec);
-    // The header was checked against the pixels by the shim: the sizes are positive.
+    // The shim checked the header against the pixels: the sizes are positive
     let image = Image { width: spec.width as usize, height: spec.height as usize, channels, data };
     let size = |n: i32| usize::try_from(n).unwrap_or(0);
     let window = Window {
@@ -269,26 +269,26 @@ fn read(input: &Input, path: &Path, part: usize, limits: &ReadLimits) -> Result<
     Ok(ReadImage { image, encoding, metadata, parts, window, is_half: spec.format == sys::OIIO_FORMAT_HALF })
 }
 
-/// The usual encoding of a file: sRGB for 8-bit and 16-bit integers, linear for everything else.
+/// The default encoding of a file: sRGB for 8-bit and 16-bit integers, linear for everything else.
 pub(super) fn usual_encoding(spec: &sys::OiioSpec) -> ColorEncoding {
     let is_integer = matches!(spec.format, sys::OIIO_FORMAT_U8 | sys::OIIO_FORMAT_U16);
     if is_integer { ColorEncoding::Srgb } else { ColorEncoding::Linear }
 }
 
-/// Reads the metadata of the first part of an image, as text by name, and no pixels.
+/// Reads the metadata of the first part of an image as text, without pixels.
 pub fn read_metadata(path: &Path) -> Result<BTreeMap<String, String>, ImageError> {
     let input = Input::open(path, 0)?;
     let spec = input.spec().map_err(|failure| read_failure(path, failure))?;
     Ok(input.metadata(spec.attributes))
 }
 
-/// Reads the headers of all parts of an image, and no pixels.
+/// Reads the headers of all parts of an image, without pixels.
 pub fn read_headers(path: &Path) -> Result<Vec<PartHeader>, ImageError> {
     Input::open(path, 0)?.headers().map_err(|failure| read_failure(path, failure))
 }
 
-/// Bytes that the colours of an image take as a texture, without coarser levels: one for each 8-bit number, four for any
-/// other. Reads no pixels.
+/// Memory of the colours of an image as a texture (bytes), without coarser levels: one byte per 8-bit value, four for
+/// others. Reads no pixels.
 pub fn texture_bytes(path: &Path) -> Result<u64, ImageError> {
     let (input, layer) = Input::open_colors(path)?;
     let spec = input.spec().map_err(|failure| read_failure(path, failure))?;
@@ -298,7 +298,7 @@ pub fn texture_bytes(path: &Path) -> Result<u64, ImageError> {
     Ok(width.saturating_mul(height).saturating_mul(channels * bytes))
 }
 
-/// The error of a file that was not read.
+/// The error of a failed read.
 pub(in crate::imaging) fn read_failure(path: &Path, (code, reason): (i32, String)) -> ImageError {
     let path = path.to_owned();
     match code {

@@ -13,7 +13,7 @@ use std::ops::Range;
 use std::path::Path;
 use std::ptr;
 
-/// What stands for a date where there is none.
+/// Date of files without a date.
 pub(super) const NO_DATE: &str = "1970:01:01 00:00:00";
 
 /// A file being written.
@@ -114,7 +114,7 @@ impl Output {
                 begin = rows.end;
             }
         }
-        // SAFETY: as above; what was written is flushed, and a full disk shows here.
+        // SAFETY: as above. Data are flushed here, so a full disk is reported.
         call(|e, n| unsafe { (self.api.output_close)(self.handle, e, n) }).map_err(|(_, m)| m)
     }
 }
@@ -126,27 +126,27 @@ impl Drop for Output {
     }
 }
 
-/// Rows that are written together: enough for all threads that compress them, 16 at a time.
+/// Rows that are written together. OpenEXR compresses 16 rows per thread.
 pub const ROWS_AT_ONCE: usize = 64;
 
-/// Makes the values of some rows of a part, interleaved. Parts are asked for one after the other, their rows in order.
+/// Computes the values of some rows of a part, interleaved. Called for one part after the other, with rows in order.
 pub type RowSource<'a> = dyn Fn(usize, Range<usize>) -> Cow<'a, [f32]> + 'a;
 
-/// Writes an image; several parts in EXR only. Either the whole file appears under its name, or none.
+/// Writes an image; several parts in EXR only. On failure, no file appears under the name.
 pub fn write_image(path: &Path, parts: &[Part]) -> Result<(), ImageError> {
     let values = |part: usize, rows: Range<usize>| {
         let Part { width, channels, data, .. } = &parts[part];
         let row = width * channels.len();
-        // What is not there is missing at the end, where it is noticed; what is too much is as well
+        // Missing values are detected at the last row; superfluous ones as well
         let end = if rows.end == parts[part].height { data.len() } else { data.len().min(row * rows.end) };
         Cow::Borrowed(&data[end.min(row * rows.start)..end])
     };
     write_rows(path, parts, &values)
 }
 
-/// The same, with values that are made while they are written. The parts have none of their own.
+/// Writes an image whose values are computed on demand. The parts have no data.
 pub fn write_rows(path: &Path, parts: &[Part], values: &RowSource<'_>) -> Result<(), ImageError> {
-    // The extension chooses the format: the file on its way has the same
+    // The temporary file keeps the extension, which determines the format
     write_whole(path, |file| write_to(file.path(), parts, values).map_err(io::Error::other))
         .map_err(|e| ImageError::Write { path: path.to_owned(), reason: e.to_string() })
 }

@@ -51,12 +51,16 @@ pub(super) fn changes(document: &Document, time: f32, messages: &mut Messages<'_
         for channel in animation.key("channels").items() {
             let target = channel.key("target");
             let path = target.key("path").text().unwrap_or_default();
+
+            // Target
             let Some(node) = target.key("node").index() else {
                 if target.extension("KHR_animation_pointer").exists() {
                     messages.warning(&target, "animations of materials, lights and cameras are not rendered");
                 }
                 continue;
             };
+
+            // Value at the time; the first channel of a property wins
             let sampler = animation.key("samplers").item(channel.key("sampler").index().unwrap_or(usize::MAX));
             if !sampler.exists() {
                 return Err(channel.key("sampler").error("is not there"));
@@ -103,6 +107,8 @@ impl Track {
             let place = sampler.key(name);
             place.index().ok_or_else(|| place.error("is not there"))
         };
+
+        // Times of the keys, shared between samplers
         let input = index("input")?;
         let (keys, position) = match positions.get(&input) {
             Some(known) => *known,
@@ -119,6 +125,8 @@ impl Track {
             Some("CUBICSPLINE") => Interpolation::CubicSpline,
             _ => Interpolation::Linear,
         };
+
+        // Only the values of the two keys around the time are read
         let accessor = document.open(index("output")?)?;
         let of_key = accessor.count() / keys;
         let mut track = Track { interpolation, position, numbers: of_key * accessor.width(), values: Vec::new() };
@@ -159,6 +167,7 @@ impl Track {
             Interpolation::Step => a.to_vec(),
             Interpolation::Linear => blend([1.0 - s, 0.0, s, 0.0], [a, b]),
             Interpolation::CubicSpline => {
+                // Hermite basis functions
                 let (s2, s3) = (s * s, s * s * s);
                 let weights = [2.0 * s3 - 3.0 * s2 + 1.0, s3 - 2.0 * s2 + s, 3.0 * s2 - 2.0 * s3, s3 - s2];
                 blend(weights, [self.key(0, 2, width), self.key(1, 0, width)])

@@ -213,6 +213,8 @@ impl<'a> Assembly<'a> {
         let name = place.key("name").text().unwrap_or("mesh").to_owned();
         let (document, to) = (self.document, self.origin);
         let placements = || users.iter().flat_map(move |&i| placements(document, &nodes[i as usize], pose, to));
+
+        // Number of placements, and of those with an inverse
         let (mut count, mut invertible) = (0, 0);
         for m in placements() {
             (count, invertible) = (count + 1, invertible + usize::from(has_inverse(&m)));
@@ -220,6 +222,8 @@ impl<'a> Assembly<'a> {
         if count == 0 {
             return Ok(());
         }
+
+        // Primitives: in the group, or in world space for each placement
         let mut group = Vec::new();
         let mut origin = None;
         let rendered =
@@ -247,6 +251,8 @@ impl<'a> Assembly<'a> {
                 self.add_emission(id, &look, files, messages);
             }
         }
+
+        // Instances of the group
         if !group.is_empty() {
             let id = self.set.groups.len() as u32;
             self.set.groups.push(Group { geometries: group });
@@ -290,6 +296,8 @@ impl<'a> Assembly<'a> {
         let light = node.place(self.document).extension("KHR_lights_punctual").key("light").index();
         let Some(index) = light.filter(|_| node.is_visible) else { return };
         let light = self.document.root().extension("KHR_lights_punctual").key("lights").item(index);
+
+        // Intensity or irradiance, in the units of the options
         let color = Rgb::from_array(light.key("color").numbers().unwrap_or([1.0; 3])).map(|c| c.max(0.0));
         let per_candela = self.options.light_units.unwrap_or_default().per_candela();
         let intensity = color * (light.key("intensity").number().unwrap_or(1.0).max(0.0) * per_candela);
@@ -301,6 +309,8 @@ impl<'a> Assembly<'a> {
             messages
                 .warning(&light.key("range"), "lights have no range: they fall off with the square of the distance");
         }
+
+        // Light
         let (p, axis) = (m.transform_point3(Vec3::ZERO), m.transform_vector3(-Vec3::Z).normalize_or(-Vec3::Z));
         match light.key("type").text() {
             Some("directional") => self.lights.push(Light::Distant { wi_world: -axis, l: intensity }),
@@ -369,6 +379,7 @@ fn emission_image(
 /// An environment map whose z axis becomes the y axis of the scene. Its centre is in direction +x, and it appears as
 /// stored: columns of pbrt's maps are counter-clockwise about z, so the map is mirrored.
 fn environment(path: &Path, files: &FileCache, messages: &mut Messages<'_>) -> Option<Light> {
+    // Image
     let d = &mut *messages.diagnostics;
     let failed = |error: ImageError| match error {
         ImageError::NotFound { .. } => d.missing_file(path, "no such file, asked for by --environment", None),
@@ -377,6 +388,8 @@ fn environment(path: &Path, files: &FileCache, messages: &mut Messages<'_>) -> O
         }
     };
     let (texels, size) = Arc::unwrap_or_clone(files.rgb(path).map_err(failed).ok()?);
+
+    // Map
     let mapping = if size[0] == size[1] { EnvironmentMapping::EqualArea } else { EnvironmentMapping::LatLong };
     match EnvironmentMap::new(texels, size, mapping, EnvironmentFilter::Nearest) {
         Ok(map) => {

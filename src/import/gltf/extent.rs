@@ -37,12 +37,15 @@ pub(super) fn of_animations(
     let mut boxes_of = HashMap::<usize, Vec<Boxes>>::new();
     let (mut bounds, mut origin) = (Bounds3::EMPTY, None);
     for step in 0..=steps {
+        // Pose at the time
         let time = first + (last - first) * f32::from(step) / f32::from(steps.max(1));
         let nodes = nodes(document, scene, &changes(document, time, messages)?)?;
         let origin = match origin {
             Some(origin) => origin,
             None => *origin.insert(near_origin(middle(document, &nodes)?)),
         };
+
+        // Bounds of all meshes, from boxes in mesh space
         let mut skins = Skins::new(document, &nodes, origin);
         for node in &nodes {
             let Some(index) = node.mesh else { continue };
@@ -85,9 +88,13 @@ impl Boxes {
             let Some(index) = place.index() else { return Ok(Vec::new()) };
             Ok(document.accessor(index)?.elements::<3>(0.0).into_iter().map(Vec3::from).collect())
         };
+
+        // Boxes of the morph targets
         let positions = points(attributes.key("POSITION"))?;
         let targets = primitive.key("targets").items().map(|t| Ok(Bounds3::from_points(points(t.key("POSITION"))?)));
         let mut boxes = Boxes { targets: targets.collect::<Result<_, GltfError>>()?, ..Boxes::default() };
+
+        // Boxes of the vertices of each joint
         for set in 0.. {
             let numbers = |name: &str| {
                 let (_, place) = attributes.members().find(|(other, _)| *other == format!("{name}_{set}"))?;
@@ -102,6 +109,8 @@ impl Boxes {
                 }
             }
         }
+
+        // Without joints, one box
         if boxes.of_joints.is_empty() {
             boxes.of_joints.insert(0, Bounds3::from_points(positions));
         }

@@ -93,6 +93,8 @@ impl<'a> Materials<'a> {
         for (name, message) in LEFT_OUT.iter().filter(|(name, _)| place.extension(name).exists()) {
             messages.warning(&place.extension(name), message);
         }
+
+        // Material; vertex colours multiply the base colour
         let (factor, base) = Self::base(place);
         let color = Rgb::new(factor[0], factor[1], factor[2]);
         let is_unlit = place.extension("KHR_materials_unlit").exists();
@@ -105,6 +107,8 @@ impl<'a> Materials<'a> {
             let base_color = self.textures.set.add_rgb(RgbTexture::Product { tex1, tex2 });
             Material::Principled(self.principled(place, base_color, messages)?)
         };
+
+        // Normal map
         let normal = place.key("normalTexture");
         let strength = normal.key("scale").number().unwrap_or(1.0);
         let normal_map = self.textures.image(&normal, ImageChannels::Color, ImageEncoding::Linear, messages)?;
@@ -114,6 +118,8 @@ impl<'a> Materials<'a> {
         let name = place.key("name").text().unwrap_or("default").to_owned();
         let dispersion = if is_unlit { None } else { dispersion(place) };
         self.entries.push(MaterialEntry { name, material, normal_map, displacement: None, dispersion });
+
+        // Emission
         let emission = if is_unlit { color } else { emitted(place) };
         let emissive = if is_unlit { base } else { place.key("emissiveTexture") };
         let emission_image = if emission.is_black() { None } else { self.textures.emission(&emissive, messages)? };
@@ -215,6 +221,8 @@ impl<'a> Materials<'a> {
         let glossiness = factor(&place.key("glossinessFactor"), 1.0);
         let texture = place.key("specularGlossinessTexture");
         let image = self.textures.image(&texture, ImageChannels::Alpha, ImageEncoding::Linear, messages)?;
+
+        // A dielectric whose specular colour is its reflectance
         material.metalness = self.textures.float(0.0);
         material.ior = MIRROR_IOR;
         material.specular_color = self.textures.colored(color, &texture, messages)?;
@@ -240,12 +248,16 @@ impl<'a> Materials<'a> {
         if mode == "OPAQUE" {
             return Ok(None);
         }
+
+        // Opacity of base colour and vertices
         let tex = self.textures.opacity_scaled(factor, base, messages)?;
         let scale = self.textures.set.add_float(FloatTexture::VertexOpacity);
         let alpha = self.textures.set.add_float(FloatTexture::Scale { tex, scale });
         if mode == "BLEND" {
             return Ok(Some(alpha));
         }
+
+        // Mask
         let threshold = place.key("alphaCutoff").number().unwrap_or(0.5);
         Ok(Some(self.textures.set.add_float(FloatTexture::Threshold { tex: alpha, threshold })))
     }

@@ -28,6 +28,8 @@ pub(super) fn primitive(
         messages.warning(&place.key("mode"), "points and lines are not rendered");
         return Ok(None);
     }
+
+    // Indices of the vertices in use
     let attributes = place.key("attributes");
     let Some(positions) = attributes.key("POSITION").index() else {
         messages.warning(&attributes, "without POSITION there is nothing to render");
@@ -40,6 +42,8 @@ pub(super) fn primitive(
     };
     let mut triangles = triangles(&indices, mode);
     let in_use = InUse::of(count, &mut triangles, &place.key("indices"))?;
+
+    // Attributes, deformed by the pose
     let read = |name| in_use.read::<3>(document, &attributes.key(name), 0.0);
     let vectors = |values: Vec<[f32; 3]>| values.into_iter().map(Vec3::from).collect::<Vec<_>>();
     let tangents = in_use.read::<4>(document, &attributes.key("TANGENT"), 1.0)?;
@@ -53,12 +57,16 @@ pub(super) fn primitive(
     if let Some(i) = positions.iter().position(|p| !p.is_finite()) {
         return Err(attributes.key("POSITION").error(format!("vertex {} is not finite", in_use.vertex(i))));
     }
+
+    // Positions relative to the common origin
     let middle = positions.get(positions.len() / 2).map_or(DVec3::ZERO, |p| p.as_dvec3());
     let origin = *origin.get_or_insert_with(|| near_origin(middle));
     if origin != DVec3::ZERO {
         positions.iter_mut().for_each(|p| *p = (p.as_dvec3() - origin).as_vec3());
     }
     let mut mesh = TriangleMesh::new(positions, triangles).map_err(|message| place.key("indices").error(message))?;
+
+    // Other attributes; glTF has v downwards
     let uvs = |name| -> Result<Vec<Vec2>, GltfError> {
         let uvs = in_use.read::<2>(document, &attributes.key(name), 0.0)?;
         Ok(uvs.into_iter().map(|[u, v]| Vec2::new(u, 1.0 - v)).collect())

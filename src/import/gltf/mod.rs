@@ -142,6 +142,8 @@ pub fn load(path: &Path, options: &LoadOptions, files: &FileCache) -> Result<Loa
         diagnostics.missing_file(path, "cannot be opened", None);
         return Err(Box::new(diagnostics.finish(&sources)));
     };
+
+    // Parse, and assemble the scene
     let bytes = sources.shared_bytes(file);
     let mut messages =
         Messages { diagnostics: &mut diagnostics, file, bytes: &bytes, named: HashMap::new(), warned: BTreeSet::new() };
@@ -167,6 +169,8 @@ pub fn load(path: &Path, options: &LoadOptions, files: &FileCache) -> Result<Loa
         messages.error(&error);
         None
     });
+
+    // Report
     let failed = diagnostics.has_errors();
     let scene_files = SceneFiles::new(&sources, others);
     let report = diagnostics.finish(&sources);

@@ -33,6 +33,8 @@ pub(super) fn nodes<'d>(document: &'d Document, scene: &Place<'d>, changes: &Cha
     let all = document.root().key("nodes");
     let count = all.len();
     let at_root = |i| (i, DAffine3::IDENTITY, true);
+
+    // Roots
     let mut open: Vec<(usize, DAffine3, bool)> = if scene.exists() {
         scene.key("nodes").items().filter_map(|root| root.index()).map(at_root).collect()
     } else {
@@ -40,6 +42,8 @@ pub(super) fn nodes<'d>(document: &'d Document, scene: &Place<'d>, changes: &Cha
             all.items().flat_map(|n| n.key("children").items()).filter_map(|child| child.index()).collect();
         (0..count).filter(|i| !children.contains(i)).map(at_root).collect()
     };
+
+    // Depth-first traversal in the order of the file
     open.reverse();
     let mut is_met = vec![false; count];
     let mut nodes = Vec::with_capacity(count);

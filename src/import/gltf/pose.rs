@@ -48,6 +48,8 @@ impl<'a> Skins<'a> {
         if let Some(joints) = self.joints.get(&index) {
             return Ok(Arc::clone(joints));
         }
+
+        // Without inverse bind matrices, all are the identity
         let skin = self.document.root().key("skins").item(index);
         let inverses = match skin.key("inverseBindMatrices").index() {
             Some(index) => self.document.accessor(index)?.elements::<16>(0.0),
@@ -128,6 +130,7 @@ impl Pose {
         vertices: &mut Vertices,
         messages: &mut Messages<'_>,
     ) -> Result<(), GltfError> {
+        // Morph targets
         for (target, &weight) in primitive.key("targets").items().zip(&self.weights).filter(|(_, w)| **w != 0.0) {
             let parts = [
                 ("POSITION", &mut vertices.positions),
@@ -141,6 +144,8 @@ impl Pose {
                 messages.warning(&target, "morph targets move vertices, not their colours and texture coordinates");
             }
         }
+
+        // Skin
         match &self.skin {
             Some((_, joints)) => skin(document, &primitive.key("attributes"), (in_use, joints), vertices),
             None => Ok(()),
@@ -170,6 +175,7 @@ fn skin(
     (in_use, joints): (&InUse, &[Affine3A]),
     vertices: &mut Vertices,
 ) -> Result<(), GltfError> {
+    // Weighted sums of joint transforms; each set has four joints per vertex
     let mut sums = vec![(Mat4::ZERO, 0.0_f32); vertices.positions.len()];
     for set in 0.. {
         let attribute = |name: &str| attributes.members().find(|(other, _)| *other == format!("{name}_{set}"));
@@ -187,6 +193,8 @@ fn skin(
             }
         }
     }
+
+    // Transform positions, normals and tangents
     for (i, (sum, total)) in sums.into_iter().enumerate().filter(|(_, (_, total))| *total > 0.0) {
         let m = Affine3A::from_mat4(sum * (1.0 / total));
         vertices.positions[i] = m.transform_point3(vertices.positions[i]);

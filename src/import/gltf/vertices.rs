@@ -50,6 +50,8 @@ impl InUse {
         if accessor.count() != self.count {
             return Err(place.error("has not one element per vertex"));
         }
+
+        // Elements of the vertices in use
         let numbers = match &self.vertices {
             Some(vertices) => accessor.numbers(vertices.iter().map(|&v| v as usize)),
             None => accessor.numbers(0..self.count),

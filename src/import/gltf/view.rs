@@ -50,6 +50,8 @@ pub(super) fn chosen_camera<'n, 'd>(
     if options.camera_auto {
         return None;
     }
+
+    // The first camera is the default
     let index = match &options.camera {
         Some(wanted) => chosen(["camera", "--camera"], wanted, names),
         None if placed.is_empty() => {
@@ -74,10 +76,13 @@ pub(super) fn camera(
     found: Option<Placed<'_, '_>>,
     (bounds, origin): (&Bounds3, DVec3),
 ) -> (Camera, FilmSettings) {
+    // Resolution, by the aspect of the camera
     let aspect = found.as_ref().and_then(|(_, c)| aspect_of(c));
     let width = (HEIGHT as f32 * aspect.unwrap_or(16.0 / 9.0)).round().clamp(1.0, 65_536.0);
     let resolution = options.resolution.unwrap_or([width as u32, HEIGHT]);
     let aspect = resolution[0] as f32 / resolution[1] as f32;
+
+    // Camera
     let camera = match found {
         Some((node, camera)) => {
             let world_from_node = rebased(&node.world_from_node, origin, DVec3::ZERO);
@@ -85,6 +90,8 @@ pub(super) fn camera(
         }
         None => frame(bounds, aspect, resolution),
     };
+
+    // Film
     let [x0, x1, y0, y1] = options.crop.unwrap_or([0.0, 1.0, 0.0, 1.0]);
     let at = |fraction: f32, size: u32| ((fraction * size as f32).ceil() as u32).min(size);
     let [w, h] = resolution;

@@ -35,6 +35,8 @@ pub(super) fn readable<'a, T, E: ToString>(
             Ok(content) => return Some(content),
             Err(error) => error,
         };
+
+        // Unreadable files are missing; all others have invalid content
         match unreadable(&error) {
             Some(reason) => d.missing_file(path, reason, Some(span)),
             None => {

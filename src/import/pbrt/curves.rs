@@ -66,6 +66,8 @@ fn segments(p: &ParamSet, basis: Basis, degree: usize, d: &mut Diagnostics) -> O
             return None;
         }
     };
+
+    // Number of control points
     let (count, span) = (points.len(), p.span_of("P"));
     let step = if basis == Basis::Bezier { degree } else { 1 };
     if count <= degree || !(count - 1 - degree).is_multiple_of(step) {
@@ -80,6 +82,8 @@ fn segments(p: &ParamSet, basis: Basis, degree: usize, d: &mut Diagnostics) -> O
         d.error(span, "control points must be finite");
         return None;
     }
+
+    // Bézier segments
     let segment = |first: usize| cubic(&points[first..=first + degree], basis);
     Some(((0..count - degree).step_by(step).map(segment).collect(), origin))
 }
@@ -129,6 +133,8 @@ fn normals(p: &ParamSet, kind: CurveKind, segments: usize, d: &mut Diagnostics) 
         }
         return Some(Vec::new());
     }
+
+    // One normal per end of a segment
     if given.len() != segments + 1 {
         let (n, expected) = (given.len(), segments + 1);
         let place = if given.is_empty() { p.span } else { p.span_of("N") };
@@ -149,6 +155,8 @@ const MERGED: f64 = 1024.0;
 /// directive per fibre.
 pub(super) fn merged(last: Option<&mut ShapeDesc>, desc: ShapeDesc) -> Option<ShapeDesc> {
     let Some(last) = last else { return Some(desc) };
+
+    // Only curves with the same state are merged
     let is_alike = last.ctm == desc.ctm
         && last.reverse_orientation == desc.reverse_orientation
         && last.material.is_same(&desc.material)
@@ -160,6 +168,7 @@ pub(super) fn merged(last: Option<&mut ShapeDesc>, desc: ShapeDesc) -> Option<Sh
         (ShapeSource::Curves(all), ShapeSource::Curves(data))
             if is_alike && all.kind == data.kind && (data.origin - all.origin).abs().max_element() <= MERGED =>
         {
+            // Points relative to the common origin
             let shift = (data.origin - all.origin).as_vec3();
             let shifted = |c: Curve| Curve { points: c.points.map(|p| p + shift), ..c };
             all.curves.extend(data.curves.into_iter().map(shifted));

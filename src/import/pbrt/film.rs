@@ -119,6 +119,8 @@ fn finish_filter(pending: Option<&Pending>, d: &mut Diagnostics) -> PixelFilter 
     let Some(Pending { name, params: p }) = pending else {
         return PixelFilter::Gaussian { rx: 1.5, ry: 1.5, sigma: 0.5 };
     };
+
+    // Radii, also by their names in pbrt-v3
     let default_radius = match name.text.as_str() {
         "box" => 0.5,
         "gaussian" => 1.5,
@@ -135,6 +137,8 @@ fn finish_filter(pending: Option<&Pending>, d: &mut Diagnostics) -> PixelFilter 
         }
     };
     let (rx, ry) = (radius("xradius", "xwidth"), radius("yradius", "ywidth"));
+
+    // Filter
     let filter = match name.text.as_str() {
         "box" => PixelFilter::Box { rx, ry },
         "triangle" => PixelFilter::Triangle { rx, ry },

@@ -72,6 +72,8 @@ impl Assembly {
             d.error(span, "an object cannot be flattened while it moves");
             return;
         };
+
+        // Copies of the shapes, in world space
         let mut is_flat = true;
         for id in self.set.groups[instance.group as usize].geometries.clone() {
             let Geometry { shape, alpha, visibility } = &self.set.geometries[id as usize];

@@ -15,12 +15,16 @@ impl Builder<'_> {
         let given: Vec<&'static str> = COLORS.into_iter().filter(|name| p.type_of(name).is_some()).collect();
         let used = given.first().copied().unwrap_or("eumelanin");
         let has_melanin = matches!(used, "eumelanin" | "pheomelanin");
+
+        // Both melanins are used together
         for name in given.iter().copied().filter(|name| *name != used) {
             if !(has_melanin && name == "pheomelanin") {
                 d.warning_once(p.span_of(name), format!("`{name}` is ignored: `{used}` colours the hair"));
                 p.ignore(name);
             }
         }
+
+        // Colour
         let color = match used {
             "sigma_a" => HairColor::SigmaA(self.rgb_param(p, "sigma_a", Rgb::BLACK, SpectrumUse::Unbounded, d)),
             "reflectance" | "color" => HairColor::Reflectance(self.albedo(p, used, Rgb::splat(0.5), d)),

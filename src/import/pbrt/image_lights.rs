@@ -31,6 +31,7 @@ impl EnvironmentDesc {
         portal: Option<Portal>,
         d: &mut Diagnostics,
     ) -> Result<Light, String> {
+        // The aspect determines the mapping
         let mapping = if size[0] == size[1] {
             EnvironmentMapping::EqualArea
         } else if size[0] == 2 * size[1] {
@@ -40,6 +41,8 @@ impl EnvironmentDesc {
             return Err(format!("an environment map is square or twice as wide as high, not {}×{}", size[0], size[1]));
         };
         let map = EnvironmentMap::new(texels, size, mapping, EnvironmentFilter::Nearest)?;
+
+        // Scale by the illuminance, if given
         let factor = if illuminance > 0.0 { illuminance / map_illuminance(&map) } else { 1.0 };
         let scale = self.scale * factor;
         Ok(match portal {

@@ -26,6 +26,8 @@ pub(super) fn realistic(p: &ParamSet, folder: &Path, diagonal: f32, d: &mut Diag
         d.error(p.span, "camera `realistic` needs `string lensfile`");
         return None;
     };
+
+    // Lens file
     let (path, span) = (file_in(folder, name), p.span_of("lensfile"));
     let text = match std::fs::read(&path) {
         Ok(bytes) => String::from_utf8_lossy(&bytes).into_owned(),
@@ -41,6 +43,8 @@ pub(super) fn realistic(p: &ParamSet, folder: &Path, diagonal: f32, d: &mut Diag
             return None;
         }
     };
+
+    // Aperture diameter (mm in the file), limited by the lens
     let stop = f64::from(positive(p, "aperturediameter", APERTURE, d)) / 1000.0 / 2.0;
     for element in elements.iter_mut().filter(|e| e.curvature_radius == 0.0) {
         if stop > element.aperture_radius {
@@ -50,6 +54,8 @@ pub(super) fn realistic(p: &ParamSet, folder: &Path, diagonal: f32, d: &mut Diag
         }
         element.aperture_radius = stop.min(element.aperture_radius);
     }
+
+    // Focus
     let focus = positive(p, "focusdistance", 10.0, d);
     let aperture = aperture(p, folder, d)?;
     match LensSystem::new(&elements, aperture, f64::from(focus), f64::from(diagonal)) {
@@ -85,6 +91,8 @@ fn elements_of_text(text: &str) -> Result<Vec<LensElement>, String> {
 /// A shape by its name, or an image.
 fn aperture(p: &ParamSet, folder: &Path, d: &mut Diagnostics) -> Option<Aperture> {
     let Some(name) = p.string("aperture", d) else { return Some(Aperture::Circle) };
+
+    // Shape
     if let Some(aperture) = Aperture::named(name) {
         return Some(aperture);
     }
@@ -93,6 +101,8 @@ fn aperture(p: &ParamSet, folder: &Path, d: &mut Diagnostics) -> Option<Aperture
         super::checks::unknown(name, span, "aperture", &Aperture::NAMES, d);
         return None;
     }
+
+    // Image: mean of the colour channels
     let path = file_in(folder, name);
     match read_colors(&path, &ReadLimits::default()) {
         Ok((read, layer)) => {

@@ -39,9 +39,13 @@ impl Builder<'_> {
                 return;
             }
         };
+
+        // An image needs the inverse transform for lookups
         if self.environments.len() > images && !self.has_inverse("a light with an image", p.span, d) {
             self.environments.truncate(images);
         }
+
+        // Sample counts of pbrt-v3 have no effect here
         p.ignore("nsamples");
         p.ignore("samples");
         let group = light_group(p, d);
@@ -74,6 +78,8 @@ impl Builder<'_> {
         let cone = p.float("coneangle", d).unwrap_or(30.0);
         let delta = p.float("conedeltaangle", d).or_else(|| p.float("conedelta", d)).unwrap_or(5.0);
         let power = p.float("power", d).unwrap_or(0.0);
+
+        // Axis
         let (p0, p1) = (world_from_light.transform_point3(from), world_from_light.transform_point3(to));
         let Some(axis) = (p1 - p0).as_vec3().try_normalize() else {
             d.error(p.span_of("to"), "the light and what it points at are the same point");
@@ -83,6 +89,8 @@ impl Builder<'_> {
             d.error(p.span_of("coneangle"), format!("coneangle must be above 0 and at most 180 degrees, not {cone}"));
             return None;
         }
+
+        // Cone and power
         let cos_total = cone.to_radians().cos();
         let cos_falloff_start = (cone - delta).clamp(0.0, cone).to_radians().cos();
         let factor = if power > 0.0 { power / spot_solid_angle(cos_total, cos_falloff_start) } else { 1.0 };
@@ -108,12 +116,16 @@ impl Builder<'_> {
         let portal = self.portal(p, d);
         self.portals.extend(portal.map(|portal| (portal, p.span_of("portal"))));
         let illuminance = p.float("illuminance", d).unwrap_or(0.0);
+
+        // Image file, also by its name in pbrt-v3
         let color = self.color_param(p, "L", SpectrumUse::Illuminant, d);
         if p.type_of("mapname").is_some() {
             d.warning_once(p.span_of("mapname"), "`mapname` is pbrt-v3; pbrt-v4 writes `filename`");
         }
         let file = file_name(p, "filename", d).map(|f| (f.to_owned(), p.span_of("filename")));
         let file = file.or_else(|| file_name(p, "mapname", d).map(|f| (f.to_owned(), p.span_of("mapname"))));
+
+        // Without an image, a constant light
         let Some((name, span)) = file else {
             let l = color.unwrap_or_else(|| self.white()) * scale;
             let l = l * if illuminance > 0.0 { illuminance / PI } else { 1.0 };
@@ -202,10 +214,14 @@ impl Builder<'_> {
         if color.is_some() && image.is_some() {
             d.error(p.span_of("L"), "an area light has `L` or `filename`, not both");
         }
+
+        // Sample counts of pbrt-v3 have no effect here
         p.ignore("nsamples");
         p.ignore("samples");
         let group = light_group(p, d);
         p.report_unused(d);
+
+        // The image is read later, with all others
         self.emission_images.extend(image.as_ref().map(|(path, _)| path.clone()));
         let l = color.unwrap_or_else(|| if image.is_some() { Rgb::WHITE } else { self.white() });
         Some(AreaLightDesc { l: l * scale, two_sided, image, power, group, span: p.span })

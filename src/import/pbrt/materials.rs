@@ -143,15 +143,16 @@ impl Builder<'_> {
     }
 
     /// `Material "evaluated" "string model" "…"`, of which only the value is used. Directions are proposed by a density
-    /// that is the same for all models, and resampled. Parameters of the models, which may all be textures:
+    /// that is the same for all models, and resampled. Parameters of the models, which may all be textures;
+    /// `reflectance` and `specular` are spectra, all others floats:
     ///
     /// | model | parameters |
     /// |---|---|
-    /// | `diffuse` | `spectrum reflectance` (0.5) |
-    /// | `orennayar` | `spectrum reflectance` (0.5), `float sigma` (20 degrees) |
-    /// | `cooktorrance` | `spectrum reflectance` (0.5), `spectrum specular` (0.5), `float slope` (0.2), `float amount` (0.5) |
-    /// | `phong`, `retroreflective` | `spectrum reflectance` (0.25), `spectrum specular` (0.5), `float exponent` (50) |
-    /// | `ashikhminshirley` | `spectrum reflectance` (0.5), `spectrum specular` (0.1), `float uexponent`, `vexponent` (100) |
+    /// | `diffuse` | `reflectance` (0.5) |
+    /// | `orennayar` | `reflectance` (0.5), `sigma` (20 degrees) |
+    /// | `cooktorrance` | `reflectance` (0.5), `specular` (0.5), `slope` (0.2), `amount` (0.5) |
+    /// | `phong`, `retroreflective` | `reflectance` (0.25), `specular` (0.5), `exponent` (50) |
+    /// | `ashikhminshirley` | `reflectance` (0.5), `specular` (0.1), `uexponent`, `vexponent` (100) |
     fn evaluated(&mut self, place: &Name, p: &ParamSet, d: &mut Diagnostics) -> Material {
         let Some(model) = p.string("model", d).map(str::to_owned) else {
             d.error(place.span, "material `evaluated` needs a `string model`")
@@ -217,6 +218,8 @@ impl Builder<'_> {
                 return Material::Interface;
             }
         }
+
+        // The nearest material of pbrt-v4
         let material = match kind {
             "matte" => self.matte(p, d),
             "plastic" | "substrate" | "uber" => Material::CoatedDiffuse {
@@ -240,6 +243,8 @@ impl Builder<'_> {
                 scale: 1.0,
             },
         };
+
+        // Warnings about the replacement and ignored parameters
         let used = material.kind_name();
         d.warning_once(place.span, format!("material `{kind}` is pbrt-v3: `{used}` takes its place"));
         for key in ["bumpmap", "Ks", "Kr", "Kt", "opacity", "index", "reflect", "remaproughness"] {
@@ -295,6 +300,8 @@ impl Builder<'_> {
             Some(_) => self.float_param(p, name, default, d),
             None => both,
         };
+
+        // Constants must be valid
         let (u, v) = (axis(names[1]), axis(names[2]));
         for (name, texture) in names.into_iter().zip([both, u, v]) {
             let value = self.textures.constant_float(texture).filter(|_| p.type_of(name).is_some());
@@ -338,6 +345,8 @@ impl Builder<'_> {
                 })
             }
         };
+
+        // Range
         match eta {
             Some(eta) if eta > 0.0 && eta.is_finite() => eta,
             Some(eta) => {

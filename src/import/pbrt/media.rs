@@ -71,6 +71,8 @@ impl Builder<'_> {
             p.ignore_all();
             return;
         }
+
+        // Medium; volumes of files are read later
         let mut volume = None;
         let medium = match kind.as_str() {
             "homogeneous" => self.homogeneous(p, d),
@@ -102,6 +104,7 @@ impl Builder<'_> {
             return None;
         }
         for (i, key) in ["sigma_a", "sigma_s"].into_iter().enumerate() {
+            // A preset overrides coefficients
             let given = self.color_param(p, key, SpectrumUse::Unbounded, d);
             let measured = found.and_then(|(_, preset)| preset).map(|preset| preset[i]);
             if let (Some(_), Some(_)) = (given, measured) {
@@ -134,11 +137,15 @@ impl Builder<'_> {
         let offset = p.float("temperatureoffset", d);
         let offset = offset.or_else(|| p.float("temperaturecutoff", d)).unwrap_or(0.0);
         let temperature_scale = p.float("temperaturescale", d).unwrap_or(1.0);
+
+        // Samples
         let coefficients = self.coefficients(p, scale, d);
         let resolution = resolution?;
         let density = float_samples(p, "density", resolution, d);
         let le_scale = float_samples(p, "Lescale", resolution, d);
         let temperature = float_samples(p, "temperature", resolution, d);
+
+        // Conflicts
         if p.type_of("density").is_none() {
             d.error(p.span, "a uniformgrid needs `float density`");
             return None;
@@ -150,6 +157,8 @@ impl Builder<'_> {
             );
             return None;
         }
+
+        // Grid
         let temperature = temperature.map(|samples| glowing(Scalars::Dense(samples), offset, temperature_scale));
         let le = if temperature.is_some() { Rgb::WHITE } else { le.unwrap_or(Rgb::BLACK) };
         let [sigma_a, sigma_s] = coefficients?;
@@ -217,6 +226,8 @@ impl Builder<'_> {
     /// The media that shapes and the camera refer to.
     pub(super) fn media_in_use(&self, shapes: &[ShapeDesc], d: &mut Diagnostics) -> MediaInUse {
         let mut media = MediaInUse::default();
+
+        // Adds a medium at its first use
         let used = |media: &mut MediaInUse, name: &Name, d: &mut Diagnostics| {
             let Some(&index) = self.medium_names.get(&name.text) else {
                 d.unknown(name.span, "medium", &name.text, self.medium_names.keys().map(String::as_str));
@@ -233,6 +244,8 @@ impl Builder<'_> {
         if let Some(name) = self.options.camera_medium() {
             media.set.camera = used(&mut media, name, d);
         }
+
+        // Interior materials and boundaries of media
         for shape in shapes.iter().filter(|s| s.media.differ() || self.interior_of(&s.material).is_some()) {
             for name in [&shape.media.inside, &shape.media.outside].into_iter().flatten() {
                 let id = used(&mut media, name, d);

@@ -180,6 +180,8 @@ impl Options {
             let camera = Camera::perspective(Affine3A::IDENTITY, 90.0, window, resolution, 0.0, 1e6);
             return Some((camera, [0.0, 1.0], 1.0));
         };
+
+        // Position and shutter
         let to_render_space = |m: &DAffine3| rebased(m, self.origin(), DVec3::ZERO).as_affine3a();
         let world_from_camera = to_render_space(&affine(&ctm.start.inverse()));
         let open = params.float("shutteropen", d).unwrap_or(0.0);
@@ -191,6 +193,8 @@ impl Options {
         let [start, end] = self.times.unwrap_or([0.0, 1.0]);
         let frame =
             CameraFrame { resolution, shutter: [(open - start) / (end - start), (close - start) / (end - start)] };
+
+        // Camera
         let camera = match name.text.as_str() {
             "perspective" => perspective(params, &world_from_camera, &frame, d),
             "orthographic" => {
@@ -224,6 +228,8 @@ impl Options {
                 return None;
             }
         };
+
+        // Motion
         params.report_unused(d);
         let places: Vec<Affine3A> = ctm.inverse().samples(frame.shutter).iter().map(to_render_space).collect();
         let camera = camera?.moving(&places);

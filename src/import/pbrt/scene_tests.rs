@@ -184,6 +184,7 @@ fn unknown_names_are_errors_where_they_are_used_first() {
         ("ObjectInstance \"tre\" ObjectBegin \"tree\" ObjectEnd", "did you mean `tree`?"),
         ("Material \"mix\" \"string materials\" [ \"a\" \"a\" ]", "unknown material `a`"),
     ] {
+        // A wrong name that is used twice is reported twice
         let error = load_with("", world).unwrap_err();
         assert!(error.contains(message) && error.starts_with("error: "), "{error}");
         assert_eq!(error.matches("error: ").count(), if message.contains("`a`") { 2 } else { 1 }, "{error}");
@@ -273,6 +274,7 @@ fn what_pbrt_leaves_out_of_meshes_is_left_out_with_a_warning() {
         (patch("\"normal N\" [ 0 0 1 ]"), "`N` has 1 entries"),
         (patch("\"integer faceIndices\" [ 1 2 ]"), "faceIndices must be 1 numbers"),
     ] {
+        // The warning has a position, and the mesh lacks the attribute
         let loaded = load_with("", &shape).unwrap();
         let warnings = loaded.warnings.to_string();
         assert!(warnings.contains(warning) && warnings.contains("scene.pbrt:5:"), "{warnings}");
@@ -290,6 +292,8 @@ fn what_pbrt_leaves_out_of_meshes_is_left_out_with_a_warning() {
             other => panic!("{other:?}"),
         }
     }
+
+    // An index out of range is an error
     let outside = load_with("", &triangles("\"integer indices\" [ 0 1 9 ]")).unwrap_err();
     assert!(outside.contains("index 9 is out of range"), "{outside}");
 }
@@ -302,6 +306,7 @@ fn flattened_meshes_patches_and_disks_are_flat_and_others_are_errors_with_their_
     for (shape, max) in [(triangle, [1.0, 1.0]), (patch, [1.0, 1.0]), (disk, [1.0, 1.0])] {
         let in_object = format!("ObjectBegin \"o\" {shape} ObjectEnd Translate 0 0 5 Scale 1 1 0 ObjectInstance \"o\"");
         for world in [format!("Translate 0 0 5 Scale 1 1 0 {shape}"), in_object] {
+            // Flat shapes in the plane z = 5, with normals along z
             let geometry = load_with("", &world).unwrap().scene.geometry;
             let bounds = geometry.world_bounds();
             assert_eq!(bounds.max.to_array(), [max[0], max[1], 5.0], "{world}");
@@ -310,6 +315,8 @@ fn flattened_meshes_patches_and_disks_are_flat_and_others_are_errors_with_their_
             assert!(hit.n.z > 0.999_999 && hit.ns.z > 0.999_999, "{world}: {hit:?}");
         }
     }
+
+    // Errors, with their positions
     let flat = |rest: &str| load_with("", &format!("Scale 1 1 0\n{rest}")).unwrap_err();
     for (rest, what) in [
         ("Shape \"sphere\"", "a sphere"),

@@ -91,12 +91,16 @@ impl Builder<'_> {
                 return;
             }
         };
+
+        // Alpha and displacement
         let alpha = self.alpha(&p, d);
         let is_mesh = source
             .as_ref()
             .is_some_and(|s| matches!(s, ShapeSource::Mesh(_) | ShapeSource::Ply(_) | ShapeSource::Loop(..)));
         let displacement = if is_mesh { self.displacement(&p, d) } else { None };
         p.report_unused(d);
+
+        // Description; curves that differ only in their numbers are merged
         if let Some(source) = source.filter(|source| self.can_be_placed(source, &kind.text, p.span, d)) {
             let emits = self.state.area_light.is_some();
             let is_curve = matches!(source, ShapeSource::Curves(_));
@@ -172,6 +176,8 @@ fn quadric(kind: &str, p: &ParamSet, d: &mut Diagnostics) -> Option<QuadricKind>
         d.error(p.span_of("phimax"), format!("phimax must be above 0 and at most 360 degrees, not {phi}"));
         return None;
     }
+
+    // Ranges of each shape
     let phi_max = phi.to_radians();
     match kind {
         "disk" => {
@@ -247,6 +253,8 @@ fn indices<const N: usize>(p: &mut ParamSet, count: usize, d: &mut Diagnostics) 
         d.error(p.span, format!("{} needs `integer indices`: it has {count} vertices", p.owner));
         return None;
     };
+
+    // Surplus indices
     let surplus = values.len() % N;
     if surplus != 0 {
         let whole = values.len() - surplus;
@@ -497,6 +505,8 @@ fn parallelograms(data: &PatchData) -> Option<MeshData> {
     if !data.normals.is_empty() || !data.indices.iter().all(is_flat) {
         return None;
     }
+
+    // Corners, with the default texture coordinates of patches
     let mut mesh = MeshData::default();
     for patch in &data.indices {
         let first = mesh.positions.len() as u32;

@@ -95,6 +95,8 @@ impl Builder<'_> {
         if let Some(rgb) = spectra::illuminant_rgb(name) {
             return Some(Resolved::Rgb(rgb));
         }
+
+        // A file; names without a dot are likely misspelt
         let path = file_in(&self.folder, name);
         match Spectrum::read(&path) {
             Ok(Ok(curve)) => {

@@ -152,6 +152,7 @@ pub struct Builder<'a> {
 impl<'a> Builder<'a> {
     /// An empty scene.
     pub fn new(folder: PathBuf, load_options: &'a LoadOptions) -> Self {
+        // The default material comes first
         let mut materials = Vec::new();
         let mut textures = TextureSet::default();
         let default_material = default_material(&mut materials, &mut textures);

@@ -53,6 +53,8 @@ impl Builder<'_> {
             d.error(p.span_of("scale"), format!("scale must be positive, not {scale}"));
             return None;
         }
+
+        // Coefficients by preset, by reflectance, or given
         let name = p.string("name", d).map(str::to_owned);
         let given = |key: &str| p.type_of(key).is_some();
         let [sigma_a, sigma_s] = match name {
@@ -105,6 +107,8 @@ impl Builder<'_> {
             p.ignore("sigma_s");
             return None;
         }
+
+        // Reflectance and mean free path
         let reflectance = self.color_param(p, "reflectance", SpectrumUse::Albedo, d);
         let mfp = match p.type_of("mfp") {
             Some(ParamType::Float) => p.float("mfp", d).map(Rgb::splat),
@@ -116,6 +120,8 @@ impl Builder<'_> {
             d.error(p.span_of("mfp"), "mfp must be finite and positive");
             return None;
         }
+
+        // Invert the reflectance of the half-space
         let space = HalfSpace::new(eta);
         let albedo = reflectance.map(|r| space.albedo(f64::from(r), f64::from(g)) as f32);
         let sigma_t = Rgb::WHITE / mfp;
@@ -142,9 +148,13 @@ impl Builder<'_> {
                     format!("the material's interior goes before the medium `{}`", inside.text),
                 );
             }
+
+            // One interior for each material
             if media.interiors.contains_key(&material) {
                 continue;
             }
+
+            // Delta lights cannot be sampled through a smooth boundary
             let Interior { medium, is_smooth, span } = self.interiors[&material];
             if is_smooth && has_delta {
                 let text =

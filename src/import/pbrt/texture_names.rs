@@ -42,6 +42,7 @@ impl<I: Copy> TextureNames<I> {
         match self.by_name.get(name) {
             Some((_, Some(texture))) => return Some(*texture),
             Some((defined, None)) => {
+                // Textures are made in a fixed order
                 let message = format!("{kind} texture `{name}` is not made before the one that uses it");
                 d.error(span, message)
                     .label(*defined, "defined here")

@@ -97,6 +97,7 @@ impl Builder<'_> {
                 tex2: self.float_param(p, "outside", 0.0, d),
             },
             "bilerp" => {
+                // Corners are constants
                 let corners = CORNERS.map(|(key, value)| p.float(key, d).unwrap_or(value));
                 FloatTexture::Bilerp(Bilerp { mapping: self.mapping(p, d), corners })
             }

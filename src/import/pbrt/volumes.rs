@@ -39,11 +39,15 @@ impl Builder<'_> {
                 d.error(p.span_of(key), format!("{key} must be finite"));
             }
         }
+
+        // Names of the grids
         let density = p.string("gridname", d).unwrap_or("density").to_owned();
         let named = p.string("temperaturename", d).map(str::to_owned);
         let span = named.is_some().then(|| p.span_of("temperaturename"));
         let temperature = (named.unwrap_or_else(|| "temperature".to_owned()), span);
         let coefficients = self.coefficients(p, scale, d);
+
+        // Description
         let Some(name) = file_name(p, "filename", d) else {
             d.error(p.span, "a nanovdb medium needs `string filename`");
             return None;
@@ -93,6 +97,7 @@ fn checked(
 ) -> Option<Arc<Volume>> {
     match read? {
         Ok(volume) if [GridClass::UNKNOWN, GridClass::FOG_VOLUME].contains(&volume.class) => {
+            // Negative values and NaN were replaced by 0
             if volume.replaced > 0 {
                 let what = "values that are negative or no numbers are taken for 0";
                 let message = format!("{}: grid `{name}`: {} {what}", desc.path.display(), volume.replaced);

@@ -1,13 +1,13 @@
-//! Builds the cache, with the same result for any number of threads.
+//! Builds the cache. The result does not depend on the number of threads.
 //!
-//! Camera samples request records in rounds, coarser subsets of the pixels first: every 16th pixel, then those between,
-//! and so on; the second camera sample of every pixel follows after the first of all. In a round
+//! Camera samples request records in rounds, for coarse subsets of the pixels first: every 16th pixel, then the pixels
+//! between, and so on. The second camera samples follow after the first samples of all pixels. A round has four steps:
 //!
-//! 1. all camera samples, and what they see through mirrors and glass, are traced in parallel; those whose diffuse
-//!    surface has no usable record from earlier rounds request one;
-//! 2. sequentially, requests are dropped that a record at an accepted point would serve, however small its radius;
-//! 3. the records of the others are computed in parallel;
-//! 4. sequentially, in the order of the pixels, they are added.
+//! 1. All camera samples are traced in parallel, through mirrors and glass. A diffuse hit without a usable record from
+//!    earlier rounds requests one.
+//! 2. Sequentially, requests are dropped that a record of minimum radius at an accepted request would serve.
+//! 3. The remaining records are computed in parallel.
+//! 4. Sequentially, in the order of the pixels, they are added.
 //!
 //! So a round depends only on earlier rounds.
 
@@ -26,17 +26,17 @@ use rayon::prelude::*;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-/// Pixel distance of the first round.
+/// Pixel stride of the first round.
 const COARSEST: u32 = 16;
 /// Camera samples per pixel that request records.
 const SAMPLES: u32 = 2;
-/// Maximum error of a record for which no other is requested; rendering accepts errors up to 1.
+/// Maximum error of a record that prevents another request. Rendering accepts errors up to 1.
 const COVERED: f32 = 0.7;
-/// Minimum throughput at which a vertex seen through mirrors and glass requests a record.
+/// Minimum throughput for requests at vertices behind mirrors and glass.
 const WORTHWHILE: f32 = 0.2;
 /// Camera samples traced together.
 const CHUNK: usize = 1024;
-/// Records that are computed before they are added; the number of records per round is not limited.
+/// Records computed before they are added. The number of records per round is not limited.
 const MAX_AT_ONCE: usize = 1 << 14;
 
 /// Statistics of building the cache.
@@ -44,7 +44,7 @@ const MAX_AT_ONCE: usize = 1 << 14;
 pub struct BuildStats {
     /// Rounds.
     pub rounds: u32,
-    /// Requests that were served by another record of their round.
+    /// Requests served by another record of their round.
     pub dropped: u64,
     /// Camera samples traced.
     pub camera_samples: u64,
@@ -54,7 +54,7 @@ pub struct BuildStats {
     pub elapsed: Duration,
 }
 
-/// Builds the cache for what the camera sees inside `bounds`. `stop` ends it early.
+/// Builds the cache for the pixels in `bounds`. `stop` ends the build early.
 pub fn build(
     job: &RenderJob,
     bounds: PixelBounds,
@@ -73,6 +73,8 @@ pub fn build(
             break;
         }
         stats.rounds += 1;
+
+        // Request records, and drop redundant requests
         let pixels = round.pixels(bounds);
         stats.camera_samples += pixels.len() as u64;
         let wanted = ask(job, &cache, &pixels, &|pixel| cameras(pixel, round.sample), &mut stats.paths);
@@ -80,6 +82,8 @@ pub fn build(
             wanted.into_iter().map(|w| RecordRequest { key: w.key | round.sample << 16, ..w }).collect();
         let chosen = without_redundant(&wanted, &cache, &world_bounds);
         stats.dropped += (wanted.len() - chosen.len()) as u64;
+
+        // Compute and add the others
         for part in chosen.chunks(MAX_AT_ONCE) {
             if cache.is_full() || stop.load(Ordering::Relaxed) {
                 break;
@@ -91,7 +95,7 @@ pub fn build(
     (cache, stats)
 }
 
-/// True if no record could hold any light.
+/// True if all records would be black.
 fn holds_nothing(job: &RenderJob) -> bool {
     let settings = &job.settings().integrator;
     let min_depth = match settings.cache.cached {
@@ -101,7 +105,7 @@ fn holds_nothing(job: &RenderJob) -> bool {
     settings.max_depth < min_depth || job.lights.lights.is_empty()
 }
 
-/// A subset of the pixels: those whose x and y are `offset` modulo `stride`.
+/// A subset of the pixels: x and y are `offset` modulo `stride`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Round {
     stride: u32,
@@ -109,7 +113,7 @@ struct Round {
     sample: u32,
 }
 
-/// All rounds: every pixel once for each of [`SAMPLES`] samples, far from each other first.
+/// All rounds: every pixel once for each of [`SAMPLES`] samples, coarse to fine.
 fn rounds() -> Vec<Round> {
     let mut rounds = vec![Round { stride: COARSEST, offset: [0, 0], sample: 0 }];
     let mut stride = COARSEST;
@@ -152,7 +156,7 @@ fn ask(
     parts.into_iter().flat_map(|(wanted, _)| wanted).collect()
 }
 
-/// Requests records where camera paths find none, and follows these through mirrors and glass.
+/// Requests records at hits of camera paths without a usable record, and follows the paths through mirrors and glass.
 fn ask_chunk(
     job: &RenderJob,
     cache: &IrradianceCache,
@@ -186,13 +190,13 @@ fn ask_chunk(
     (paths.search.only_reflected, paths.only_specular) = (true, true);
     paths.search.start(job, samples, &mut out);
     paths.follow((job, &job.settings().integrator), Some(own), samples, &mut Fits::default(), &mut out);
-    // Paths went on vertex by vertex
+    // The requests are in the order of the vertices
     wanted.sort_by_key(|w: &RecordRequest| [w.pixel[1], w.pixel[0]]);
     wanted
 }
 
-/// The sides of a diffuse surface, 0 that of the viewer and 1 the other, that reflect or transmit light and have no
-/// usable record, with their normals.
+/// The sides of a diffuse surface without a usable record, with their normals. Side 0 is the side of the viewer, if it
+/// reflects; side 1 the other one, if it transmits.
 fn unserved_sides(cache: &IrradianceCache, v: &ShadingPoint<'_>) -> [Option<(u32, Vec3)>; 2] {
     let Some(part) = v.bsdf.lambertian(v.wo) else { return [None; 2] };
     let ns = v.viewer_normal();
@@ -202,12 +206,12 @@ fn unserved_sides(cache: &IrradianceCache, v: &ShadingPoint<'_>) -> [Option<(u32
     })
 }
 
-/// Width of a pixel at `p`, not so small that positions cannot be told apart.
+/// Pixel width at `p`, at least the resolution of positions.
 fn pixel_width(width: f32, p: Vec3) -> f32 {
     width.max(1e-6 * p.abs().max_element()).max(1e-30)
 }
 
-/// The requests without those that a record of minimum radius at an earlier one would serve.
+/// Removes requests that a record of minimum radius at an earlier request would serve.
 fn without_redundant(wanted: &[RecordRequest], cache: &IrradianceCache, bounds: &Bounds3) -> Vec<RecordRequest> {
     let settings = cache.settings();
     let mut chosen: Vec<RecordRequest> = Vec::new();
@@ -226,7 +230,7 @@ fn without_redundant(wanted: &[RecordRequest], cache: &IrradianceCache, bounds: 
     chosen
 }
 
-/// The records requested, in their order.
+/// Computes the requested records, in their order.
 fn gather(job: &RenderJob, wanted: &[RecordRequest], stats: &mut PathStats) -> Vec<Record> {
     let parts: Vec<(Vec<Record>, PathStats)> = wanted
         .par_chunks(BATCH)

@@ -1,4 +1,4 @@
-//! The records, and the octrees that find them.
+//! The records, and octrees for their lookup.
 
 use super::gradients::Irradiance;
 use super::octree::Octree;
@@ -15,9 +15,9 @@ pub struct IrradianceCache {
     settings: IrradianceCacheSettings,
     records: Vec<Record>,
     ranges: Vec<Range>,
-    /// Balls of radius a, for interpolation.
+    /// Spheres of radius a, for interpolation.
     reaches: Octree,
-    /// Balls of radius R, for clamping.
+    /// Spheres of radius R, for clamping.
     radii: Octree,
 }
 
@@ -38,12 +38,12 @@ impl IrradianceCache {
         &self.records
     }
 
-    /// The settings that it was built with.
+    /// The settings of the cache.
     pub fn settings(&self) -> &IrradianceCacheSettings {
         &self.settings
     }
 
-    /// True if no more records are taken.
+    /// True if the maximum number of records is reached.
     pub fn is_full(&self) -> bool {
         self.records.len() >= MAX_RECORDS
     }
@@ -53,7 +53,7 @@ impl IrradianceCache {
         self.records.len() * (size_of::<Record>() + size_of::<Range>()) + self.reaches.bytes() + self.radii.bytes()
     }
 
-    /// Irradiance at a point with the normal `n`, from all usable records; `None` if there are none.
+    /// Irradiance at a point with the normal `n`, interpolated from all usable records; `None` if there are none.
     #[inline]
     pub fn irradiance(&self, p: Vec3, n: Vec3) -> Option<Rgb> {
         let (mut sum, mut weights) = (Rgb::BLACK, 0.0);
@@ -78,17 +78,21 @@ impl IrradianceCache {
         found
     }
 
-    /// Adds a record, unless the cache is full. Radii are clamped so that R_i ≤ R_j + |x_i − x_j| for all pairs: where
-    /// one record sees something near, its neighbours, which may have missed it, do not extend beyond [Křivánek et al.
-    /// 2006].
+    /// Adds a record, unless the cache is full. Radii are clamped so that R_i ≤ R_j + |x_i − x_j| for all pairs
+    /// [Křivánek et al. 2006]. So if one record detects a near surface, neighbours that may have missed it do not
+    /// extend beyond it.
     pub fn insert(&mut self, mut record: Record) {
         if self.is_full() {
             return;
         }
+
+        // Limit the radius by the range of a, then by the neighbours
         let [min, max] = self.settings.radius;
         record.radius = record.radius.min(max.max(min) * record.pixel_width / self.settings.error);
         let mut nearby = Vec::new();
         self.radii.near(record.p, record.radius, |id| nearby.push(id));
+
+        // Limit the radii of the neighbours
         for &id in &nearby {
             let other = &self.records[id as usize];
             record.radius = record.radius.min(other.radius + record.p.distance(other.p));
@@ -102,6 +106,7 @@ impl IrradianceCache {
             }
         }
 
+        // Store the record
         let id = self.records.len() as u32;
         let reach = record.reach(&self.settings);
         limit_gradients(&mut record.light, reach, self.settings.error);
@@ -112,7 +117,7 @@ impl IrradianceCache {
     }
 }
 
-/// Gradients from few samples are noisy: their change within the radius of a record is clamped to the value itself.
+/// Gradients from few samples are noisy. The change within the radius of a record is clamped to the value itself.
 fn limit_gradients(light: &mut Irradiance, reach: f32, error: f32) {
     // √(1 − cos α) = κ at α ≈ √2 κ
     let turn = std::f32::consts::SQRT_2 * error;
@@ -145,6 +150,8 @@ mod tests {
     fn radii_obey_the_triangle_inequality() {
         let settings = IrradianceCacheSettings { radius: [0.0, 1000.0], ..Default::default() };
         let mut cache = IrradianceCache::new(settings, &unit_box());
+
+        // Random records, some of them with small radii
         let mut s = pcg32([5, 6, 7]);
         let mut asked = Vec::new();
         for _ in 0..400 {
@@ -153,6 +160,8 @@ mod tests {
             asked.push(radius);
             cache.insert(record(p, radius, 1.0));
         }
+
+        // The inequality holds for all pairs
         let (mut tight, records) = (0, cache.records());
         for (a, &asked) in records.iter().zip(&asked) {
             assert!(a.radius <= asked);
@@ -171,6 +180,8 @@ mod tests {
     #[test]
     fn interpolation_is_what_a_search_of_all_records_gives() {
         let mut cache = IrradianceCache::new(IrradianceCacheSettings::default(), &unit_box());
+
+        // Random records
         let mut s = pcg32([9, 6, 7]);
         for _ in 0..300 {
             let n = (Vec3::Z + sample_uniform_sphere(s.random::<[f32; 2]>()) * 0.1).normalize();
@@ -180,6 +191,8 @@ mod tests {
         let mut found = 0;
         for _ in 0..1000 {
             let (x, n) = (Vec3::new(s.random::<f32>(), s.random::<f32>(), 0.0), Vec3::Z);
+
+            // Reference: a search of all records
             let (mut sum, mut weights) = (0.0_f64, 0.0_f64);
             for r in cache.records() {
                 let reach = r.reach(cache.settings());
@@ -189,6 +202,8 @@ mod tests {
                     weights += f64::from(1.0 - error);
                 }
             }
+
+            // The cache
             match cache.irradiance(x, n) {
                 None => assert_eq!(weights, 0.0),
                 Some(e) => {

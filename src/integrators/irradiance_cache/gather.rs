@@ -1,12 +1,12 @@
-//! Computes records: indirect light by path tracing over a stratified hemisphere, direct light by estimating it on a
-//! white Lambertian surface, whose radiance is E/π.
+//! Computes records. Indirect light comes from path tracing over a stratified hemisphere. Direct light is estimated at
+//! a white Lambertian surface, whose radiance is E/π.
 //!
-//! A path from a record omits what its first hit emits, since that is direct light. Its random numbers are those of the
-//! pixel that requests the record, so that a record does not depend on other records.
+//! A path from a record omits the emission of its first hit, which is direct light. Its random numbers follow from the
+//! pixel that requests the record, so that records are independent of each other.
 //!
-//! The gradient of direct irradiance comes from the samples themselves: with the weights that make Σ c_i an estimate of
-//! E, Σ c_i ∇ln g_i is an estimate of its gradient, g = cos θ cos θ'/r² being the factor that changes with the point.
-//! Visibility is treated as constant: the movement of shadows is ignored, which only smaller radii can make up for.
+//! The gradient of direct irradiance comes from the same samples. With weights such that Σ c_i estimates E, Σ c_i ∇ln
+//! g_i estimates its gradient, where g = cos θ cos θ'/r² is the factor that changes with the point. Visibility is
+//! treated as constant: the movement of shadows is ignored, and only smaller radii reduce this error.
 
 use super::gradients::{Cells, Irradiance};
 use super::record::Record;
@@ -31,7 +31,7 @@ use std::f32::consts::PI;
 
 /// Records computed together.
 pub const BATCH: usize = 16;
-/// Lower bound of the cosines that gradients are divided by.
+/// Lower bound of cosines in denominators of gradients.
 const MIN_COS: f32 = 0.05;
 
 /// Random-number domains of a record.
@@ -55,11 +55,11 @@ pub struct RecordRequest {
     pub time: f32,
     /// Width of a pixel on the surface.
     pub pixel_width: f32,
-    /// How that grows with distance.
+    /// Growth of the pixel width per unit length.
     pub spread: f32,
     /// The pixel that requests it.
     pub pixel: [u32; 2],
-    /// Distinguishes the records that a pixel may request.
+    /// Distinguishes the records of a pixel.
     pub key: u32,
 }
 
@@ -77,7 +77,7 @@ pub struct Gatherer {
 }
 
 impl Gatherer {
-    /// The counts and times since the last call.
+    /// Counts and times since the last call.
     pub fn take_stats(&mut self) -> PathStats {
         let mut stats = self.paths.take_stats();
         stats.direct.merge(&std::mem::take(&mut self.direct.stats));
@@ -96,9 +96,9 @@ impl Gatherer {
         records
     }
 
-    /// Indirect light, and radii.
+    /// Records of indirect light, with their radii.
     fn indirect(&mut self, job: &RenderJob, settings: &IntegratorSettings, wanted: &[RecordRequest]) -> Vec<Record> {
-        // Paths through every cell; one bounce, which the record's surface makes, is theirs no more
+        // Paths through every cell, with one bounce less: the record's surface makes it
         let cells = Cells::new(settings.cache.samples);
         let paths = IntegratorSettings {
             kind: IntegratorKind::Path,
@@ -146,7 +146,7 @@ impl Gatherer {
         wanted.iter().zip(self.results.chunks(cells.count() as usize)).map(of_record).collect()
     }
 
-    /// Direct light. Progressive estimators are fitted to the earlier passes of each record, in blocks.
+    /// Direct light. Progressive estimators are fitted to earlier passes of each record, in blocks.
     fn sources(&mut self, job: &RenderJob, settings: &IntegratorSettings, wanted: &[RecordRequest]) -> Vec<Irradiance> {
         let passes = settings.cache.passes.max(1);
         let mut sums = vec![Irradiance::default(); wanted.len()];
@@ -178,7 +178,7 @@ impl Gatherer {
         sums
     }
 
-    /// Adds the gradients of the samples of the last estimates, one per point, times `scale`.
+    /// Adds `scale` times the gradients of the samples of the last estimates to the sums of their points.
     fn add_gradients(&mut self, job: &RenderJob, wanted: &[RecordRequest], scale: f32, sums: &mut [Irradiance]) {
         // Normals of the emitters at the ends of segments
         let segments = self.direct.segments();
@@ -204,15 +204,15 @@ impl Gatherer {
             Irradiance::add_gradient(&mut sum.rotation, w.ns.cross(wi), c / wi.dot(w.ns).max(MIN_COS));
             if has_end {
                 let gradient = log_gradient(job, w, d, self.emitters[i].as_ref());
-                // Tangential
+                // Only the tangential component
                 Irradiance::add_gradient(&mut sum.translation, gradient - w.ns * gradient.dot(w.ns), c);
             }
         }
     }
 }
 
-/// ∇x ln(cos θ cos θ'/r²) up to a part along the normal, d being the way from x to the light: 4d/r² − n'/(n'·d) for an
-/// emitter at its end, 3d/r² for a light that is a point.
+/// ∇x ln(cos θ cos θ'/r²) up to a component along the normal, where d leads from x to the light: 4d/r² − n'/(n'·d) for
+/// an emitting surface at its end, 3d/r² for a point light.
 fn log_gradient(job: &RenderJob, w: &RecordRequest, d: Vec3, emitter: Option<&EmitterHit>) -> Vec3 {
     let r2 = d.length_squared();
     match emitter {
@@ -225,8 +225,8 @@ fn log_gradient(job: &RenderJob, w: &RecordRequest, d: Vec3, emitter: Option<&Em
     }
 }
 
-/// R: the harmonic mean of the distances [Ward et al. 1988], but no more than E/|∇t E| [Křivánek et al. 2006], nor so
-/// much that κR passes the nearest surface: what lies behind that is another place.
+/// R: the harmonic mean of the distances [Ward et al. 1988], at most E/|∇t E| [Křivánek et al. 2006]. κR is at most the
+/// distance of the nearest surface, since the light behind it differs.
 fn radius(light: &Irradiance, r: &[f32], kappa: f32) -> f32 {
     let inverse: f32 = r.iter().map(|r| 1.0 / r).sum();
     let mean = r.len() as f32 / inverse;
@@ -234,7 +234,7 @@ fn radius(light: &Irradiance, r: &[f32], kappa: f32) -> f32 {
     let luminance = |v: [f32; 3]| Rgb::from_array(v).luminance();
     let gradient: [f32; 3] = std::array::from_fn(|axis| luminance(light.translation.map(|g| g[axis])));
     let by_gradient = light.e.luminance() / Vec3::from_array(gradient).length();
-    // Without light both are 0, and the quotient is NaN, which min leaves out
+    // Without light both are 0; the quotient is NaN, which `min` ignores
     mean.min(by_gradient).min(nearest / kappa)
 }
 
@@ -244,20 +244,21 @@ impl RecordRequest {
         self.stream_of_block(job, 0, index)
     }
 
-    /// The same for blocks that are independent of each other.
+    /// The same for independent blocks of samples.
     fn stream_of_block(&self, job: &RenderJob, block: u32, index: u32) -> SampleStream {
         let sampling = &job.settings().sampling;
         let [seed, ..] = pcg4d([sampling.seed, self.key, 0x6972_7261, block]);
         SampleStream::new(sampling.sampler, self.pixel, index, seed)
     }
 
-    /// A white surface at the point, for which light is estimated with sample `index` of `block`.
+    /// A white surface at the point, for sample `index` of `block`.
     fn white_point(
         &self,
         job: &RenderJob,
         (block, index): (u32, u32),
         sample_counts: SampleCounts,
     ) -> ShadingPoint<'static> {
+        // A white Lambertian surface, whose radiance is E/π
         let bsdf = SurfaceBsdf {
             bsdf: Bsdf::Diffuse(Diffuse { reflectance: Rgb::WHITE }),
             frame: Frame::from_z(self.ns),

@@ -1,9 +1,9 @@
 //! A stratified hemisphere, its irradiance, and the derivatives of the irradiance by position and normal
 //! [Ward and Heckbert 1992; Křivánek et al. 2008].
 //!
-//! M × N cells (M rings of polar angle θ, N sectors of azimuth φ) of equal projected solid angle π/(MN), with one
-//! direction each. With L_jk and r_jk the radiance and distance of cell (j, k), u_k the tangent at the middle of the
-//! sector, v_k the one across, and index − and + for the lower and upper bounds of a cell:
+//! M × N cells (M rings of polar angle θ, N sectors of azimuth φ) have the equal projected solid angle π/(MN), with one
+//! direction each. L_jk and r_jk are the radiance and distance of cell (j, k). u_k is the tangent at the middle of the
+//! sector, v_k the tangent perpendicular to it. The indices − and + stand for the lower and upper bounds of a cell:
 //!
 //! E    = π/(MN) Σ L_jk
 //!
@@ -12,9 +12,9 @@
 //! ∇t E = Σ_k [ u_k (2π/N) Σ_{j≥1} sin θ_j− cos²θ_j− (L_jk − L_{j−1,k}) / min(r_jk, r_{j−1,k})
 //!            + v_k− Σ_j (sin θ_j+ − sin θ_j−) (L_jk − L_{j,k−1}) / min(r_jk, r_{j,k−1}) ]
 //!
-//! ∇r is the integral of L (n × ω) dω with L constant in each cell, not the sum of tan θ_jk L_jk of the source, whose
-//! variance is unbounded. ∇t is the movement of the boundaries between cells, at the nearer of the two surfaces, as the
-//! point moves. Both are tangential: E(x, n) ≈ E + (x − x_i)·∇t E + (n_i × n)·∇r E.
+//! ∇r is the integral of L (n × ω) dω with L constant in each cell. The source has the sum of tan θ_jk L_jk instead,
+//! whose variance is unbounded. ∇t is the movement of the boundaries between cells, at the nearer of the two surfaces,
+//! as the point moves. Both are tangential: E(x, n) ≈ E + (x − x_i)·∇t E + (n_i × n)·∇r E.
 
 use lumiris_numbers::math::{Frame, Rgb, Vec3, safe_sqrt};
 use std::f32::consts::{PI, TAU};
@@ -50,14 +50,14 @@ impl Irradiance {
         }
     }
 
-    /// Adds to a gradient `scale` times the direction for each channel.
+    /// Adds `scale` times `direction` to the gradient of each channel.
     pub fn add_gradient(gradient: &mut [Vec3; 3], direction: Vec3, scale: Rgb) {
         for (c, g) in gradient.iter_mut().enumerate() {
             *g += direction * scale[c];
         }
     }
 
-    /// True if no number is NaN or infinite.
+    /// True if all numbers are finite.
     pub fn is_finite(&self) -> bool {
         self.e.is_finite() && self.translation.iter().chain(&self.rotation).all(|v| v.is_finite())
     }
@@ -95,8 +95,8 @@ impl Cells {
         (sin2.sqrt(), safe_sqrt(1.0 - sin2))
     }
 
-    /// Irradiance and its gradients in world space from the radiance `l` and the distance `r` (infinite if there is
-    /// nothing) of each cell.
+    /// Irradiance and its gradients in world space, from the radiance `l` and the distance `r` of each cell. The
+    /// distance is infinite if the ray hits nothing.
     pub fn irradiance(self, frame: &Frame, l: &[Rgb], r: &[f32]) -> Irradiance {
         let mut sum = Irradiance::default();
         let at = |ring: u32, sector: u32| (ring * self.sectors + sector) as usize;
@@ -140,7 +140,7 @@ mod tests {
 
     const FINE: Cells = Cells { rings: 96, sectors: 300 };
 
-    /// Light from the plane z = 1, seen from `p` with the normal `n`: cell middles.
+    /// Irradiance at `p` with the normal `n` from the plane z = 1, by rays through the cell centres.
     fn under_plane(cells: Cells, p: Vec3, n: Vec3, l: impl Fn(Vec3) -> Rgb) -> Irradiance {
         let frame = Frame::from_z(n);
         let (mut radiance, mut distance) = (Vec::new(), Vec::new());

@@ -1,17 +1,18 @@
-//! Irradiance caching [Ward et al. 1988]: the light that diffuse surfaces reflect is interpolated between records.
+//! Irradiance caching [Ward et al. 1988]: irradiance of diffuse surfaces is interpolated between records.
 //!
-//! Irradiance has two parts, E = E_sources + E_indirect [Fan et al. 2006, §5.1]. Records hold either the second one
-//! ([`Cached::Indirect`]; direct light is estimated at every hit) or both ([`Cached::All`]). They are computed where
-//! the camera looks, before rendering ([`build()`]), and do not change after that.
+//! Irradiance has two parts, E = E_sources + E_indirect [Fan et al. 2006, §5.1]. Records hold either E_indirect
+//! ([`Cached::Indirect`]; direct light is estimated at every hit) or both ([`Cached::All`]). They are computed at
+//! points visible to the camera, before rendering ([`build()`]), and do not change afterwards.
 //!
-//! Camera paths take the light reflected by the Lambertian part of a BSDF from the records, and continue with the other
-//! lobes (`diffuse.rs`).
+//! Camera paths take the light reflected by Lambertian lobes from the records, and continue with the other lobes
+//! (`diffuse.rs`).
 //!
-//! Biased: irradiance is interpolated, the base below a coat is treated as Lambertian, and the bounces of a record's
-//! light are counted from the record, whatever mirrors precede it; records at different shutter times are not
-//! distinguished. Where nothing is interpolated, the result is that of `path`.
+//! Biased: irradiance is interpolated, and the base below a coat is treated as Lambertian. The bounces of a record's
+//! light are counted from the record, not counting mirrors before. Records of different shutter times are not
+//! distinguished. Without interpolation, the result equals the integrator `path`.
 //!
-//! Reading order: [`gradients`], [`record`], [`octree`], [`cache`], [`gather`], [`mod@build`]; this file renders.
+//! Reading order: [`gradients`], [`record`], [`octree`], [`cache`], [`gather`], [`mod@build`]; this file has the
+//! integrator.
 
 pub mod build;
 pub mod cache;
@@ -40,11 +41,11 @@ use std::sync::atomic::AtomicBool;
 /// Statistics of an irradiance cache.
 #[derive(Clone, Copy, Debug)]
 pub struct CacheReport {
-    /// Records.
+    /// Number of records.
     pub records: usize,
-    /// Their memory (bytes).
+    /// Memory of the records (bytes).
     pub bytes: usize,
-    /// How it was built; its ray counts are also included in those of the rendering.
+    /// Statistics of the build. Its ray counts are included in the counts of the image.
     pub build: BuildStats,
     /// Lookups and cache misses.
     pub lookups: LookupStats,
@@ -107,7 +108,7 @@ impl Tracer for CacheTracer<'_> {
     }
 }
 
-/// Radiance that the Lambertian part of a vertex reflects to the viewer; `None` without records.
+/// Radiance that the Lambertian lobe reflects to the viewer; `None` without usable records.
 fn reflected(cache: &IrradianceCache, v: &PathVertex<'_, '_>, part: &Lambertian<'_>) -> Option<Rgb> {
     let ns = v.point.viewer_normal();
     let sides = [(part.reflectance, ns), (part.transmittance, -ns)];

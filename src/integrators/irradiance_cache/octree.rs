@@ -1,9 +1,8 @@
-//! An octree of spheres: which of them contain a point, or intersect another sphere.
+//! An octree of spheres, for queries by point and by sphere.
 //!
-//! A sphere is stored in all nodes of one level that it intersects, at most eight, where nodes are two to four times as
-//! wide as its radius. A point is in one node of each level, so a query descends once. Space is divided at the centres
-//! of nodes only: the outermost nodes extend to infinity, and nothing need lie inside the box that the tree was built
-//! for.
+//! A sphere is stored in all nodes of one level that it intersects, at most eight. Nodes of this level are two to four
+//! times as wide as its radius. A point is in one node of each level, so a query descends once. Space is divided at the
+//! centres of nodes only: the outermost nodes extend to infinity, and spheres may lie outside of the box of the tree.
 
 use lumiris_numbers::math::{Bounds3, Vec3};
 
@@ -12,7 +11,7 @@ const MAX_DEPTH: u32 = 24;
 /// No child.
 const NONE: u32 = u32::MAX;
 
-/// Balls by their ids.
+/// Octree of sphere ids.
 #[derive(Clone, Debug)]
 pub struct Octree {
     center: Vec3,
@@ -32,7 +31,7 @@ impl Node {
     }
 }
 
-/// A node with its place.
+/// A node with its position and size.
 #[derive(Clone, Copy)]
 struct Place {
     node: u32,
@@ -42,7 +41,7 @@ struct Place {
 }
 
 impl Place {
-    /// Child `i`, which is `node`; bit k is the upper half of axis k.
+    /// Child `i` with the node index `node`. Bit k of `i` selects the upper half of axis k.
     fn child(&self, i: usize, node: u32) -> Place {
         let half = 0.5 * self.half;
         let side = |bit: usize| if i >> bit & 1 == 1 { half } else { -half };
@@ -78,7 +77,7 @@ impl Octree {
         Place { node: 0, center: self.center, half: self.half, depth: 0 }
     }
 
-    /// Adds a ball.
+    /// Adds a sphere.
     pub fn insert(&mut self, id: u32, p: Vec3, radius: f32) {
         let mut pending = vec![self.root()];
         while let Some(place) = pending.pop() {
@@ -98,8 +97,8 @@ impl Octree {
         }
     }
 
-    /// Calls `f` with the ids of all spheres that contain `p`, and some others nearby, each once, in an order that
-    /// depends on the insertions only.
+    /// Calls `f` once for the id of each sphere that contains `p`, and of some others nearby. The order depends on the
+    /// insertions only.
     #[inline]
     pub fn at_point(&self, p: Vec3, mut f: impl FnMut(u32)) {
         let mut place = self.root();
@@ -117,8 +116,8 @@ impl Octree {
         }
     }
 
-    /// Calls `f` with the ids of all spheres that intersect the sphere about `p`, and some others nearby, possibly more
-    /// than once.
+    /// Calls `f` with the ids of all spheres that intersect the sphere about `p`, and of some others nearby, possibly
+    /// more than once.
     pub fn near(&self, p: Vec3, radius: f32, mut f: impl FnMut(u32)) {
         let mut pending = vec![self.root()];
         while let Some(place) = pending.pop() {
@@ -139,7 +138,7 @@ mod tests {
     use lumiris_test_support::random::{Pcg32, RngExt, pcg32};
 
     fn random_point(s: &mut Pcg32) -> Vec3 {
-        // Some outside of the box
+        // Some points lie outside of the box
         Vec3::new(s.random::<f32>(), s.random::<f32>(), s.random::<f32>()) * 3.0 - 1.5
     }
 
@@ -152,6 +151,8 @@ mod tests {
         for (i, &(p, r)) in balls.iter().enumerate() {
             tree.insert(i as u32, p, r);
         }
+
+        // Compare both queries with a search of all spheres
         for _ in 0..500 {
             let (p, radius) = (random_point(&mut s), 0.3 * s.random::<f32>());
             let mut at = Vec::new();

@@ -4,15 +4,15 @@
 //!
 //! ε_i(x, n) = |x − x_i| / a_i + √(1 − n·n_i) / κ
 //!
-//! is below 1, where a_i is κR_i, clamped to a range in pixels; the weight 1 − ε_i falls to 0 there, so that the
-//! interpolation is continuous.
+//! is below 1. a_i is κR_i, clamped to a range in pixels. The weight is 1 − ε_i, which falls to 0 at ε_i = 1, so that
+//! the interpolation is continuous.
 
 use super::gradients::Irradiance;
 use crate::settings::IrradianceCacheSettings;
 use lumiris_numbers::math::{Rgb, Vec3};
 
-/// Maximum distance of a point behind the tangent plane of a record, relative to a_i: points further behind are hidden
-/// from light that the record sees [Ward et al. 1988].
+/// Maximum distance of a point behind the tangent plane of a record, relative to a_i. Points further behind may be
+/// hidden from the light of the record [Ward et al. 1988].
 const BEHIND: f32 = 0.05;
 
 /// Irradiance of a point.
@@ -24,7 +24,7 @@ pub struct Record {
     pub n: Vec3,
     /// Irradiance.
     pub light: Irradiance,
-    /// R: mean distance of the surfaces that the point sees, after clamping.
+    /// R: harmonic mean distance of visible surfaces, after clamping.
     pub radius: f32,
     /// Width of a pixel on the surface.
     pub pixel_width: f32,
@@ -40,7 +40,7 @@ impl Record {
         (settings.error * self.radius).clamp(min * self.pixel_width, max.max(min) * self.pixel_width)
     }
 
-    /// Irradiance at `x` with the normal `n` by the first order, not below 0.
+    /// First-order extrapolation of the irradiance to `x` with the normal `n`, clamped at 0.
     #[inline]
     pub fn extrapolate(&self, x: Vec3, n: Vec3) -> Rgb {
         let (moved, turned) = (x - self.p, self.n.cross(n));
@@ -49,7 +49,7 @@ impl Record {
     }
 }
 
-/// What determines where a record is used.
+/// Data that determine the range of use of a record.
 #[derive(Clone, Copy, Debug)]
 pub struct Range {
     /// Its point.
@@ -61,7 +61,7 @@ pub struct Range {
 }
 
 impl Range {
-    /// ε; infinite for points behind.
+    /// ε; infinite for points behind the record.
     #[inline]
     pub fn error(&self, kappa: f32, x: Vec3, n: Vec3) -> f32 {
         let moved = x - self.p;

@@ -1,28 +1,27 @@
-//! What of a camera path light paths could have found as well, and how the two share it.
+//! The part of a camera path that light paths can sample as well, and the MIS weights of both.
 
-/// The part of a camera path from its first vertex on: any surface there, and after that metal and glass only. See
-/// [`super`].
+/// The part of a camera path from its first vertex on: any surface there, then only metal and glass. See [`super`].
 #[derive(Clone, Copy, Debug)]
 pub(in crate::integrators) struct Chain {
-    /// Density of camera samples at the first vertex (1/m², projected); beyond it that of the direction as well
-    /// (1/(m² sr), projected). 0 if light paths cannot find the path.
+    /// Density of camera samples at the first vertex (1/m², projected). Beyond that vertex, times the density of the
+    /// direction (1/(m² sr), projected). 0 if light paths cannot sample the path.
     density: f32,
-    /// Metal or glass was met.
+    /// True if the path has hit metal or glass.
     is_bundled: bool,
 }
 
 impl Chain {
-    /// Of no use for light paths.
+    /// A path that light paths cannot sample.
     pub(in crate::integrators) const NONE: Chain = Chain { density: 0.0, is_bundled: false };
 
-    /// At a first vertex that is seen at the cosine `cos` to its geometric normal, where a pixel is `width` wide.
+    /// At a first vertex. `cos` is the cosine between the camera ray and the geometric normal, `width` the pixel width.
     #[inline]
     pub(in crate::integrators) fn at_first(cos: f32, width: f32) -> Self {
         Chain { density: samples_per_area(cos, width), ..Chain::NONE }.checked()
     }
 
-    /// Beyond that vertex, in a direction of the density `pdf` (1/sr) and at the cosine `cos` to the geometric normal;
-    /// `None` if no other technique finds the direction.
+    /// Beyond the first vertex, in a direction with the density `pdf` (1/sr) and the cosine `cos` to the geometric
+    /// normal. `pdf` is `None` if no other technique can sample the direction.
     #[inline]
     #[must_use]
     pub(in crate::integrators) fn beyond_first(self, pdf: Option<f32>, cos: f32) -> Self {
@@ -30,27 +29,26 @@ impl Chain {
         Chain { density: self.density * projected(pdf, cos), ..self }.checked()
     }
 
-    /// At metal or glass.
+    /// The chain after a vertex on metal or glass.
     #[inline]
     #[must_use]
     pub(in crate::integrators) fn bundled(self) -> Self {
         Chain { is_bundled: true, ..self }
     }
 
-    /// True if what is at the next vertex decides.
+    /// True if light paths may sample the path, depending on its next vertices.
     #[inline]
     pub(in crate::integrators) fn is_open(&self) -> bool {
         self.density > 0.0
     }
 
-    /// True if light paths may have found what the path meets now.
+    /// True if light paths can sample an emitter hit at the next vertex.
     #[inline]
     pub(in crate::integrators) fn is_caustic(&self) -> bool {
         self.is_open() && self.is_bundled
     }
 
-    /// What is left to the camera path of light that light paths bring with the density `of_light`
-    /// ([`super::Guide::density`]).
+    /// MIS weight of the camera path, where light paths have the density `of_light` ([`super::Guide::density`]).
     #[inline]
     pub(in crate::integrators) fn rest(&self, of_light: f32) -> f32 {
         1.0 - light_weight(of_light, self.density)
@@ -61,26 +59,26 @@ impl Chain {
     }
 }
 
-/// Density of camera samples (1/m², projected) where a pixel is `width` wide and seen at the cosine `cos`.
+/// Density of camera samples (1/m², projected). `width` is the pixel width, `cos` the cosine of the camera ray.
 #[inline]
 fn samples_per_area(cos: f32, width: f32) -> f32 {
     cos.abs() / (width * width)
 }
 
-/// A density per steradian of projected solid angle.
+/// Density per projected solid angle (1/sr).
 #[inline]
 fn projected(pdf: f32, cos: f32) -> f32 {
     pdf / cos.abs()
 }
 
-/// Density of camera paths that light paths are compared with: seen at the cosine `cos_seen` where a pixel is `width` wide,
-/// and on in a direction of the density `pdf` (1/sr) at the cosine `cos`.
+/// Density of camera paths (1/(m² sr), projected), for the MIS weight of a light path. The camera ray has the cosine
+/// `cos_seen` and the pixel width `width`. The next direction has the density `pdf` (1/sr) and the cosine `cos`.
 #[inline]
 pub(super) fn camera_density((cos_seen, width): (f32, f32), (pdf, cos): (f32, f32)) -> f32 {
     Chain::at_first(cos_seen, width).beyond_first(Some(pdf), cos).density
 }
 
-/// Weight of a light path by the balance heuristic [Veach 1997, §9.2.2]; 0 where one of both densities is 0.
+/// Weight of a light path by the balance heuristic [Veach 1997, §9.2.2]; 0 if either density is 0.
 #[inline]
 pub(super) fn light_weight(of_light: f32, of_camera: f32) -> f32 {
     if of_light > 0.0 && of_camera > 0.0 { 1.0 / (1.0 + of_camera / of_light) } else { 0.0 }

@@ -1,9 +1,9 @@
-//! Where light paths begin: at which lights, and in which directions.
+//! Sampling of the first segments of light paths: light, point and direction.
 //!
-//! Few directions lead from a lamp over glass or metal to what the camera sees. A pilot finds them: rays in all directions
-//! find metal and glass, and light paths there find what is of use. Lights of one geometry share a table over the directions
-//! of world space. What the pilot has missed has the density 0, and is left to the camera paths; so the estimate is unbiased
-//! whatever it finds.
+//! Few directions lead from a light over glass or metal to surfaces visible to the camera. A pilot learns them: first,
+//! rays in all directions locate metal and glass; then light paths in these directions measure their contribution to
+//! the image. Lights of one geometry share a table over the directions of world space. Directions missed by the pilot
+//! have the density 0, and remain with camera paths. So the estimate is unbiased for any pilot.
 
 use crate::lights::{EmittingPoint, Light, LightId, LightSet};
 use crate::photons::LightDistribution;
@@ -12,27 +12,27 @@ use lumiris_numbers::math::sphere_map::{
 };
 use lumiris_numbers::math::{PiecewiseConstant2D, Rgb, Vec2, Vec3};
 
-/// Cells along the edge of the map of directions.
+/// Cells along the edge of the direction table.
 const EDGE: usize = 64;
-/// Groups of lights that have a table of their own; all others share one.
+/// Maximum number of tables. The lights of all further geometries share the last one.
 const MAX_GROUPS: usize = 256;
 
-/// A light path as it leaves its light.
+/// The start of a light path.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Emitted {
     pub(super) light: LightId,
     pub(super) p: Vec3,
     pub(super) p_error: Vec3,
-    /// Normal on the side that emits.
+    /// Normal on the emitting side.
     pub(super) n: Vec3,
     pub(super) d: Vec3,
-    /// Its power (W), for one light path in all.
+    /// Power (W) if the image had only this light path.
     pub(super) power: Rgb,
     /// See [`Guide::density`].
     pub(super) density: f32,
 }
 
-/// How light paths begin.
+/// Distribution of the first segments of light paths.
 #[derive(Clone, Debug)]
 pub(in crate::integrators) struct Guide {
     lights: LightDistribution,
@@ -41,11 +41,11 @@ pub(in crate::integrators) struct Guide {
     tables: Vec<PiecewiseConstant2D>,
     /// Light paths per area of each light (1/m²).
     rates: Vec<f32>,
-    /// Light paths that are traced together.
+    /// Number of light paths in a set.
     pub(super) paths: u32,
 }
 
-/// What the paths of a pilot found, by light and by direction.
+/// Contributions of the paths of a pilot, by light and by direction.
 #[derive(Clone, Debug)]
 pub(super) struct Found {
     of_light: Vec<f64>,
@@ -54,7 +54,7 @@ pub(super) struct Found {
 }
 
 impl Guide {
-    /// That of a pilot, by power and in all directions; `None` without area lights.
+    /// The first guide of a pilot: lights in proportion to power, and uniform directions. `None` without area lights.
     pub(super) fn everywhere(set: &LightSet, paths: u32) -> Option<Self> {
         let sources = set.sources();
         let last = sources.iter().flatten().max().map_or(0, |&last| (last as usize).min(MAX_GROUPS - 1));
@@ -80,7 +80,7 @@ impl Guide {
         Some(Guide { lights, group_of, tables, rates, paths })
     }
 
-    /// The same directions by another number of paths.
+    /// The same distribution with another number of paths.
     #[must_use]
     pub(in crate::integrators) fn with_paths(&self, paths: u32) -> Self {
         let factor = paths as f32 / self.paths as f32;
@@ -89,13 +89,13 @@ impl Guide {
         Guide { lights, group_of, tables, rates, paths }
     }
 
-    /// Nothing was found yet.
+    /// Empty contributions.
     pub(super) fn begin(&self) -> Found {
         let cells = self.tables.len() * EDGE * EDGE;
         Found { of_light: vec![0.0; self.rates.len()], of_direction: vec![0.0; cells] }
     }
 
-    /// Adds what a path found that left `light` in the direction `d`.
+    /// Adds the contribution `value` of a path that left `light` in the direction `d`.
     pub(super) fn add(&self, found: &mut Found, light: LightId, d: Vec3, value: f64) {
         let cell = (equal_area_sphere_to_square(d) * EDGE as f32).clamp(Vec2::ZERO, Vec2::splat((EDGE - 1) as f32));
         let cell = cell.y as usize * EDGE + cell.x as usize;
@@ -103,14 +103,14 @@ impl Guide {
         found.of_direction[usize::from(self.group_of[light as usize]) * EDGE * EDGE + cell] += value;
     }
 
-    /// By what was found; `None` if that is nothing.
+    /// A guide in proportion to the contributions; `None` if all are 0.
     pub(super) fn learned(&self, set: &LightSet, found: &Found) -> Option<Self> {
         let tables = found.of_direction.chunks(EDGE * EDGE).map(table).collect();
         Self::new(set, self.group_of.clone(), tables, self.paths, |light| found.of_light[light as usize])
     }
 
-    /// Density of light paths (1/(m² sr), projected) that leave `light`, whose normal is `n` there, in the direction `d`; 0
-    /// if none do.
+    /// Density of light paths (1/(m² sr), projected) that leave `light` in the direction `d`, at a point with the
+    /// normal `n`. 0 if there are none.
     #[inline]
     pub(in crate::integrators) fn density(&self, light: LightId, n: Vec3, d: Vec3) -> f32 {
         let rate = self.rates[light as usize];
@@ -124,8 +124,8 @@ impl Guide {
         table.pdf(equal_area_sphere_to_square(d)) * pdf_equal_area_square_to_sphere()
     }
 
-    /// A light path by two numbers for the light, two for the point, and two for the direction; `None` if it carries
-    /// nothing.
+    /// Samples a light path by two random numbers each for the light, the point and the direction; `None` if it carries
+    /// no power.
     pub(super) fn emit(&self, set: &LightSet, u_light: [f32; 2], [u_point, u_d]: [[f32; 2]; 2]) -> Option<Emitted> {
         let (light, pmf) = self.lights.sample(u_light);
         let place = self.tables[usize::from(self.group_of[light as usize])].sample(u_d)?;
@@ -149,7 +149,7 @@ fn power(set: &LightSet, light: LightId) -> f32 {
     if let Light::Area(area) = &set.lights[light as usize] { area.phi() } else { 0.0 }
 }
 
-/// Directions by what was found in them and in their neighbours.
+/// A table in proportion to the contributions, smoothed over neighbouring cells.
 fn table(cells: &[f64]) -> PiecewiseConstant2D {
     let edge = EDGE as isize;
     let around = |x: isize, y: isize| {
@@ -169,7 +169,7 @@ fn table(cells: &[f64]) -> PiecewiseConstant2D {
 }
 
 impl Found {
-    /// This and that, each as if it were one path in all.
+    /// The sum of both, each normalised over the lights, and over the directions of each table.
     pub(super) fn mixed(&self, other: &Found) -> Found {
         let mix = |a: &[f64], b: &[f64]| {
             let [all_a, all_b] = [a, b].map(|values| values.iter().sum::<f64>());
@@ -235,7 +235,7 @@ mod tests {
         }
         let guide = all.learned(&set, &found).unwrap().with_paths(500);
         assert!(all.learned(&set, &all.begin()).is_none());
-        // Of each light that was found, by cells of the map of directions
+        // Counts by light and by cell of the direction table
         const CELLS: usize = 32;
         let cell = |d: Vec3| {
             let p = (equal_area_sphere_to_square(d) * CELLS as f32).clamp(Vec2::ZERO, Vec2::splat(31.0));
@@ -249,13 +249,13 @@ mod tests {
             observed[e.light as usize * CELLS * CELLS + cell(e.d)] += 1.0;
             let density = guide.density(e.light, e.n, e.d);
             assert!((density / e.density - 1.0).abs() < 1e-5 && e.n.dot(e.d) > 0.0);
-            // Power is radiance over the density, of which the guide has that of so many paths
+            // Power is radiance over the density. The density of the guide includes its number of paths, 500
             let Light::Area(area) = &set.lights[e.light as usize] else { panic!("it has no area") };
             let radiance = area.emission.radiance(Vec2::ZERO).luminance();
             let is_flat = e.light > 1;
             assert!(!is_flat || (e.power.luminance() * density / (500.0 * radiance) - 1.0).abs() < 1e-3);
         }
-        // By integration of the density over the sphere; of the mesh, which emits in all directions
+        // Integrate the density over the sphere, for the mesh, which emits in all directions
         let fine = 16 * CELLS;
         let mut expected = vec![0.0_f64; observed.len()];
         for i in 0..fine * fine {

@@ -1,4 +1,4 @@
-//! What light paths bring to the pixels, for some of the turns of an image.
+//! Contributions of light paths to the pixels, for some sample steps of an image.
 
 use super::guide::Guide;
 use super::per_sample;
@@ -13,16 +13,16 @@ use std::f32::consts::SQRT_2;
 use std::ops::Range;
 use std::sync::Arc;
 
-/// Combined with the seed of the image to give those of light paths.
+/// Combined with the seed of the image for the seeds of light paths.
 const SEED: u32 = 0x6c_69_67_68;
-/// Light paths that are traced at a time, at most.
+/// Maximum number of light paths traced at a time.
 const MAX_PATHS: u64 = 1 << 21;
 
 /// A contribution to a pixel.
 #[derive(Clone, Copy, Debug)]
 struct Entry {
     x: u32,
-    /// Its bits of [`TURN`].
+    /// Sample step, masked by [`TURN`].
     turn: u32,
     value: Rgb,
 }
@@ -32,11 +32,11 @@ struct Entry {
 pub(in crate::integrators) struct LightImage {
     pub(in crate::integrators) guide: Arc<Guide>,
     bounds: PixelBounds,
-    /// Turns so far.
+    /// Number of sample steps so far.
     served: u32,
-    /// By row, pixel and turn.
+    /// By row, pixel and step.
     entries: Vec<Entry>,
-    /// Where the entries of each row begin, and end.
+    /// Start of the entries of each row, followed by the end of the last row.
     rows: Vec<u32>,
     /// One bit for each pixel that has entries.
     has_entries: Vec<u64>,
@@ -44,7 +44,7 @@ pub(in crate::integrators) struct LightImage {
 }
 
 impl LightImage {
-    /// That of an image whose settings ask for light paths, and where a pilot finds some of use.
+    /// `None` if light paths are disabled, or if the pilot finds no useful ones.
     pub(in crate::integrators) fn new(job: &RenderJob) -> Option<Self> {
         let bounds = job.world.scene.film.bounds;
         let paths = (f64::from(per_sample(job)) * bounds.area() as f64).round();
@@ -58,11 +58,14 @@ impl LightImage {
         Some(LightImage { guide: Arc::new(guide), bounds, served: 0, entries: Vec::new(), rows, has_entries, stats })
     }
 
-    /// Traces the light paths of the turns from `first` on: as many as before, and how many that is.
+    /// Traces the light paths of the sample steps from `first` on. The number of steps equals the number traced so far,
+    /// within limits. Returns it.
     pub(in crate::integrators) fn prepare(&mut self, job: &RenderJob, first: u32) -> u32 {
         let most = (MAX_PATHS / u64::from(self.guide.paths)).clamp(1, 1 << 16) as u32;
         let count = self.served.clamp(1, most);
         self.served += count;
+
+        // Trace one set of light paths per step
         let seed = job.settings().sampling.seed;
         let paths = u64::from(self.guide.paths);
         let of_turn = |turn: u32| (turn, pcg4d([seed, SEED, turn, 0])[0]);
@@ -70,14 +73,18 @@ impl LightImage {
         let parts: Vec<(u32, Range<u64>)> = parts.collect();
         let scene = Scene::new(job, &self.guide);
         let found = trace(&scene, &parts, |turn| of_turn(turn).1, &mut self.stats);
+
+        // Sort the contributions by row, pixel and step
         let factor = 1.0 / paths as f32;
         let mut all: Vec<(u32, Entry)> = Vec::with_capacity(found.iter().map(Vec::len).sum());
         for ((turn, _), seen) in parts.iter().zip(&found) {
             let entry = |s: &Seen| (s.pixel[1], Entry { x: s.pixel[0], turn: *turn & TURN, value: s.value * factor });
             all.extend(seen.iter().map(entry));
         }
-        // Stable: what a pixel has of one turn is added in the order of the light paths
+        // The sort is stable: the contributions of one step to a pixel are added in the order of the light paths
         all.par_sort_by_key(|(y, entry)| (*y, entry.x, entry.turn));
+
+        // Index of pixels and rows
         self.has_entries.fill(0);
         for (y, entry) in &all {
             let place = self.place(entry.x, *y);
@@ -96,7 +103,7 @@ impl LightImage {
         (y - self.bounds.y0) as usize * self.bounds.width() as usize + (x - self.bounds.x0) as usize
     }
 
-    /// Adds to camera samples, given by pixel, turn, and whether they are of a replica, what their pixels have of that turn.
+    /// Adds the contributions of light paths to camera samples, given by pixel, sample step, and true for replicas.
     pub(in crate::integrators) fn add(
         &self,
         samples: impl Iterator<Item = ([u32; 2], u32, bool)>,
@@ -107,11 +114,15 @@ impl LightImage {
             if self.has_entries[place / 64] >> (place % 64) & 1 == 0 {
                 continue;
             }
+
+            // Find the entries of the pixel at this step
             let row = (y - self.bounds.y0) as usize;
             let row = &self.entries[self.rows[row] as usize..self.rows[row + 1] as usize];
             let turn = turn & TURN;
             let begin = row.partition_point(|entry| (entry.x, entry.turn) < (x, turn));
             let own = row[begin..].iter().take_while(|entry| (entry.x, entry.turn) == (x, turn));
+
+            // A replica also gets a signed contribution, from which the variance is estimated
             let light = own.map(|entry| entry.value).sum::<Rgb>();
             out.radiance += light;
             if is_replica {
@@ -121,14 +132,16 @@ impl LightImage {
     }
 }
 
-/// The sign s of a turn in a replica, whose difference from its pixel tells the variance. There is one set of light paths for
-/// both, so the difference is made: Σ e (1 + √2 s)/n and Σ e/n differ by √2 Σ s e/n, of which half the square is the variance of
-/// the latter in the mean, if as many turns have either sign. So two that follow each other have different ones, at random
-/// which. Pixels with samples in few of the turns have random signs, and state too much.
+/// The sign s of a sample step in a replica. The variance of a pixel is estimated from the difference of replica and
+/// pixel, but both use the same light paths. So the difference is made up: Σ e (1 + √2 s)/n and Σ e/n differ by √2 Σ s
+/// e/n. Half its square is the variance of Σ e/n on average, if the signs are balanced. So two consecutive steps have
+/// opposite signs, in random order. Pixels with samples in few of the steps have random signs, and overestimate the
+/// variance.
 fn sign(turn: u32) -> f32 {
     let [of_pair, ..] = pcg4d([turn >> 1, SEED, 1, 0]);
     if (of_pair ^ turn) & 1 == 1 { 1.0 } else { -1.0 }
 }
 
-/// The bits of a turn beside those which count the samples of a pixel in it, see [`crate::scene::PixelSamples::turn`].
+/// Mask of the lower bits of a sample step. The upper bits count the samples of a pixel within the step, see
+/// [`crate::scene::PixelSamples::turn`].
 const TURN: u32 = (1 << 20) - 1;

@@ -1,23 +1,26 @@
-//! Caustics by light paths [Arvo 1986; Veach 1997, §10.2], beside the camera paths.
+//! Caustics by light paths [Arvo 1986; Veach 1997, §10.2], in addition to camera paths. Reading order: `guide` samples
+//! the emission, `trace` traces light paths, `chain` has the MIS weights, `pilot` learns the guide, `image` stores the
+//! contributions.
 //!
-//! Let a path go from the camera to any surface but metal or glass, from there over metal or glass only, and end at an
-//! emitting surface. A camera path must hit that emitter by chance. A light path begins there, goes over the same metal and
-//! glass, and is then seen by the camera wherever that may be. Both find the path, and share it by the balance heuristic.
+//! Consider paths from the camera to any surface other than metal or glass, from there over metal and glass only, to an
+//! emitting surface. A camera path hits the emitter by chance. A light path starts at the emitter, passes the same
+//! metal and glass, and is connected to the camera. The two techniques are combined by the balance heuristic.
 //!
-//! The densities are compared at the ends: what passes through metal and glass keeps its area times projected solid angle
-//! (étendue), so the density of the camera path is that of camera samples at its first vertex, cos θ/w², where a pixel is w
-//! wide, times that of the direction which it goes on by; and the density of the light path is that of its emission. Of rough
-//! metal or glass the densities differ a little more, which the heuristic may leave out. Weights depend on nothing that only
-//! one of both knows: those of a path sum to one, whatever was drawn, and how many light samples there are.
+//! The densities are compared at the ends of the path, since metal and glass preserve étendue (area times projected
+//! solid angle). The density of the camera path is the density of camera samples at its first vertex, cos θ/w² with the
+//! pixel width w, times the density of its next direction. The density of the light path is the density of its
+//! emission. For rough metal or glass the densities differ slightly more, which the heuristic may neglect. The weights
+//! depend only on quantities that both techniques know. So the weights of a path sum to one, for any direction sampled
+//! and any number of light samples.
 //!
-//! Both must meet the same surfaces. Textures and bumps are filtered by a footprint that depends on the point alone
-//! ([`crate::scene::SurfaceInteraction::new`]). Which materials count as metal and glass is a property of the material,
-//! textures and all ([`crate::materials::MaterialSet::find_caustics`]). Where a mixture is drawn anew for each direction, a
-//! light path may both go on as over metal and be seen as on another surface.
+//! Both techniques must meet the same surfaces. Textures and bumps are filtered by a footprint that depends on the
+//! point alone ([`crate::scene::SurfaceInteraction::new`]). The classification as metal or glass is a property of the
+//! material, textures included ([`crate::materials::MaterialSet::find_caustics`]). A mixture is sampled anew for each
+//! direction, so a light path may both continue at it as at metal and be connected to the camera as at another surface.
 //!
-//! Camera paths keep what a smooth coat at the first vertex mirrors, and the light of the last vertex that the settings
-//! allow. The k-th sample of each pixel has the k-th set of light paths, as many as `light_paths` says for each pixel. So
-//! images depend on nothing but scene, settings, seed, and samples.
+//! Camera paths keep the mirror reflection of a smooth coat at the first vertex, and the light of the last vertex that
+//! the settings allow. The k-th sample of each pixel uses the k-th set of light paths, with `light_paths` paths per
+//! pixel. So images depend only on scene, settings, seed, and samples.
 
 mod chain;
 mod guide;
@@ -34,7 +37,7 @@ pub use trace::LightPathStats;
 use super::features::{self, Feature};
 use crate::scene::RenderJob;
 
-/// Light paths per camera sample; 0 where there are none.
+/// Light paths per camera sample; 0 if disabled.
 pub fn per_sample(job: &RenderJob) -> f32 {
     let wanted = job.settings().integrator.light_paths.unwrap_or(0.0);
     if wanted > 0.0 && features::allows(job, Feature::LightPaths) { wanted } else { 0.0 }

@@ -1,4 +1,4 @@
-//! The pilot that finds where light paths of use begin, and what they are worth.
+//! The pilot that learns the emission of useful light paths, and estimates their variance and time.
 
 use super::guide::Guide;
 use super::trace::{LightPathStats, Scene, Walker, parts, trace};
@@ -11,22 +11,22 @@ use std::time::Instant;
 
 /// Seed of pilots.
 const SEED: u32 = 0x6c_70_69_6c;
-/// Limits of the number of rays, of which there is one for each pixel, and rays for each light path of the pilot. They do not
-/// depend on the number of samples: an image that goes on to more samples keeps its light paths.
+/// Limits of the number of pilot rays (one per pixel), and number of rays per light path of the pilot. They do not
+/// depend on the number of samples: an image that is continued with more samples keeps its light paths.
 const RAYS: [u64; 2] = [1 << 14, 1 << 20];
 const RAYS_PER_PATH: u64 = 4;
 /// Rounds of light paths.
 const ROUNDS: u32 = 2;
 
-/// What a pilot of light paths has found.
+/// Results of the pilot.
 #[derive(Debug)]
 pub struct LightPilot {
     pub(super) guide: Guide,
     pub(super) stats: LightPathStats,
-    /// Light paths that were seen in the last round: the square of what one brings without weight, and its density over that
-    /// of a camera sample.
+    /// Light paths of the last round that reach the camera: squared unweighted contribution, and density relative to
+    /// the density of a camera sample.
     seen: Vec<[f64; 2]>,
-    /// Light paths of that round, and their time (ns).
+    /// Number and time (ns) of the light paths of the last round.
     round: (u64, f64),
     /// Time of the pilot (ns).
     nanoseconds: f64,
@@ -34,7 +34,7 @@ pub struct LightPilot {
 }
 
 impl LightPilot {
-    /// The pilot of an image, with a part 1/`divisor` of its paths; `None` if light paths cannot help, or none of use was found.
+    /// Runs the pilot with 1/`divisor` of its paths; `None` if light paths are excluded, or none is useful.
     pub fn new(job: &RenderJob, divisor: u64) -> Option<Self> {
         if !features::allows(job, Feature::LightPaths) {
             return None;
@@ -44,7 +44,7 @@ impl LightPilot {
         let seed = |round: u32| pcg4d([SEED, round, 0, 0])[0];
         let mut stats = LightPathStats::default();
 
-        // Where metal and glass are
+        // Locate metal and glass
         let everywhere = Guide::everywhere(set, rays as u32)?;
         let mut bundling = everywhere.begin();
         let scene = Scene::new(job, &everywhere);
@@ -59,7 +59,7 @@ impl LightPilot {
             stats.time += *time;
         }
 
-        // What is seen of the light that they send on
+        // Light paths over metal and glass that reach the camera
         let mut found = everywhere.begin();
         let mut guide = everywhere.learned(set, &bundling)?;
         let (mut moments, mut of_round) = (Vec::new(), (0, 0.0));
@@ -67,6 +67,8 @@ impl LightPilot {
             let parts: Vec<_> = parts(rays / RAYS_PER_PATH).map(|part| (round, part)).collect();
             let (scene, before) = (Scene::new(job, &guide), stats);
             let seen = trace(&scene, &parts, seed, &mut stats);
+
+            // Learn from their contributions
             moments.clear();
             for seen in seen.iter().flatten() {
                 let value = f64::from(seen.value.luminance().abs());
@@ -82,21 +84,21 @@ impl LightPilot {
         Some(LightPilot { guide, stats, seen: moments, round: of_round, nanoseconds, pixels: bounds.area() as f64 })
     }
 
-    /// Where light paths begin.
+    /// The learned distribution of light paths.
     pub(in crate::integrators) fn guide(&self) -> &Guide {
         &self.guide
     }
 
-    /// The variance of a camera sample, averaged over pixels, that is of light which light paths find as well, of which so many
-    /// are traced for each. 0: none are, and it is all of camera paths.
+    /// Mean over pixels of the variance of a camera sample, for the light that both camera paths and light paths
+    /// sample, with `per_sample` light paths per camera sample. With 0, camera paths carry all of it.
     pub fn variance(&self, per_sample: f64) -> f64 {
         let paths = per_sample * self.pixels;
-        // ∫f²/(p + paths q) by light paths of the density q
+        // ∫f²/(p + paths·q), estimated by light paths of the density q
         let moment = |[square, ratio]: &[f64; 2]| square * ratio / (1.0 + paths * ratio);
         self.seen.iter().map(moment).sum::<f64>() / (self.round.0.max(1) as f64 * self.pixels)
     }
 
-    /// The time (ns) that they add to one of `samples` camera samples.
+    /// Time (ns) of light paths per camera sample, if there are `samples` camera samples.
     pub fn time(&self, per_sample: f64, samples: f64) -> f64 {
         if per_sample > 0.0 {
             per_sample * self.round.1 / self.round.0.max(1) as f64 + self.nanoseconds / samples

@@ -1,4 +1,4 @@
-//! Light paths over metal and glass to what the camera sees, a batch at a time.
+//! Light paths over metal and glass to surfaces visible to the camera, a batch at a time.
 
 use super::chain::{camera_density, light_weight};
 use super::guide::{Emitted, Guide};
@@ -15,32 +15,32 @@ use rayon::prelude::*;
 use std::ops::Range;
 use std::time::{Duration, Instant};
 
-/// Random-number domains of a light path beside those of its beginning: the place on the lens and in the filter, and vertex
-/// k at `VERTEX + k`.
+/// Random-number domains of a light path after its emission: position on the lens and in the filter, and vertex k at
+/// `VERTEX + k`.
 const FILM: u32 = 3;
 const VERTEX: u32 = 16;
 
-/// A light path on its way.
+/// The state of a light path.
 #[derive(Clone, Copy, Debug)]
 struct LightPath {
     ray: Ray,
     power: Rgb,
     stream: SampleStream,
     light: LightId,
-    /// Direction in which it left the light, and the density of that.
+    /// Direction at the light, and density of the emission ([`Guide::density`]).
     d: Vec3,
     density: f32,
 }
 
-/// A light path that the camera sees, unless something lies between.
+/// The connection of a light path to the camera, possibly occluded.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Seen {
     pub(super) pixel: [u32; 2],
-    /// What it adds to a pixel of one camera sample, if all light paths are one.
+    /// Contribution to a pixel with one camera sample, if there were only one light path. Includes the MIS weight.
     pub(super) value: Rgb,
-    /// Its weight, which is a factor of that.
+    /// MIS weight.
     pub(super) weight: f32,
-    /// Where it came from.
+    /// The light, and the direction of the emission.
     pub(super) light: LightId,
     pub(super) d: Vec3,
 }
@@ -59,7 +59,7 @@ pub(super) struct Walker {
     pub(super) traced: u64,
 }
 
-/// What all light paths have in common.
+/// Common data of all light paths.
 pub(super) struct Scene<'a> {
     pub(super) job: &'a RenderJob,
     pub(super) guide: &'a Guide,
@@ -73,14 +73,14 @@ impl<'a> Scene<'a> {
 }
 
 impl Walker {
-    /// Traces some of the light paths of a seed: `self.seen` becomes those that the camera sees.
+    /// Traces some of the light paths of a seed. `self.seen` becomes their unoccluded connections to the camera.
     pub(super) fn trace(&mut self, scene: &Scene<'_>, seed: u32, paths: Range<u64>) {
         let job = scene.job;
         self.seen.clear();
         self.shadows.clear();
         self.active.clear();
         self.active.extend(paths.filter_map(|path| emit(scene, path_stream(seed, path))));
-        // The last scattering event is where the camera sees it, and paths of one more are left to camera paths
+        // The last scattering event is the connection to the camera. Paths with one more event are left to camera paths
         for bundled in 0..job.settings().integrator.depth().saturating_sub(1) {
             self.rays.set(self.active.iter().map(|path| &path.ray));
             job.world.accel.intersect(&self.rays, Coherence::Incoherent, &mut self.hits);
@@ -93,7 +93,7 @@ impl Walker {
                 if bsdf.makes_caustics {
                     self.next.extend(path.scattered(&interaction, &bsdf, VERTEX + bundled));
                 }
-                // Of a mixture, the camera may see another part than the light
+                // A mixture may be metal for the light and another surface for the camera
                 let may_be_seen = !bsdf.makes_caustics || interaction.is_mixture(job);
                 if bundled > 0
                     && may_be_seen
@@ -105,6 +105,8 @@ impl Walker {
             }
             std::mem::swap(&mut self.active, &mut self.next);
         }
+
+        // Keep unoccluded connections
         job.world.accel.occluded(&self.shadows, Coherence::Packets, &mut self.occluded);
         self.traced += self.seen.len() as u64;
         let mut occluded = self.occluded.iter();
@@ -112,17 +114,17 @@ impl Walker {
     }
 }
 
-/// Metal or glass that a ray from a light meets.
+/// Metal or glass hit by a ray from a light.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Bundling {
     pub(super) light: LightId,
     pub(super) d: Vec3,
-    /// What arrives there (W), for one path in all.
+    /// Incident power (W) if there were only one path.
     pub(super) value: Rgb,
 }
 
 impl Walker {
-    /// The first surfaces of light paths that are metal or glass.
+    /// Light paths whose first hit is metal or glass.
     pub(super) fn first_hits(&mut self, scene: &Scene<'_>, seed: u32, paths: Range<u64>) -> Vec<Bundling> {
         let job = scene.job;
         self.active.clear();
@@ -138,7 +140,7 @@ impl Walker {
     }
 }
 
-/// A light path as it leaves its light.
+/// Samples the emission of a light path.
 fn emit(scene: &Scene<'_>, stream: SampleStream) -> Option<LightPath> {
     let [p0, p1, d0, d1] = stream.domain(domain::EMISSION).draw::<4>();
     let choice = stream.domain(domain::LIGHT).draw::<2>();
@@ -150,7 +152,7 @@ fn emit(scene: &Scene<'_>, stream: SampleStream) -> Option<LightPath> {
 }
 
 impl LightPath {
-    /// The path after metal or glass.
+    /// The path after scattering at metal or glass.
     fn scattered(&self, at: &SurfaceInteraction, bsdf: &SurfaceBsdf<'_>, key: u32) -> Option<LightPath> {
         let [uc, u0, u1] = self.stream.domain(key).draw::<3>();
         let s = bsdf.sample(at.wo, uc, [u0, u1])?;
@@ -159,10 +161,12 @@ impl LightPath {
         (!power.is_black() && power.is_finite()).then_some(LightPath { ray, power, ..*self })
     }
 
-    /// The path as the camera sees it at any other surface, and the segment between.
+    /// Connects the path at any other surface to the camera. Returns the contribution and the shadow segment.
     fn connect(&self, scene: &Scene<'_>, at: &SurfaceInteraction) -> Option<(Seen, Ray)> {
         let (job, film) = (scene.job, &scene.job.world.scene.film);
         let camera = &job.world.scene.camera;
+
+        // Project the point onto the film, and choose a pixel
         let [l0, l1, u] = self.stream.domain(FILM).draw::<3>();
         let p = at.surface.p;
         let seen = camera.project(p, [l0, l1], 0.0)?;
@@ -173,7 +177,7 @@ impl LightPath {
             return None;
         }
 
-        // The surface as a camera ray meets it
+        // The surface with the footprint of a camera ray
         let from = camera.ray(seen.film_xy, [l0, l1], 0.0);
         let d = p - seen.o;
         let distance = d.length();
@@ -183,6 +187,8 @@ impl LightPath {
         if bsdf.makes_caustics || !bsdf.bsdf.is_evaluated_exactly() {
             return None;
         }
+
+        // MIS weight
         let (wo, wi) = (at_camera.wo, at.wo);
         let (cos, cos_light) = (bsdf.n.dot(wo).abs(), bsdf.n.dot(wi).abs());
         let of_camera = camera_density((cos, at_camera.width), (bsdf.pdf(wo, wi), cos_light));
@@ -190,6 +196,8 @@ impl LightPath {
         if !(weight > 0.0) {
             return None;
         }
+
+        // Contribution
         let measure = cos * seen.density / (distance * distance * cos_light);
         let value = self.power * bsdf.f_cos(wo, wi) * (measure * weight * of_filter * film.scale);
         if value.is_black() || !value.is_finite() {
@@ -201,9 +209,10 @@ impl LightPath {
     }
 }
 
-/// One of the pixels whose filter has the point of the film, drawn by the magnitude of the filter there, and the filter
-/// over the probability.
+/// Samples one of the pixels whose filters cover the film point, in proportion to the magnitude of the filter. Returns
+/// the pixel, and filter value over probability.
 fn pixel_of(filter: &FilterSampler, film_xy: Vec2, u: f32) -> Option<([u32; 2], f32)> {
+    // All pixels with their filter values
     let reach = filter.radius() + 0.5;
     let pixels = |x: f32, reach: f32| (x - reach).floor().max(0.0) as u32..=(x + reach).max(0.0) as u32;
     let all = || {
@@ -212,6 +221,8 @@ fn pixel_of(filter: &FilterSampler, film_xy: Vec2, u: f32) -> Option<([u32; 2], 
         let value = |[x, y]: [u32; 2]| filter.value(film_xy - Vec2::new(x as f32 + 0.5, y as f32 + 0.5));
         rows.flat_map(of_row).map(move |pixel| (pixel, value(pixel))).filter(|(_, value)| *value != 0.0)
     };
+
+    // Choose by the cumulative sum
     let total: f32 = all().map(|(_, value)| value.abs()).sum();
     let (mut left, mut chosen) = (u * total, None);
     for (pixel, value) in all() {
@@ -229,7 +240,7 @@ fn pixel_of(filter: &FilterSampler, film_xy: Vec2, u: f32) -> Option<([u32; 2], 
 pub struct LightPathStats {
     /// Light paths.
     pub paths: u64,
-    /// Those that a pixel got.
+    /// Light paths that contribute to a pixel.
     pub seen: u64,
     /// Rays and segments traced.
     pub rays: u64,
@@ -237,12 +248,13 @@ pub struct LightPathStats {
     pub time: Duration,
 }
 
-/// Batches of so many light paths.
+/// Divides `paths` light paths into batches.
 pub(super) fn parts(paths: u64) -> impl Iterator<Item = Range<u64>> {
     (0..paths.div_ceil(BATCH)).map(move |i| i * BATCH..((i + 1) * BATCH).min(paths))
 }
 
-/// Traces batches of light paths; what the camera sees of each, in their order.
+/// Traces batches of light paths, given with their rounds. Returns the connections to the camera, in the order of the
+/// batches.
 pub(super) fn trace(
     scene: &Scene<'_>,
     parts: &[(u32, Range<u64>)],
@@ -256,6 +268,8 @@ pub(super) fn trace(
         (walker.seen.clone(), walker.traced, start.elapsed())
     };
     let all: Vec<_> = parts.par_iter().with_max_len(1).map_init(Walker::default, one).collect();
+
+    // Statistics, in the order of the batches
     stats.paths += parts.iter().map(|(_, part)| part.end - part.start).sum::<u64>();
     all.into_iter()
         .map(|(seen, rays, time)| {
@@ -279,6 +293,7 @@ mod tests {
             PixelFilter::Gaussian { rx: 1.5, ry: 1.5, sigma: 0.5 },
             PixelFilter::LanczosSinc { rx: 3.0, ry: 2.0, tau: 3.0 },
         ] {
+            // Sums of the values by pixel
             let sampler = filter.sampler();
             let film = Vec2::new(20.37, 11.81);
             let count = 100_000;
@@ -288,6 +303,8 @@ mod tests {
                 let (pixel, value) = pixel_of(&sampler, film, u).unwrap();
                 *sums.entry(pixel).or_default() += f64::from(value) / f64::from(count);
             }
+
+            // They equal the filter values
             for y in 5..18 {
                 for x in 14..27 {
                     let expected = sampler.value(film - Vec2::new(x as f32 + 0.5, y as f32 + 0.5));

@@ -1,14 +1,14 @@
-//! Boundary bias of density estimation: what an estimate loses at edges, in corners, and beside other objects.
+//! Boundary bias of density estimation: the loss at edges, in corners, and next to other objects.
 //!
-//! An estimate with kernel K of radius r sees the irradiance times p = ∫ K dA, the part of the kernel that lies on the
-//! surface. p is not known, but points of the kernel can be tested: the number of trials up to and including the first
-//! one on the surface has the expectation 1/p. Multiplied by that number, the estimate is correct on average wherever
-//! irradiance and surface are smooth; where the kernel lies entirely on the surface the number is 1, and no noise is
-//! added.
+//! An estimate with kernel K of radius r has the expectation E · p, where E is the irradiance and p = ∫ K dA is the
+//! part of the kernel that lies on the surface. p is unknown, but points of the kernel can be tested. The number of
+//! trials up to and including the first point on the surface has the expectation 1/p. Multiplied by this number, the
+//! estimate is correct on average wherever irradiance and surface are smooth. If the kernel lies entirely on the
+//! surface, the number is 1 and adds no noise.
 //!
-//! A point lies on the surface if the way to it along the surface is unoccluded, and a short ray down from there hits a
-//! surface of nearly the same normal. Points are drawn with the density of the Epanechnikov kernel, whose radii have
-//! the distribution F(s) = 2s² − s⁴, s = d/r.
+//! A point lies on the surface if the path to it along the surface is unoccluded, and a short ray down from there hits
+//! a surface with nearly the same normal. Points have the density of the Epanechnikov kernel. Their distance d has the
+//! distribution F(s) = 2s² − s⁴, s = d/r.
 
 use crate::accel::{Coherence, Hit, RayBatch};
 use crate::photons::Place;
@@ -17,14 +17,15 @@ use lumiris_numbers::math::{Frame, Ray, Vec3};
 use lumiris_numbers::samplers::SampleStream;
 use std::f32::consts::TAU;
 
-/// Maximum number of trials; where less of the surface is left, some bias remains.
+/// Maximum number of trials. If p is below about 1/32, some bias remains.
 const MAX_TRIALS: u32 = 32;
 /// Minimum cosine between the normals of points on the same surface, as in photon maps.
 const MIN_NORMAL_COS: f32 = 0.8;
-/// Height of the way above the surface, in radii: photons farther than a quarter from the tangent plane do not count.
+/// Height of the path above the surface, in radii. Photons farther than a quarter radius from the tangent plane do not
+/// count.
 const HEIGHT: f32 = 0.25;
 
-/// A kernel that is tried.
+/// A kernel to be tested.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Probe {
     pub(super) place: Place,
@@ -35,7 +36,7 @@ pub(super) struct Probe {
 }
 
 impl Probe {
-    /// Foot of a trial on the tangent plane, and its height.
+    /// Base point of a trial on the tangent plane, and its height.
     fn point(&self, trial: u32) -> (Vec3, f32) {
         let [u, v] = self.stream.domain(trial).draw::<2>();
         let s2 = 1.0 - (1.0 - u).sqrt();
@@ -73,7 +74,7 @@ impl Boundary {
 
     /// One trial for each unfinished kernel.
     fn round(&mut self, world: &World, probes: &[Probe], trial: u32, out: &mut [u32]) {
-        // The way there
+        // Along the surface
         self.rays.clear();
         for &i in &self.open {
             let probe = &probes[i as usize];
@@ -149,14 +150,13 @@ Shape "trianglemesh" "point3 P" [ -0.5 -1 0  -0.5 1 0  -0.5 1 1  -0.5 -1 1 ] "in
 
     #[test]
     fn the_mean_number_of_trials_is_the_reciprocal_of_what_lies_on_the_surface() {
-        // Inside, on an edge, in a corner, on an edge where the kernel also reaches the wall no more, and beside the
-        // wall
+        // Inside, on an edge, in a corner, next to the wall, and on an edge next to the wall
         let world = world();
         let inside = numbers(&world, Vec3::new(0.2, 0.0, 0.0), 0.3);
         assert_eq!((inside.mean(), inside.variance()), (1.0, 0.0));
         for (p, reciprocal) in [([1.0, 0.0], 2.0), ([1.0, 1.0], 4.0), ([-0.4999, 0.1], 2.0), ([-0.4999, 1.0], 4.0)] {
             let numbers = numbers(&world, Vec3::new(p[0], p[1], 0.0), 0.3);
-            // 32 trials are 1 − (1 − 1/4)³² = 0.9999 of what 1/4 takes
+            // For p = 1/4, the limit of 32 trials multiplies the mean by 1 − (1 − 1/4)³² = 0.9999
             let near = (numbers.mean() / reciprocal - 1.0).abs() < 1e-3;
             assert!(near || t_test(&numbers, reciprocal).p_value > 1e-4, "{p:?}: {numbers:?}");
         }

@@ -1,9 +1,9 @@
 //! Guiding of the final gather by nearby photons [Jensen 1995].
 //!
 //! Directions are points of the unit square under the cosine-weighted map of the hemisphere. A histogram over a grid of
-//! that square holds the power of the photons that arrive from there; with a fraction s of the rays guided, the density
-//! is p(ω) = cos θ/π·(1 − s + s·h), h being the histogram's density in the square. So cos θ/p ≤ π/(1 − s) whatever the
-//! photons are.
+//! the square holds the power of the photons by direction of incidence. With a fraction s of guided rays, the density
+//! is p(ω) = cos θ/π·(1 − s + s·h), where h is the density of the histogram in the square. So cos θ/p ≤ π/(1 − s) for
+//! any photons.
 
 use lumiris_numbers::math::warp::{invert_cosine_hemisphere, pdf_cosine_hemisphere, sample_cosine_hemisphere};
 use lumiris_numbers::math::{PiecewiseConstant2D, Vec2, Vec3};
@@ -19,7 +19,8 @@ pub struct Guide {
 }
 
 impl Guide {
-    /// From directions to where photons came from, with their power. Without photons the cosine alone.
+    /// A guide by photons, given by the direction of incidence and the power. Without photons, the density is the
+    /// cosine.
     pub fn new(photons: impl IntoIterator<Item = (Vec3, f32)>, fraction: f32) -> Self {
         let mut cells = [0.0; CELLS * CELLS];
         for (wi, power) in photons {
@@ -32,7 +33,7 @@ impl Guide {
         Guide { histogram: is_lit.then(|| PiecewiseConstant2D::new(&cells, CELLS)), fraction }
     }
 
-    /// A direction, with z > 0 but for rounding.
+    /// A direction with z > 0, up to rounding.
     pub fn sample(&self, u_choice: f32, u: [f32; 2]) -> Vec3 {
         let by_photons = self.histogram.as_ref().filter(|_| u_choice < self.fraction).and_then(|h| h.sample(u));
         sample_cosine_hemisphere(by_photons.map_or(u, |s| s.p.to_array()))

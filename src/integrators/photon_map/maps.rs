@@ -1,9 +1,11 @@
-//! The photon maps of an image: which photons are traced, how they are queried, and precomputed irradiance.
+//! The photon maps of an image: number of photons, density estimation, and precomputed irradiance.
 //!
-//! Without `progressive`, estimates use the k nearest photons, and the final gather uses irradiance precomputed at
-//! every fourth photon of the global map, at the nearest of these [Christensen 1999]. A pilot fixes the number of
-//! photon paths of all maps. Progressive: each pass has new photons and smaller radii, so that the mean over the passes
-//! converges in the memory of one map [Knaus and Zwicker 2011].
+//! Without `progressive`, estimates use the k nearest photons. The final gather uses irradiance precomputed at every
+//! fourth photon of the global map, at the nearest of these photons [Christensen 1999]. A pilot determines the number
+//! of photon paths of all maps.
+//!
+//! With `progressive`, each pass has new photons and smaller radii. The mean over the passes converges with the memory
+//! of one map [Knaus and Zwicker 2011].
 
 use super::boundary::{Boundary, Probe};
 use crate::direct::Vertices;
@@ -24,19 +26,19 @@ use rayon::prelude::*;
 use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
 
-/// Irradiance is precomputed at one in this many photons of the global map.
+/// Irradiance is precomputed at every `RECORD_STRIDE`-th photon of the global map.
 const RECORD_STRIDE: usize = 4;
 /// Photons per thread and step when irradiances are computed.
 const CHUNK: usize = 1024;
 /// Number of photons at which radii are measured.
 const PROBES: usize = 512;
-/// Fraction of the visible points where p(x) may be below 1. With 0, one dim corner would set p = 1 everywhere else.
+/// Fraction of the visible points where p(x) may be below 1. With 0, one dark corner would set p = 1 everywhere else.
 const QUANTILE: f32 = 0.1;
-/// Number of trials whose mean precomputed irradiance uses.
+/// Number of boundary tests per photon, averaged for precomputed irradiance.
 const TRIES: u32 = 4;
-/// Seed of these trials.
+/// Seed of these tests.
 const RECORD_SEED: u32 = 0x65_64_67_65;
-/// Seeds of passes, and of the maps that the first radii come from.
+/// Seeds of passes, and of the maps that determine the first radii.
 const PASS_SEED: u32 = 0x70_68_6f_74;
 const RADIUS_SEED: u32 = 0x72_61_64_69;
 
@@ -76,13 +78,13 @@ pub struct PhotonMaps {
 /// Irradiance (W/m²) in three parts.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Answer {
-    /// Precomputed.
+    /// Precomputed irradiance.
     pub(super) known: Rgb,
     /// By photons of the global map, and the radius of the kernel.
     pub(super) global: (Rgb, f32),
     /// By photons of caustics, and the radius of the kernel.
     pub(super) caustic: (Rgb, f32),
-    /// Distance of the photons.
+    /// Radius of the photons used.
     pub(super) reach: f32,
 }
 
@@ -95,8 +97,8 @@ pub struct MapMaker<'a> {
     max_depth: u32,
     seed: u32,
     importance: Option<Importance>,
-    /// Photon paths per map: fixed before any is traced, since a number that depends on what was stored would bias the
-    /// light.
+    /// Photon paths per map. Determined before tracing, since a number that depends on the stored photons would bias
+    /// the estimate.
     paths: u64,
     /// First radii of progressive maps: global, caustic.
     radii: Option<[f32; 2]>,
@@ -105,11 +107,14 @@ pub struct MapMaker<'a> {
 }
 
 impl<'a> MapMaker<'a> {
-    /// Traces importons, if there are to be any, and finds out how many photon paths a map takes, and the first radii
-    /// of progressive maps: as far as the nearest photons reach from `seen`, places and normals where the camera looks.
+    /// Traces importons if enabled, and determines the number of photon paths per map. For progressive maps, also
+    /// determines the first radii: the distance of the nearest photons at `seen`, points and normals visible to the
+    /// camera.
     pub fn new(job: &RenderJob, seen: &[(Vec3, Vec3)], stop: &'a AtomicBool) -> Result<Self, PhotonError> {
         let settings = job.settings().integrator.photons;
         let (max_depth, seed) = (job.settings().integrator.max_depth, job.settings().sampling.seed);
+
+        // Importance
         let low_importance = match settings.storage {
             PhotonStorage::All => None,
             PhotonStorage::Floor(min) => Some(LowImportance::Floor(min)),
@@ -123,12 +128,16 @@ impl<'a> MapMaker<'a> {
                 Some(trace_importons(job, &settings)?)
             }
         };
+
+        // Number of photon paths
         let (radii, stats) = (None, MapStats::default());
         let mut maker = MapMaker { stop, settings, max_depth, seed, importance, paths: 0, radii, stats };
         let start = Instant::now();
         let budget = PhotonBudget::Stored { global: u64::from(settings.photons), max_paths: settings.paths };
         maker.paths = path_count(job, &maker.tracing(seed), maker.importance.as_ref(), budget)?;
         maker.stats.tracing = start.elapsed();
+
+        // First radii of progressive maps
         if let Some(progressive) = settings.progressive {
             maker.radii = Some(match progressive.radius {
                 Some(radius) => [radius; 2],
@@ -146,7 +155,7 @@ impl<'a> MapMaker<'a> {
         Ok(maker)
     }
 
-    /// The importance that decides what is stored.
+    /// The importance that decides which photons are stored.
     pub fn importance(&self) -> Option<&Importance> {
         self.importance.as_ref()
     }
@@ -155,8 +164,8 @@ impl<'a> MapMaker<'a> {
         let s = &self.settings;
         Tracing {
             seed,
-            // A photon that was scattered n times is light of n + 1 bounces where it lies, and of n + 2 where a gather
-            // sees it
+            // After n scattering events, a photon is light of n + 1 bounces at its position, and of n + 2 bounces by a
+            // final gather
             max_depth: self.max_depth.saturating_sub(1),
             max_global_depth: self.max_depth.saturating_sub(1 + u32::from(s.gather > 0)),
             q: s.caustic_ratio,
@@ -198,7 +207,7 @@ impl<'a> MapMaker<'a> {
             return PhotonMaps { global, caustic, records: None, search, caustic_search, nearest };
         }
         let max = job.lights.scene_radius;
-        // Where caustics end, the nearest photons are far away and not of that place
+        // At the border of a caustic, the nearest photons are far away and unrelated
         let reach = median_reach(&caustic, &places_of(&caustic), nearest, max).unwrap_or(0.01 * max);
         let search = Search::Nearest { count: nearest, max_radius: max };
         let caustic_search = Search::Nearest { count: nearest, max_radius: 2.0 * reach };
@@ -226,15 +235,15 @@ impl PhotonMaps {
         &self.caustic
     }
 
-    /// Irradiance by all photons.
+    /// Irradiance of all photons.
     pub(super) fn irradiance(&self, at: &Place, scratch: &mut GatherScratch) -> Answer {
         if let Some(records) = &self.records {
-            // The nearest one: of two, the farther lies on the rim of the kernel and does not count
+            // The nearest record: the second one lies on the rim of the kernel and has no weight
             let max = Search::Nearest { count: 2, max_radius: self.max_radius() };
             let mut e = None;
             let spacing = records.gather(at, max, scratch, |record, _| e = Some(record.power()));
             if let Some(known) = e {
-                // k photons lie in the disk that holds k/4 records
+                // The disk with k/4 records holds k photons
                 let reach = spacing * (self.nearest as f32 / (2 * RECORD_STRIDE) as f32).sqrt();
                 return Answer { known, reach, ..Answer::default() };
             }
@@ -250,14 +259,14 @@ impl PhotonMaps {
         }
     }
 
-    /// Irradiance from the photons themselves.
+    /// Irradiance by density estimation from both maps.
     fn estimate(&self, at: &Place, scratch: &mut GatherScratch) -> [(Rgb, f32); 2] {
         let mut e = Rgb::BLACK;
         let radius = self.global.gather(at, self.search, scratch, |photon, weight| e += photon.power() * weight);
         [(e, radius), self.caustics(at, scratch)]
     }
 
-    /// Irradiance by the photons of caustics, and the radius of the kernel.
+    /// Irradiance of the caustic map, and the radius of the kernel.
     pub(super) fn caustics(&self, at: &Place, scratch: &mut GatherScratch) -> (Rgb, f32) {
         let mut e = Rgb::BLACK;
         let radius =
@@ -265,7 +274,7 @@ impl PhotonMaps {
         (e, radius)
     }
 
-    /// Irradiance by photons of the global map that were scattered, and the radius of the kernel.
+    /// Irradiance of scattered photons of the global map, and the radius of the kernel.
     pub(super) fn indirect(&self, at: &Place, scratch: &mut GatherScratch) -> (Rgb, f32) {
         let mut e = Rgb::BLACK;
         let radius = self.global.gather(at, self.search, scratch, |photon, weight| {
@@ -280,6 +289,7 @@ impl PhotonMaps {
     fn irradiances(&self, world: &World) -> Vec<Photon> {
         let chosen: Vec<&Photon> = self.global.photons().iter().step_by(RECORD_STRIDE).collect();
         let of_chunk = |(c, chunk): (usize, &[&Photon])| {
+            // Density estimates, with several boundary tests each
             let (mut scratch, mut boundary) = (GatherScratch::default(), Boundary::default());
             let (mut probes, mut parts) = (Vec::new(), Vec::new());
             for (i, photon) in chunk.iter().enumerate() {
@@ -294,6 +304,8 @@ impl PhotonMaps {
                     probes.extend((0..TRIES).map(|k| Probe { place, radius, time: 0.0, stream: stream.domain(k) }));
                 }
             }
+
+            // Correct the estimates by the mean number of trials
             let mut trials = Vec::new();
             boundary.trials(world, &probes, &mut trials);
             let mut irradiances = vec![Rgb::BLACK; chunk.len()];
@@ -308,12 +320,14 @@ impl PhotonMaps {
     }
 }
 
-/// Diffuse points that the camera sees, spread over the image, with their normals.
+/// Diffuse points visible to the camera, spread over the image, with their normals.
 pub fn seen(job: &RenderJob, cameras: Cameras<'_>) -> Vec<(Vec3, Vec3)> {
     let b = job.world.scene.film.bounds;
     let stride = (b.area() / PROBES).max(1);
     let pixels = (0..b.area() as u32).step_by(stride).map(|i| [b.x0 + i % b.width(), b.y0 + i / b.width()]);
     let samples: Vec<CameraSample> = pixels.map(|pixel| cameras(pixel, 0)).collect();
+
+    // Trace to the first vertices
     let (mut search, mut results) = (VertexSearch::default(), Vec::new());
     search.start(job, &samples, &mut results);
     let (left, mut vertices) = (Vertices::default(), Vertices::default());
@@ -327,19 +341,21 @@ pub fn seen(job: &RenderJob, cameras: Cameras<'_>) -> Vec<(Vec3, Vec3)> {
         out: &mut results,
         vertices: &mut vertices,
     });
+
+    // Keep Lambertian surfaces, with the normal on the side of the camera
     let found = BatchVertices { vertex: 0, paths: &search.active, vertices: &vertices };
     let points = found.each().map(|v| v.point).filter(|v| v.bsdf.lambertian(v.wo).is_some());
     points.map(|v| (v.p, if v.bsdf.n.dot(v.wo) < 0.0 { -v.bsdf.n } else { v.bsdf.n })).collect()
 }
 
-/// Some places where photons of a map lie.
+/// Position and normal of some photons of a map.
 fn places_of(map: &PhotonMap) -> Vec<(Vec3, Vec3)> {
     let stride = (map.len() / PROBES).max(1);
     map.photons().iter().step_by(stride).map(|photon| (photon.p(), photon.n())).collect()
 }
 
-/// The median over some places of the radius that holds `nearest` photons; `None` where fewer than half have so many
-/// within `max`.
+/// Median over `places` of the radius that holds `nearest` photons. `None` if, at half of the places or more, `max`
+/// holds fewer.
 fn median_reach(map: &PhotonMap, places: &[(Vec3, Vec3)], nearest: u32, max: f32) -> Option<f32> {
     let mut scratch = GatherScratch::default();
     let search = Search::Nearest { count: nearest, max_radius: max };

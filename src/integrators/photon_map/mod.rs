@@ -1,19 +1,19 @@
 //! Photon mapping [Jensen 1996] with the extensions of [Keller and Wald 2000].
 //!
-//! Direct light is estimated at every vertex, by any estimator; specular and glossy lobes are followed by paths
-//! (`diffuse.rs`). The remaining light reflected by Lambertian parts comes from photons: from the caustic map, if the
-//! last scattering of the light was by another lobe, and otherwise by a final gather, whose rays look up in the maps
-//! what Lambertian surfaces reflect where they arrive. So each light path counts once: its last scattering before the
-//! vertex was either by a Lambertian lobe, which the gather covers, or not, which the caustic map covers.
+//! Direct light is estimated at every vertex by any estimator. Specular and glossy lobes are followed by paths
+//! (`diffuse.rs`). The remaining light at Lambertian lobes comes from photons: from the caustic map, if the light was
+//! last scattered by another lobe, otherwise from a final gather, whose rays look up the maps at Lambertian surfaces.
+//! Each light path counts once, since its last scattering before the vertex was either Lambertian (final gather) or not
+//! (caustic map).
 //!
-//! Where a gather ray is shorter than the search radius of the photons at its end, the density estimate there says
-//! little about the corner between the two surfaces: the ray continues as a path, with direct light and another ray.
+//! If a gather ray is shorter than the search radius at its end, density estimation is inaccurate near the corner
+//! between the two surfaces. The ray then continues as a path, with direct light and another ray.
 //!
-//! Biased by density estimation, and because the base below a coat is treated as Lambertian; with `progressive`,
-//! density estimation is consistent. Bounces are counted from the vertex that looks up the maps, whatever mirrors
-//! precede it.
+//! Biased by density estimation, and because the base below a coat is treated as Lambertian. With `progressive`,
+//! density estimation is consistent. Bounces are counted from the vertex that looks up the maps, not counting mirrors
+//! before.
 //!
-//! Reading order: [`maps`], `boundary`, [`mod@guide`]; this file renders.
+//! Reading order: [`maps`], `boundary`, [`mod@guide`]; this file has the integrator.
 
 mod boundary;
 pub mod guide;
@@ -45,19 +45,19 @@ const GATHER: u32 = 4;
 /// Random-number domains of the kernel trials there, one per side.
 const CAUSTIC: u32 = 5;
 const GLOBAL: u32 = 7;
-/// Photons that guide the directions of a gather.
+/// Number of photons that guide the directions of a gather.
 const GUIDES: u32 = 32;
 
 /// Renders with photon maps.
 pub struct PhotonMapIntegrator<'a> {
     job: &'a RenderJob,
     maker: MapMaker<'a>,
-    /// Of the samples under way.
+    /// Maps of the current samples.
     maps: Option<PhotonMaps>,
 }
 
 impl<'a> PhotonMapIntegrator<'a> {
-    /// Prepares what all maps have in common.
+    /// Prepares the data common to all maps.
     pub fn new(job: &'a RenderJob, cameras: Cameras<'_>, stop: &'a AtomicBool) -> Result<Self, PhotonError> {
         let maker = MapMaker::new(job, &maps::seen(job, cameras), stop)?;
         Ok(PhotonMapIntegrator { job, maker, maps: None })
@@ -65,7 +65,7 @@ impl<'a> PhotonMapIntegrator<'a> {
 }
 
 impl Integrator for PhotonMapIntegrator<'_> {
-    /// Progressive maps serve one sample of each pixel. One map of all samples is the same, whichever is the first.
+    /// Progressive maps serve one sample per pixel. A map for all samples does not depend on `first`.
     fn prepare(&mut self, first: u32) -> Result<u32, PhotonError> {
         self.maps = None;
         match self.maker.make(self.job, if self.shares_noise() { first } else { 0 }) {
@@ -88,7 +88,7 @@ impl Integrator for PhotonMapIntegrator<'_> {
         })
     }
 
-    /// Samples of progressive maps vary with their maps.
+    /// True for progressive maps: all pixels of a pass share a map.
     fn shares_noise(&self) -> bool {
         self.job.settings().integrator.photons.progressive.is_some()
     }
@@ -104,12 +104,12 @@ struct PhotonMapTracer<'m> {
     paths: PathTracer,
     gather: PathTracer,
     lookups: Lookups,
-    /// Rays of gathers, and what they see.
+    /// Gather rays, and their radiance.
     samples: Vec<CameraSample>,
     results: Vec<PixelSample>,
 }
 
-/// What is looked up in the maps, and what remains to be done about it.
+/// Lookups in the maps, with pending corrections and gather requests.
 #[derive(Debug, Default)]
 struct Lookups {
     scratch: GatherScratch,
@@ -120,10 +120,10 @@ struct Lookups {
     trials: Vec<u32>,
 }
 
-/// Radiance whose kernel has yet to be corrected for boundary bias.
+/// Radiance that awaits the correction of boundary bias.
 #[derive(Clone, Copy, Debug)]
 struct Pending {
-    /// Index of the camera sample, or of the ray of a gather.
+    /// Index of the camera sample, or of the gather ray.
     owner: u32,
     radiance: Rgb,
     probe: Probe,
@@ -136,13 +136,13 @@ struct GatherRequest {
     sample: u32,
     /// Weight of radiance sampled with the cosine density: throughput times albedo.
     beta: Rgb,
-    /// The vertex of its path, from 0.
+    /// Index of the vertex along its path, from 0.
     vertex: u32,
     place: Place,
     p_error: Vec3,
     time: f32,
     stream: SampleStream,
-    /// Width of a pixel, and its growth.
+    /// Pixel width, and its growth per unit length.
     width: f32,
     spread: f32,
 }
@@ -178,7 +178,7 @@ impl Tracer for PhotonMapTracer<'_> {
     fn take_stats(&mut self) -> PathStats {
         let mut stats = self.paths.take_stats();
         let mut gather = self.gather.take_stats();
-        // Rays of the gather are no camera rays
+        // Gather rays are not camera rays
         gather.bounce_rays += std::mem::take(&mut gather.camera_rays);
         gather.bounce_time += std::mem::take(&mut gather.camera_time);
         stats.merge(&gather);
@@ -222,7 +222,7 @@ impl PhotonMapTracer<'_> {
         }
     }
 
-    /// Traces the rays of all gathers and adds what they see.
+    /// Traces the rays of all gathers, and looks up the maps at their hits.
     fn finish_gather(&mut self, job: &RenderJob, settings: &IntegratorSettings) {
         let (maps, lookups) = (self.maps, &mut self.lookups);
         (self.gather.search.only_reflected, self.gather.estimator_of) = (true, Some(1));
@@ -236,7 +236,8 @@ impl PhotonMapTracer<'_> {
 }
 
 impl Lookups {
-    /// Takes caustics from the map, and the rest as well or requests a gather.
+    /// Looks up caustics. The remaining light is requested by a final gather, or looked up as well if gathering is
+    /// disabled.
     fn look_up(
         &mut self,
         maps: &PhotonMaps,
@@ -245,6 +246,7 @@ impl Lookups {
         v: &PathVertex<'_, '_>,
         part: &Lambertian<'_>,
     ) {
+        // Both sides, with a final gather for each
         let path = v.path;
         for (i, side) in (0..).zip(sides(&v.point, part)) {
             let (albedo, place) = side;
@@ -267,8 +269,8 @@ impl Lookups {
         }
     }
 
-    /// Looks up the maps where the rays of gathers arrive. A ray that is shorter than their search radius goes on as a
-    /// path that the Lambertian part scatters.
+    /// Looks up the maps at the hits of gather rays. A ray shorter than the search radius continues as a path scattered
+    /// by the Lambertian lobe.
     fn arrive<'w>(
         &mut self,
         maps: &PhotonMaps,
@@ -278,6 +280,7 @@ impl Lookups {
     ) -> Vec<Shading<'w>> {
         let rays_per_request = settings.photons.gather.max(1);
         let shading = |v: PathVertex<'_, 'w>| {
+            // Lookup at the hit
             let (path, point) = (v.path, &v.point);
             let Some(part) = point.bsdf.lambertian(point.wo) else { return Shading::default() };
             let first = self.pending.len();
@@ -287,6 +290,8 @@ impl Lookups {
                 out[path.sample as usize].radiance += path.beta * radiance;
                 return Shading::default();
             }
+
+            // Too near: caustics, direct light and another segment instead
             self.pending.truncate(first);
             for (i, side) in (0..).zip(sides(point, &part)) {
                 wait((&v, CAUSTIC + i), side, maps.caustics(&side.1, &mut self.scratch), &mut self.pending);
@@ -298,7 +303,7 @@ impl Lookups {
         found.each().map(shading).collect()
     }
 
-    /// Adds the pending radiance, times the numbers of trials of its kernels.
+    /// Adds the pending radiance, multiplied by the numbers of trials.
     fn correct(&mut self, job: &RenderJob, out: &mut [PixelSample]) {
         self.probes.clear();
         self.probes.extend(self.pending.iter().map(|p| p.probe));
@@ -310,7 +315,7 @@ impl Lookups {
     }
 }
 
-/// The sides of a vertex that reflect to the viewer, with their albedos.
+/// The sides of a vertex that scatter light to the viewer, with their albedos.
 fn sides(v: &ShadingPoint<'_>, part: &Lambertian<'_>) -> impl Iterator<Item = (Rgb, Place)> {
     let (n, ns, p) = (v.bsdf.n, v.viewer_normal(), v.p);
     let n = if n.dot(v.wo) < 0.0 { -n } else { n };
@@ -318,7 +323,8 @@ fn sides(v: &ShadingPoint<'_>, part: &Lambertian<'_>) -> impl Iterator<Item = (R
     both.into_iter().filter(|(albedo, _)| !albedo.is_black())
 }
 
-/// Adds light reflected by the side of a vertex to the pending radiance: irradiance `e`, by a kernel of `radius`.
+/// Adds the light scattered by one side of a vertex to the pending radiance. `e` is its irradiance, by a kernel of
+/// radius `radius`.
 fn wait(
     (v, key): (&PathVertex<'_, '_>, u32),
     (albedo, place): (Rgb, Place),
@@ -332,8 +338,8 @@ fn wait(
     }
 }
 
-/// Radiance that the Lambertian part of a vertex reflects by all photons, as far as it needs no correction, and the
-/// distance of these photons; what needs correction is left pending.
+/// Reflected radiance of all photons at the Lambertian lobe that needs no boundary correction, and the distance of the
+/// photons. Radiance that needs the correction is added to `pending`.
 fn reflected(
     maps: &PhotonMaps,
     v: &PathVertex<'_, '_>,
@@ -351,7 +357,7 @@ fn reflected(
     (radiance, reach)
 }
 
-/// The Lambertian part as a BSDF.
+/// The Lambertian lobe as a BSDF.
 fn only_lambertian<'a>(bsdf: &SurfaceBsdf<'a>, part: &Lambertian<'_>) -> SurfaceBsdf<'a> {
     let (reflectance, transmittance) = (part.reflectance, part.transmittance);
     let lambertian = if transmittance.is_black() {
@@ -362,7 +368,7 @@ fn only_lambertian<'a>(bsdf: &SurfaceBsdf<'a>, part: &Lambertian<'_>) -> Surface
     SurfaceBsdf { bsdf: lambertian, ..*bsdf }
 }
 
-/// Guide from the photons around a vertex.
+/// A guide from the photons around a vertex.
 fn guide(maps: &PhotonMaps, place: &Place, frame: &Frame, fraction: f32, scratch: &mut GatherScratch) -> Guide {
     let mut photons = Vec::new();
     if fraction > 0.0 {

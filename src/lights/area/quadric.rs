@@ -95,6 +95,7 @@ impl QuadricLight {
     fn sample_local(&self, u: [f32; 2]) -> (Vec3, Vec3) {
         match self.quadric.kind {
             QuadricKind::Sphere { radius, z_min, z_max, phi_max } => {
+                // Uniform in z (Archimedes)
                 let n = direction((z_max + (z_min - z_max) * u[0]) / radius, phi_max * u[1]);
                 (n * radius, n)
             }

@@ -1,8 +1,8 @@
-//! Stores the sums of a rendering from time to time.
+//! Stores the sums of a rendering at intervals.
 //!
-//! All threads encode and write while the rendering pauses; another thread then waits until the disk has it all, and
-//! renames the file. So there is always one whole checkpoint after the first, and what writing costs the rendering is
-//! known: if that is more than a hundredth of the time between two, checkpoints become rarer.
+//! The rendering pauses while all threads encode and write. Another thread then waits for the disk and renames the
+//! file. From the first checkpoint on there is always a complete one. If writing takes more than 1 % of the interval,
+//! checkpoints become less frequent.
 
 use super::file::write_tiles;
 use super::header::FilmHeader;
@@ -13,12 +13,12 @@ use std::path::PathBuf;
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-/// Time between two checkpoints, at least, by the time that writing one takes.
+/// Minimum interval between checkpoints, as a multiple of the time that writing one takes.
 const REST: u32 = 100;
 
-/// Time that a rendering has at least for its first tile.
+/// Minimum interval before the first tile is done.
 const SHORTEST: Duration = Duration::from_millis(50);
-/// More than this is as good as never (ten years), and what is added to the time of day must not overflow it.
+/// Maximum interval (ten years): adding the interval to an `Instant` must not overflow.
 const LONGEST: Duration = Duration::from_secs(315_360_000);
 
 /// Stores checkpoints of one rendering.
@@ -28,17 +28,17 @@ pub struct Checkpoints {
     header: FilmHeader,
     warn: Box<dyn Fn(&str) + Send + Sync>,
     due: Instant,
-    /// The checkpoint that is on its way to the disk.
+    /// The checkpoint that is being written to the disk.
     under_way: Option<JoinHandle<io::Result<()>>>,
-    /// Time for which the rendering waited.
+    /// Time that the rendering spent waiting for checkpoints.
     pub waited: Duration,
-    /// Checkpoints that are on the disk.
+    /// Number of checkpoints on the disk.
     pub stored: u32,
     has_warned: bool,
 }
 
 impl Checkpoints {
-    /// Checkpoints at a path, every `interval` from now on. Why one could not be written is told to `warn`, once.
+    /// Writes checkpoints to a path, every `interval` from now on. `warn` receives the first error.
     pub fn new(
         path: PathBuf,
         interval: Duration,
@@ -53,6 +53,7 @@ impl Checkpoints {
             header,
             warn: Box::new(warn),
             due,
+            // Nothing is written yet
             under_way: None,
             waited: Duration::ZERO,
             stored: 0,
@@ -60,12 +61,12 @@ impl Checkpoints {
         }
     }
 
-    /// When the next one is due.
+    /// Time of the next checkpoint.
     pub(in crate::render) fn due(&self) -> Instant {
         self.due
     }
 
-    /// Stores the sums so far, unless the disk is still busy with the ones before, or there are none yet.
+    /// Stores the sums so far. Does nothing if there are none yet or the previous checkpoint is still being written.
     pub(in crate::render) fn store(&mut self, tiles: &Tiles) {
         let start = Instant::now();
         if tiles.cells.is_empty() && tiles.tiles.iter().all(|t| t.done <= self.header.samples.start) {
@@ -82,7 +83,7 @@ impl Checkpoints {
         self.due = Instant::now() + self.interval.max(waited * REST);
     }
 
-    /// Stores the sums in the end, and waits for the disk.
+    /// Stores the sums at the end of the rendering, and waits for the disk.
     pub(in crate::render) fn finish(&mut self, tiles: &Tiles) {
         self.await_disk();
         self.write(tiles);
@@ -103,7 +104,7 @@ impl Checkpoints {
         }
     }
 
-    /// Waits until the checkpoint that is under way is on the disk.
+    /// Waits until the checkpoint in progress is on the disk.
     fn await_disk(&mut self) {
         if let Some(thread) = self.under_way.take() {
             let written = thread.join().unwrap_or_else(|_| Err(io::Error::other("its thread ended early")));

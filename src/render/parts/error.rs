@@ -1,9 +1,9 @@
-//! What can be wrong with the files of parts.
+//! Errors of part files and checkpoints.
 
 use std::io;
 use std::path::{Path, PathBuf};
 
-/// Why parts cannot be read, merged or continued.
+/// Reason why parts cannot be read, merged or resumed.
 #[derive(Debug, thiserror::Error)]
 pub enum PartError {
     /// A file cannot be read or written.
@@ -11,29 +11,29 @@ pub enum PartError {
     Io {
         /// The file.
         path: PathBuf,
-        /// Why. No source of the error, whose text has it already.
+        /// The cause. Not declared as the source of the error, because the text includes it.
         cause: io::Error,
     },
-    /// A file is something else, or of another version.
+    /// A file has another format or version.
     #[error("{}: {reason}", path.display())]
     Foreign {
         /// The file.
         path: PathBuf,
-        /// What it is.
+        /// The actual content.
         reason: String,
     },
-    /// A file is cut off, or was changed.
+    /// A file is truncated or was modified.
     #[error("{} is damaged: {reason}", path.display())]
     Damaged {
         /// The file.
         path: PathBuf,
-        /// What is wrong.
+        /// The defect.
         reason: String,
     },
-    /// The stored sums do not fit the scene and settings.
+    /// The stored sums do not match the scene and settings.
     #[error("the stored sums belong to other settings: {0}")]
     Sums(&'static str),
-    /// Parts do not belong together, or not all are there.
+    /// Parts do not belong together, or some are missing.
     #[error("{0}")]
     Parts(String),
 }

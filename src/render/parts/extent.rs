@@ -1,24 +1,24 @@
-//! Which samples of which pixels are asked for.
+//! Selection of samples and pixels: the extent of a part.
 
 use super::stored::Stored;
 use crate::integrators::features::{Feature, between};
 use crate::render::{RenderSettings, TileShare, depends_on_earlier_samples};
 use crate::settings::{Allocation, EstimatorKind, IntegratorKind, Settings};
 
-/// A part of an image; the whole of it by default.
+/// A part of an image; by default the whole image.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Extent {
     /// The I-th of N parts, from 1.
     pub part: Option<[u32; 2]>,
-    /// True if a part is a share of the pixels, false if it is one of the samples of all pixels.
+    /// True if parts divide the pixels, false if they divide the samples of all pixels.
     pub is_by_tiles: bool,
     /// Index of the first sample of each pixel.
     pub samples_from: Option<u32>,
-    /// Index after the last one.
+    /// Index after the last sample.
     pub samples_to: Option<u32>,
 }
 
-/// Why an image cannot be divided so, in the words of the command line.
+/// Reason why an image cannot be divided this way, in terms of command-line options.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{0}")]
 pub struct ExtentError(String);
@@ -29,7 +29,7 @@ impl From<&str> for ExtentError {
     }
 }
 
-/// True if pixels share paths by these settings, or `auto` may choose that.
+/// True if pixels share paths with these settings, or if `auto` may decide so.
 fn may_share_paths(settings: &Settings) -> bool {
     let Settings { integrator, sampling, .. } = settings;
     let is_open = integrator.estimator == EstimatorKind::Auto && sampling.allocation == Allocation::Auto;
@@ -38,7 +38,7 @@ fn may_share_paths(settings: &Settings) -> bool {
 }
 
 impl Extent {
-    /// True if it is not the whole image.
+    /// True if this is not the whole image.
     pub fn is_partial(&self) -> bool {
         self.part.is_some() || self.has_range()
     }
@@ -47,7 +47,7 @@ impl Extent {
         self.samples_from.is_some() || self.samples_to.is_some()
     }
 
-    /// Rejects what contradicts itself, or a limit of the time.
+    /// Rejects contradictions, and a time limit for a part.
     pub fn check(&self, is_limited: bool) -> Result<(), ExtentError> {
         if self.part.is_some_and(|[i, n]| i < 1 || i > n) {
             return Err("--part: expected I/N with 1 <= I <= N, such as 3/8".into());
@@ -62,12 +62,12 @@ impl Extent {
         Ok(())
     }
 
-    /// Rejects settings by which an image cannot be divided, if it is to be.
+    /// Rejects settings that prevent a division, if the extent is a part.
     pub fn check_settings(&self, settings: &Settings) -> Result<(), ExtentError> {
         if self.is_partial() { self.check_division(settings) } else { Ok(()) }
     }
 
-    /// Rejects settings by which an image cannot be divided.
+    /// Rejects settings that prevent the division of an image.
     pub fn check_division(&self, settings: &Settings) -> Result<(), ExtentError> {
         if settings.sampling.noise.is_some() {
             return Err("parts of an image cannot be limited by --noise: give a number of samples, --spp".into());
@@ -81,14 +81,15 @@ impl Extent {
         conflict.map_or(Ok(()), |conflict| Err(ExtentError(conflict.to_string())))
     }
 
-    /// Sets what is rendered: this part of an image with the samples that are set, or what is stored. `more` is the number of
-    /// samples that an image goes on to.
+    /// Applies the extent, and stored sums if there are any, to the settings. `more` is the new number of samples of an
+    /// image that is resumed.
     pub fn apply(
         &self,
         settings: &mut RenderSettings,
         stored: Option<&Stored>,
         more: Option<u32>,
     ) -> Result<(), ExtentError> {
+        // Range of samples, or part I of N
         let spp = settings.spp;
         (settings.skip, settings.spp) = (self.samples_from.unwrap_or(0), self.samples_to.unwrap_or(spp));
         if let Some([i, n]) = self.part {
@@ -105,6 +106,8 @@ impl Extent {
                 }
             }
         }
+
+        // Stored sums, and a check of the result
         if let Some(stored) = stored {
             self.go_on(settings, stored, more)?;
         }
@@ -114,7 +117,7 @@ impl Extent {
         Ok(())
     }
 
-    /// The same from what is stored.
+    /// Applies stored sums, which have to be of the same part.
     fn go_on(&self, settings: &mut RenderSettings, stored: &Stored, more: Option<u32>) -> Result<(), ExtentError> {
         let header = &stored.header;
         let before = (header.samples.start, header.samples.end, header.share);
@@ -122,7 +125,7 @@ impl Extent {
             return Err(ExtentError(format!("{} is of another part of the image", stored.path.display())));
         }
         (settings.skip, settings.spp, settings.share) = before;
-        // The samples of a part follow from those of the whole image, which --spp names
+        // The sample range of a part follows from `--spp` of the whole image, so only whole images can be extended
         if let Some(more) = more.filter(|n| !self.is_partial() && *n != header.samples.end) {
             let done = stored.tiles.iter().map(|t| t.done).chain(stored.cells.end()).max().unwrap_or(0);
             if header.samples.start > 0 || more < done {

@@ -1,6 +1,8 @@
-//! Files of sums: eight bytes and a version, then chunks. A chunk is a letter, the number of its bytes, these bytes, and
-//! the CRC-32 of all that. `H` is the header as text, `T` holds tiles, `C` says how far cells are where pixels share paths, and
-//! `E`, which is last, says how many chunks of tiles there are. All numbers are little-endian.
+//! Files of film sums.
+//!
+//! A file has eight magic bytes and a version, then chunks. A chunk is a letter, its number of bytes, these bytes, and
+//! the CRC-32 of all of that. `H` is the header as text, `T` holds tiles, `C` the progress of cells where pixels share
+//! paths. `E` is last and holds the number of tile chunks. All numbers are little-endian.
 
 use super::error::PartError;
 use super::header::FilmHeader;
@@ -15,21 +17,21 @@ use std::fs::File;
 use std::io::{self, BufReader, Read, Write};
 use std::path::{Path, PathBuf};
 
-/// What files begin with.
+/// Magic bytes.
 const MAGIC: &[u8; 8] = b"LUMIFILM";
 /// Version of the format.
 const VERSION: u32 = 4;
-/// Letters of chunks.
+/// Letters of the chunks.
 const HEADER: u8 = b'H';
 const TILES: u8 = b'T';
 const CELLS: u8 = b'C';
 const END: u8 = b'E';
-/// Pixels of a chunk of tiles, about.
+/// Approximate number of pixels in a chunk of tiles.
 const CHUNK_PIXELS: usize = 1 << 14;
-/// Chunks that are made at the same time, which limits the memory that they take.
+/// Chunks that are encoded at the same time, which limits the memory.
 const CHUNKS_AT_ONCE: usize = 16;
 
-/// Writes a file of sums under a name beside `path`, which is then renamed: `path` is never half of a file.
+/// Writes a file of sums. It has a temporary name until it is complete, so that `path` is never a partial file.
 pub fn write_film(path: &Path, header: &FilmHeader, tiles: &Tiles) -> Result<(), PartError> {
     let written = Partial::write(path, |file| write_tiles(file, header, tiles)).and_then(Partial::end);
     written.map_err(|error| PartError::io(path, error))
@@ -38,6 +40,7 @@ pub fn write_film(path: &Path, header: &FilmHeader, tiles: &Tiles) -> Result<(),
 /// Writes a file of sums.
 pub(super) fn write_tiles(file: &mut File, header: &FilmHeader, tiles: &Tiles) -> io::Result<()> {
     let Tiles { tiles, cells } = tiles;
+    // Header
     file.write_all(MAGIC)?;
     file.write_all(&VERSION.to_le_bytes())?;
     write_chunk(file, HEADER, header.text().as_bytes())?;
@@ -48,6 +51,8 @@ pub(super) fn write_tiles(file: &mut File, header: &FilmHeader, tiles: &Tiles) -
         let encoded: Vec<Vec<u8>> = chunks.par_iter().map(|tiles| chunk_of(tiles)).collect();
         encoded.iter().try_for_each(|bytes| write_chunk(file, TILES, bytes))?;
     }
+
+    // Progress of cells, and the end
     if !cells.is_empty() {
         let mut encoder = Encoder::default();
         cells.write(&mut encoder);
@@ -84,29 +89,32 @@ fn checksum(head: &[u8], bytes: &[u8]) -> u32 {
     hasher.finalize()
 }
 
-/// Reads a file of sums, some tiles at a time.
+/// Reads a file of sums, a chunk of tiles at a time.
 #[derive(Debug)]
 pub struct FilmReader {
     path: PathBuf,
     file: BufReader<File>,
-    /// Bytes that are not read yet.
+    /// Bytes that were not read yet.
     left: u64,
     header: FilmHeader,
     chunks: u64,
-    /// How far cells are, where that is stored.
+    /// Progress of cells, if it is stored.
     cells: CellProgress,
-    /// Pixels that were read.
+    /// Pixels read so far.
     pixels: PixelSet,
 }
 
 impl FilmReader {
     /// Opens a file and reads its header.
     pub fn open(path: &Path) -> Result<Self, PartError> {
+        // Open the file
         let file = File::open(path).map_err(|error| PartError::io(path, error))?;
         let metadata = file.metadata().map_err(|error| PartError::io(path, error))?;
         if metadata.is_dir() {
             return Err(PartError::foreign(path, "is a folder"));
         }
+
+        // Check magic bytes and version
         let mut file = BufReader::with_capacity(1 << 20, file);
         let mut start = [0; 12];
         match file.read_exact(&mut start) {
@@ -119,6 +127,8 @@ impl FilmReader {
             let reason = format!("is of version {version} of the format; this program reads version {VERSION}");
             return Err(PartError::foreign(path, &reason));
         }
+
+        // Read the header
         let left = metadata.len().saturating_sub(start.len() as u64);
         let (letter, bytes) = read_chunk(&mut file, left).map_err(|e| e.at(path))?;
         let header = std::str::from_utf8(&bytes).ok().filter(|_| letter == HEADER).and_then(FilmHeader::parse);
@@ -138,11 +148,14 @@ impl FilmReader {
         &self.path
     }
 
-    /// The next tiles; `None` at the end of the file. Together they are the pixels that the header says, each once.
+    /// The next tiles; `None` at the end of the file. All tiles together have each pixel of the header's extent once.
     pub fn tiles(&mut self) -> Result<Option<Vec<StoredTile>>, PartError> {
+        // Read a chunk
         let damaged = |reason| PartError::damaged(&self.path, reason);
         let (letter, bytes) = read_chunk(&mut self.file, self.left).map_err(|e| e.at(&self.path))?;
         self.left -= bytes.len() as u64 + CHUNK_OVERHEAD;
+
+        // Decode and check it
         match letter {
             TILES => {
                 self.chunks += 1;
@@ -170,7 +183,7 @@ impl FilmReader {
         }
     }
 
-    /// How far cells are, when all tiles were read.
+    /// Progress of cells; valid after all tiles were read.
     pub fn cells(self) -> CellProgress {
         self.cells
     }
@@ -185,7 +198,7 @@ impl FilmReader {
     }
 }
 
-/// Pixels of an image, a bit each.
+/// Set of pixels of an image, one bit each.
 #[derive(Debug, Default)]
 struct PixelSet {
     words: Vec<u64>,
@@ -193,8 +206,8 @@ struct PixelSet {
 }
 
 impl PixelSet {
-    /// Inserts the pixels of a tile, which lies inside the image. False if one of them is there already, or is not of the part
-    /// that the header says.
+    /// Inserts the pixels of a tile inside the image. Returns false if a pixel is in the set already or belongs to
+    /// another part.
     fn insert(&mut self, tile: &PixelBounds, header: &FilmHeader) -> bool {
         let image = &header.bounds;
         self.words.resize(image.area().div_ceil(64), 0);
@@ -213,7 +226,7 @@ impl PixelSet {
     }
 }
 
-/// Number of pixels that a file has.
+/// Number of pixels in the extent of a file.
 fn pixels_of(header: &FilmHeader) -> usize {
     match header.share {
         Some(share) => share.tiles(&header.bounds).map(|tile| tile.area()).sum(),
@@ -221,10 +234,10 @@ fn pixels_of(header: &FilmHeader) -> usize {
     }
 }
 
-/// Bytes of a chunk besides its own.
+/// Bytes of a chunk in addition to its content.
 const CHUNK_OVERHEAD: u64 = 13;
 
-/// Why a chunk cannot be read.
+/// Reason why a chunk cannot be read.
 enum ChunkError {
     Io(io::Error),
     Damaged(&'static str),
@@ -239,12 +252,14 @@ impl ChunkError {
     }
 }
 
-/// Reads a chunk of a file that has `left` more bytes.
+/// Reads a chunk of a file with `left` remaining bytes.
 fn read_chunk(file: &mut impl Read, left: u64) -> Result<(u8, Vec<u8>), ChunkError> {
     const CUT: ChunkError = ChunkError::Damaged("it is cut off");
     if left < CHUNK_OVERHEAD {
         return Err(CUT);
     }
+
+    // Letter and length. The length is checked before memory is allocated
     let mut head = [0; 9];
     let mut read = |bytes: &mut [u8]| match file.read_exact(bytes) {
         Err(error) if error.kind() == io::ErrorKind::UnexpectedEof => Err(CUT),
@@ -255,6 +270,8 @@ fn read_chunk(file: &mut impl Read, left: u64) -> Result<(u8, Vec<u8>), ChunkErr
     if len > left - CHUNK_OVERHEAD {
         return Err(CUT);
     }
+
+    // Content and checksum
     let mut bytes = vec![0; len as usize];
     let mut stored = [0; 4];
     read(&mut bytes)?;
@@ -297,7 +314,7 @@ mod tests {
         Tile { bounds, done, sums, layers: Vec::new(), replicas: Vec::new(), fits: Fits::default() }
     }
 
-    /// What is wrong with a file of these tiles, all of whose checksums are right.
+    /// The error of a file with these tiles, whose checksums are correct.
     fn fault(share: Option<TileShare>, tiles: Vec<Tile>) -> Option<String> {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.part");
@@ -332,7 +349,7 @@ mod tests {
         let mut tiles = ours();
         tiles[0].bounds = IMAGE.tiles(SHARE_TILE)[0];
         assert!(fault(Some(share), tiles).unwrap().contains("of another part"));
-        // More parts than tiles: some have none
+        // With more parts than tiles, some parts have no tile
         assert_eq!(fault(Some(TileShare { index: 6, count: 7 }), Vec::new()), None);
     }
 }

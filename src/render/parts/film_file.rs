@@ -1,4 +1,4 @@
-//! What is stored of a rendering: checkpoints on the way, a part in the end.
+//! Storage of a rendering: checkpoints while it runs, a part at the end.
 
 use super::checkpoint::Checkpoints;
 use super::error::PartError;
@@ -14,20 +14,20 @@ use crate::scene::RenderJob;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-/// What is to be stored of a rendering.
+/// Storage options of a rendering.
 #[derive(Debug, Default)]
 pub struct Storage {
-    /// Where checkpoints are stored, and the time between two of them.
+    /// Path of checkpoints and the time between two of them.
     pub checkpoint: Option<(PathBuf, Duration)>,
-    /// Whether the sums are kept, to be a part.
+    /// True if the sums are kept to be written as a part.
     pub keeps_sums: bool,
-    /// What the rendering goes on from.
+    /// Stored sums to resume from.
     pub stored: Option<Stored>,
-    /// What was chosen by measurements, as text.
+    /// The plan: settings chosen by measurements, as text.
     pub plan: Option<String>,
 }
 
-/// What is stored of a rendering, and how it is called.
+/// Header, checkpoints and stored sums of a rendering.
 pub struct FilmFile {
     header: FilmHeader,
     checkpoints: Option<Checkpoints>,
@@ -37,8 +37,8 @@ pub struct FilmFile {
 }
 
 impl FilmFile {
-    /// What is stored of a rendering that is prepared for `spp` samples per pixel. Fails if it cannot go on from what is
-    /// stored. What goes wrong with checkpoints is told to `warn`.
+    /// Storage of a rendering with `spp` samples per pixel. Fails if the stored sums belong to another rendering.
+    /// `warn` receives errors of checkpoints.
     pub fn new(
         asked: &Asked,
         (job, files): (&RenderJob, &SceneFiles),
@@ -52,7 +52,7 @@ impl FilmFile {
         let mut header = FilmHeader::new(job, settings, spp, fingerprint, [described, notes]);
         if let Some(stored) = &storage.stored {
             check_kinship(stored, &header)?;
-            // What was measured then is not measured again
+            // A stored plan is not measured again
             let plan = stored.header.note(PLAN_NOTE).filter(|_| header.note(PLAN_NOTE).is_none());
             header.notes.extend(plan.map(|text| (PLAN_NOTE.to_owned(), text.to_owned())));
         }
@@ -63,20 +63,20 @@ impl FilmFile {
         Ok(FilmFile { header, checkpoints, stored, cells, keeps_sums: storage.keeps_sums })
     }
 
-    /// What the rendering goes on from.
+    /// The inputs to resume the rendering.
     pub fn continuation(&mut self) -> Continuation<'_> {
         let (stored, cells) = (self.stored.take(), std::mem::take(&mut self.cells));
         let checkpoints = self.checkpoints.as_mut();
         Continuation { stored, cells, checkpoints, keeps_sums: self.keeps_sums, ..Continuation::default() }
     }
 
-    /// Notes how the rendering ended.
+    /// Records the end of the rendering in the header.
     pub fn end(&mut self, rendering: &Rendering) {
         self.header.is_finished = rendering.complete;
         self.header.notes.push((SECONDS.to_owned(), rendering.elapsed.as_secs_f64().to_string()));
     }
 
-    /// Writes the part that was rendered.
+    /// Writes the rendered part.
     pub fn write(&self, path: &Path, rendering: &Rendering) -> Result<(), PartError> {
         let sums = rendering.sums.as_ref().ok_or(PartError::Sums("they were not kept"))?;
         write_film(path, &self.header, sums)
@@ -88,7 +88,7 @@ impl FilmFile {
     }
 }
 
-/// Fails if what is stored is of another scene or of other settings.
+/// Fails if the stored sums belong to another scene or to other settings.
 fn check_kinship(stored: &Stored, header: &FilmHeader) -> Result<(), PartError> {
     let mut differences = stored.header.differences_of_settings(header);
     if stored.header.spp != header.spp {

@@ -1,4 +1,4 @@
-//! What the sums of a file belong to: scene, settings, samples and pixels.
+//! Header of a file of sums: scene, settings, samples and pixels.
 
 use crate::direct::Estimator;
 use crate::film::PixelBounds;
@@ -10,10 +10,10 @@ use crate::scene::RenderJob;
 use std::ops::Range;
 use std::str::FromStr;
 
-/// Note of what was chosen for the image by measurements.
+/// Name of the note with the plan: the settings chosen by measurements.
 pub const PLAN_NOTE: &str = "plan";
 
-/// Texts by name.
+/// Texts with names.
 type Entries = Vec<(String, String)>;
 
 /// The header of a file of sums.
@@ -23,31 +23,30 @@ pub struct FilmHeader {
     pub resolution: [u32; 2],
     /// The crop window.
     pub bounds: PixelBounds,
-    /// Indices of the samples of each pixel.
+    /// Range of sample indices of each pixel.
     pub samples: Range<u32>,
     /// Samples per pixel of the whole image.
     pub spp: u32,
-    /// The pixels; all if `None`.
+    /// The share of the pixels; all if `None`.
     pub share: Option<TileShare>,
-    /// True if there are all these samples of all these pixels.
+    /// True if all pixels have all samples of the range.
     pub is_finished: bool,
-    /// Pixels that are estimated twice, if there are any.
+    /// Selection of the pixels that are estimated twice, if any.
     pub replicas: Option<ReplicaChoice>,
-    /// Number of control variates that are summed.
+    /// Number of control variates with stored sums.
     pub controls: u32,
-    /// Names of the layers by lights.
+    /// Names of the light-group layers.
     pub light_layers: Vec<String>,
-    /// Tells the scene from others.
+    /// Hash of the scene files.
     pub fingerprint: u64,
-    /// What the image depends on, by name: equal in all parts of an image.
+    /// Settings that the image depends on. They are equal in all parts of an image.
     pub settings: Entries,
-    /// What may differ.
+    /// Notes, which may differ between parts.
     pub notes: Entries,
 }
 
 impl FilmHeader {
-    /// The header of the sums of a rendering that is prepared for `spp` samples per pixel; `settings` and `notes` are
-    /// given.
+    /// The header of the sums of a rendering with `spp` samples per pixel.
     pub fn new(
         job: &RenderJob,
         render: &RenderSettings,
@@ -55,6 +54,7 @@ impl FilmHeader {
         fingerprint: u64,
         [settings, notes]: [Entries; 2],
     ) -> Self {
+        // Samples and pixels come from the job; settings and notes are given
         let film = &job.world.scene.film;
         let estimator = Estimator::at_vertex(&job.settings().integrator, 0);
         let end = render.first_sample + render.spp;
@@ -74,17 +74,18 @@ impl FilmHeader {
         }
     }
 
-    /// A note.
+    /// The note with this name.
     pub fn note(&self, name: &str) -> Option<&str> {
         self.notes.iter().find(|(key, _)| key == name).map(|(_, value)| value.as_str())
     }
 
-    /// A setting.
+    /// The setting with this name.
     pub fn setting(&self, name: &str) -> Option<&str> {
         self.settings.iter().find(|(key, _)| key == name).map(|(_, value)| value.as_str())
     }
 
-    /// What keeps this and `other` from being parts of one image, a line each: what is here, and what is there.
+    /// Differences that prevent this part and `other` from being parts of one image, one line each: the value of
+    /// `other`, then the value of this part.
     pub fn differences(&self, other: &FilmHeader) -> Vec<String> {
         let mut lines = self.differences_of_settings(other);
         if self.spp != other.spp {
@@ -100,7 +101,7 @@ impl FilmHeader {
         lines
     }
 
-    /// The same, where numbers of samples may differ.
+    /// Like [`Self::differences`], but sample counts may differ.
     pub fn differences_of_settings(&self, other: &FilmHeader) -> Vec<String> {
         let mut lines = Vec::new();
         for (key, value) in &self.settings {
@@ -121,8 +122,9 @@ impl FilmHeader {
         lines
     }
 
-    /// As text, a line for each entry.
+    /// The header as text, one line per entry.
     pub(super) fn text(&self) -> String {
+        // Fields
         let b = &self.bounds;
         let share = self.share.map_or_else(|| "all".to_owned(), |s| format!("{}/{}", s.index, s.count));
         let own = [
@@ -137,17 +139,21 @@ impl FilmHeader {
             ("light_layers", self.light_layers.join(",")),
             ("fingerprint", format!("{:016x}", self.fingerprint)),
         ];
+        // Settings and notes
         let mut text: String = own.iter().map(|(key, value)| line("", key, value)).collect();
         text.extend(self.settings.iter().map(|(key, value)| line("setting ", key, value)));
         text.extend(self.notes.iter().map(|(key, value)| line("note ", key, value)));
         text
     }
 
-    /// From text; `None` if an entry is missing or means nothing.
+    /// Parses a header; `None` if an entry is missing or invalid.
     pub(super) fn parse(text: &str) -> Option<Self> {
+        // Split lines into entries
         let entries: Vec<(&str, String)> =
             text.lines().map(|l| l.split_once('=').map(|(k, v)| (k, unescaped(v)))).collect::<Option<_>>()?;
         let own = |name: &str| entries.iter().find(|(key, _)| *key == name).map(|(_, value)| value.as_str());
+
+        // Size, samples and share
         let [w, h] = numbers(own("resolution")?)?;
         let [x0, x1, y0, y1] = numbers(own("bounds")?)?;
         let [start, end] = numbers(own("samples")?)?;
@@ -158,6 +164,8 @@ impl FilmHeader {
                 Some(Some(TileShare { index, count }).filter(|share| index < share.count)?)
             }
         };
+
+        // Replicas
         let replicas = match own("replicas")? {
             "none" => None,
             text => {
@@ -165,11 +173,15 @@ impl FilmHeader {
                 Some(Some(ReplicaChoice { edge, seed }).filter(|choice| choice.edge > 0)?)
             }
         };
+
+        // Settings and notes
         let is_inside = x0 < x1 && x1 <= w && y0 < y1 && y1 <= h && w.max(h) <= 1 << 16;
         let named = |prefix: &str| {
             let of_kind = entries.iter().filter_map(|(key, value)| Some((key.strip_prefix(prefix)?, value)));
             of_kind.map(|(key, value)| (key.to_owned(), value.clone())).collect()
         };
+
+        // Check the ranges
         (is_inside && start <= end).then_some(FilmHeader {
             resolution: [w, h],
             bounds: PixelBounds { x0, x1, y0, y1 },
@@ -187,7 +199,7 @@ impl FilmHeader {
     }
 }
 
-/// A name without the prefix of metadata.
+/// A name without the metadata prefix.
 fn short(key: &str) -> &str {
     key.strip_prefix("lumiris:").unwrap_or(key)
 }
@@ -214,13 +226,13 @@ fn unescaped(text: &str) -> String {
     out
 }
 
-/// Values, of which there are N.
+/// N values between separators.
 pub(super) fn list<T: FromStr, const N: usize>(text: &str, separator: char) -> Option<[T; N]> {
     let values: Vec<T> = text.split(separator).map(|v| v.parse().ok()).collect::<Option<_>>()?;
     values.try_into().ok()
 }
 
-/// Numbers, of which there are N.
+/// N numbers between spaces.
 fn numbers<const N: usize>(text: &str) -> Option<[u32; N]> {
     list(text, ' ')
 }

@@ -1,7 +1,7 @@
-//! Adds up the parts of an image. The sums are exact, so the result has the bits of the image rendered at once.
+//! Merges the parts of an image. Sums are exact, so the result is bit-identical to the image rendered at once.
 //!
-//! First all headers are read: do the parts belong together, and is there every sample of every pixel, once? Then the
-//! parts are read one after the other, some tiles at a time, into tiles that cover the image.
+//! First all headers are read, to check that the parts belong together and have every sample of every pixel exactly
+//! once. Then the parts are read one by one, a chunk of tiles at a time, and added to tiles that cover the image.
 
 use super::error::PartError;
 use super::file::FilmReader;
@@ -21,21 +21,21 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// Most lines of a message about many parts.
+/// Maximum lines of a message about many parts.
 const MAX_LINES: usize = 8;
 
-/// The image that parts make.
+/// The image of merged parts.
 #[derive(Debug)]
 pub struct Merged {
     /// The film.
     pub film: Film,
     /// The header of the first part.
     pub header: FilmHeader,
-    /// What is missing, if that is allowed.
+    /// Missing samples, if these are allowed.
     pub missing: Vec<String>,
-    /// Indices of the samples that a whole image has.
+    /// Range of sample indices of the whole image.
     pub samples: Range<u32>,
-    /// Time that all parts took together (s).
+    /// Total time of all parts (s).
     pub seconds: f64,
 }
 
@@ -53,7 +53,7 @@ impl Merged {
         has_features(&self.header)
     }
 
-    /// Metadata as of an image that is rendered at once.
+    /// Metadata, as for an image rendered at once.
     pub fn metadata(&self) -> Vec<(String, String)> {
         let settings = self.header.settings.iter().filter(|(key, _)| key.starts_with("lumiris:")).cloned();
         let mut metadata: Vec<(String, String)> = settings.collect();
@@ -77,7 +77,7 @@ pub fn merge(paths: &[PathBuf], allows_missing: bool) -> Result<Merged, PartErro
     let readers = paths.iter().map(|path| FilmReader::open(path)).collect::<Result<Vec<_>, _>>()?;
     let parts: Vec<Part> =
         readers.iter().map(|r| Part { path: r.path().to_owned(), header: r.header().clone() }).collect();
-    // Open again when it is their turn: there may be more parts than a process can have files
+    // The files are opened again one by one: there may be more parts than a process can have open files
     drop(readers);
     let first = parts.first().ok_or_else(|| PartError::Parts("there are no parts to merge".to_owned()))?;
     check_kinship(&parts)?;
@@ -108,13 +108,13 @@ pub fn merge(paths: &[PathBuf], allows_missing: bool) -> Result<Merged, PartErro
     Ok(Merged { film, header: first.header.clone(), missing, samples, seconds })
 }
 
-/// A part that is not read yet.
+/// A part whose tiles are not read yet.
 struct Part {
     path: PathBuf,
     header: FilmHeader,
 }
 
-/// The lines of a message, of which only the first ones are shown.
+/// The lines of a message; only the first [`MAX_LINES`] are shown.
 fn listed(lines: &[String]) -> String {
     let mut text: Vec<String> = lines.iter().take(MAX_LINES).map(|line| format!("  {line}")).collect();
     if lines.len() > MAX_LINES {
@@ -123,7 +123,7 @@ fn listed(lines: &[String]) -> String {
     text.join("\n")
 }
 
-/// Fails if a part is of another image than the first one.
+/// Fails if a part does not belong to the image of the first part.
 fn check_kinship(parts: &[Part]) -> Result<(), PartError> {
     for part in &parts[1..] {
         let differences = parts[0].header.differences(&part.header);
@@ -136,19 +136,22 @@ fn check_kinship(parts: &[Part]) -> Result<(), PartError> {
     Ok(())
 }
 
-/// The samples of the whole image: those asked for, or more where parts have more.
+/// Sample range of the whole image: the requested samples, or more if parts have more.
 fn samples_of_all(parts: &[Part]) -> Range<u32> {
     0..parts.iter().map(|p| p.header.samples.end.max(p.header.spp)).max().unwrap_or(0)
 }
 
-/// What is missing. Fails if there are samples that two parts have.
+/// Missing samples. Fails if two parts have the same samples.
 fn coverage(parts: &[Part], samples: &Range<u32>) -> Result<Vec<String>, PartError> {
+    // Tiles are distinguished only if a part is a share of the tiles
     let bounds = parts[0].header.bounds;
     let count = if parts.iter().any(|p| p.header.share.is_some()) {
         (bounds.width().div_ceil(SHARE_TILE) * bounds.height().div_ceil(SHARE_TILE)) as usize
     } else {
         1
     };
+
+    // Find the gaps of each tile, in the order of samples
     let mut of_tile: Vec<&Part> = Vec::with_capacity(parts.len());
     let mut by_start: Vec<&Part> = parts.iter().collect();
     by_start.sort_by_key(|p| (p.header.samples.start, p.header.samples.end));
@@ -172,6 +175,8 @@ fn coverage(parts: &[Part], samples: &Range<u32>) -> Result<Vec<String>, PartErr
             gaps.entry((next, samples.end)).or_default().push(tile);
         }
     }
+
+    // Describe the gaps, tiles with the same gap together
     Ok(gaps.iter().flat_map(|(&(from, to), tiles)| gap(parts, from..to, tiles, count)).collect())
 }
 
@@ -183,14 +188,14 @@ fn double(a: &Part, b: &Part) -> PartError {
     PartError::Parts(format!("{a} and {b} both have the samples {from} to {to} of the same pixels"))
 }
 
-/// Names the samples that are missing in some of the tiles.
+/// Describes samples that are missing in some tiles.
 fn gap(parts: &[Part], samples: Range<u32>, tiles: &[usize], count: usize) -> Vec<String> {
     let Range { start, end } = samples;
     let what = format!("samples {start} to {end}");
     if tiles.len() == count {
         return vec![format!("{what} of all pixels")];
     }
-    // Whole shares, where all parts are such
+    // Name whole shares if all parts are shares
     let shares: Vec<u32> = parts.iter().filter_map(|p| p.header.share.map(|s| s.count)).collect();
     let of = shares.first().copied().filter(|n| shares.iter().all(|other| other == n));
     if let Some(of) = of {
@@ -204,7 +209,7 @@ fn gap(parts: &[Part], samples: Range<u32>, tiles: &[usize], count: usize) -> Ve
     vec![format!("{what} of {} of {count} tiles of {SHARE_TILE} pixels", tiles.len())]
 }
 
-/// The image on its way, in tiles of [`SHARE_TILE`] pixels.
+/// The merged image so far, in tiles of [`SHARE_TILE`] pixels.
 struct Whole {
     bounds: PixelBounds,
     tiles: Vec<Tile>,
@@ -227,8 +232,9 @@ impl Whole {
         Whole { bounds: image, tiles: image.tiles(SHARE_TILE).into_iter().map(tile).collect(), packing: Vec::new() }
     }
 
-    /// Adds a stored tile, of whatever size.
+    /// Adds a stored tile of any size.
     fn add(&mut self, stored: &StoredTile, part: &Part) -> Result<(), PartError> {
+        // Check the tile against the header
         let damaged = |reason| PartError::damaged(&part.path, reason);
         if part.header.is_finished && stored.done < part.header.samples.end {
             return Err(damaged("a tile lacks samples that its header says are there"));
@@ -243,6 +249,8 @@ impl Whole {
         if stored.layers.len() != part.header.light_layers.len() {
             return Err(damaged("it does not have the light groups that its header says"));
         }
+
+        // Add it to the overlapping tiles
         let sums = stored.sums.unpacked();
         let layers: Vec<_> = stored.layers.iter().map(PackedSums::unpacked).collect();
         let columns = self.bounds.width().div_ceil(SHARE_TILE) as usize;
@@ -260,7 +268,8 @@ impl Whole {
     }
 }
 
-/// Adds what a tile and a stored one have in common. The stored one has `controls` as sums of control variates, of all pixels.
+/// Adds a stored tile to an overlapping tile. `controls` are the sums of its control variates, of all pixels and
+/// replicas.
 fn add_to(
     tile: &mut Tile,
     (stored, sums, controls): (&StoredTile, &[PixelAccumulator], &[FixedSum]),
@@ -270,6 +279,8 @@ fn add_to(
     let index = |i: u32| index_in(&bounds, &stored.bounds, i);
     let row = controls.len() / (sums.len() + stored.replicas.len());
     let controls = |fit: usize| &controls[fit * row..][..row];
+
+    // Pixels
     let mut merged = tile.sums.unpacked();
     for (i, sums) in sums.iter().enumerate() {
         let Some(at) = index(i as u32) else { continue };
@@ -281,6 +292,8 @@ fn add_to(
         }
     }
     tile.set_sums(&merged, packing);
+
+    // Replicas
     for (i, replica) in stored.replicas.iter().enumerate() {
         let Some(at) = index(replica.pixel) else { continue };
         let at = tile.replicas.binary_search_by_key(&(at as u32), |r| r.pixel);
@@ -294,7 +307,7 @@ fn add_to(
     Ok(())
 }
 
-/// Adds what the layers of a tile and stored ones have in common.
+/// Adds the layers of a stored tile to an overlapping tile.
 fn add_layers_to(tile: &mut Tile, (from, layers): (&PixelBounds, &[Vec<PixelAccumulator>]), packing: &mut Vec<u8>) {
     let bounds = tile.bounds;
     for (layer, sums) in layers.iter().enumerate() {
@@ -308,14 +321,14 @@ fn add_layers_to(tile: &mut Tile, (from, layers): (&PixelBounds, &[Vec<PixelAccu
     }
 }
 
-/// The index in the tile `to` of the pixel with index `i` of the tile `from`; `None` if it is outside.
+/// Index in the tile `to` of the pixel with index `i` in the tile `from`; `None` if it is outside.
 fn index_in(to: &PixelBounds, from: &PixelBounds, i: u32) -> Option<usize> {
     let [x, y] = position(from, i);
     let is_inside = (to.x0..to.x1).contains(&x) && (to.y0..to.y1).contains(&y);
     is_inside.then(|| ((y - to.y0) * to.width() + x - to.x0) as usize)
 }
 
-/// The first of several paths that are the same file; `None` if there is none.
+/// The first path that refers to the same file as an earlier one; `None` if there is none.
 pub fn repeated(paths: &[PathBuf]) -> Option<&Path> {
     let identity = |path: &PathBuf| path.canonicalize().unwrap_or_else(|_| path.clone());
     let mut seen = std::collections::HashSet::new();

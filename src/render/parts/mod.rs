@@ -1,10 +1,10 @@
-//! Films in files: parts of an image, which are merged to the bits of the whole, and checkpoints, from which a rendering
-//! goes on.
+//! Film sums in files: parts of an image, whose merged image is bit-identical to the whole, and checkpoints, from which
+//! a rendering is resumed.
 //!
-//! Both are one format ([`mod@file`]): the exact sums of some samples of some pixels, tile by tile ([`stored_tile`]), with
-//! the settings that they belong to ([`header`], [`notes`]). [`extent`] says which samples of which pixels; [`film_file`] is all
-//! that is stored of a rendering, by [`checkpoint`] while it is under way; [`stored`] is what it goes on from. [`mod@merge`]
-//! adds parts up. `partial` is a file that is being written.
+//! Both have one format ([`mod@file`]): exact sums of some samples of some pixels, tile by tile ([`stored_tile`]), with
+//! the settings that they belong to ([`header`], [`notes`]). [`extent`] selects samples and pixels. [`film_file`] is
+//! the storage of one rendering, with [`checkpoint`] while it runs. [`stored`] is the input of a resumed rendering.
+//! [`mod@merge`] adds parts. `partial` is a file with a temporary name.
 
 pub mod checkpoint;
 pub mod error;

@@ -1,5 +1,5 @@
-//! What files of sums tell of a rendering: what its image depends on, which all parts have in common, and notes, by which it
-//! is continued and merged.
+//! Entries of files of sums: settings, which are equal in all parts of an image, and notes, which are needed to resume
+//! and merge.
 
 use super::error::PartError;
 use super::header::{FilmHeader, PLAN_NOTE, list};
@@ -11,36 +11,37 @@ use crate::render::RenderSettings;
 use crate::render::output::{self, Aov};
 use crate::scene::{AccelKind, Choices, RenderJob};
 
-/// Note of the layers that the image is to have.
+/// Note: the layers of the image.
 const AOV: &str = "aov";
-/// Note of the path of the scene.
+/// Note: the path of the scene.
 pub(super) const SCENE_NOTE: &str = "scene";
-/// Note of the time that it took.
+/// Note: the time of the rendering (s).
 pub(super) const SECONDS: &str = "seconds";
-/// Notes of the matrices of the camera.
+/// Notes: the camera matrices.
 const MATRICES: [&str; 2] = ["camera_from_world", "ndc_from_world"];
-/// Entry of what the sums are of, besides radiance; and its word for the features of the first surfaces.
+/// Setting: the layers of the sums besides radiance, and the word for features of the first surfaces.
 const LAYERS: &str = "layers";
 const FEATURES: &str = "features";
 
-/// What is asked of a rendering, besides its settings and its extent.
+/// Options of a rendering besides its settings and extent.
 #[derive(Clone, Debug, Default)]
 pub struct Asked {
-    /// The scene, as it is called in metadata.
+    /// Name of the scene in metadata.
     pub scene: String,
-    /// How it is loaded.
+    /// Options of the import.
     pub load: LoadOptions,
-    /// Whether there is a box filter of one pixel in place of its own filter.
+    /// True if a box filter of one pixel replaces the filter of the scene.
     pub box_filter: bool,
     /// The ray tracer.
     pub accel: AccelKind,
-    /// The layers of its image; the default ones if `None`.
+    /// The layers of the image; the default ones if `None`.
     pub aovs: Option<Vec<Aov>>,
 }
 
 impl Asked {
-    /// What is stored, where nothing is asked for now.
+    /// Fills in stored options where no option is given now.
     pub fn complete(&mut self, stored: &Stored) -> Result<(), PartError> {
+        // Size
         let note = |name| stored.header.note(name).filter(|text| !text.is_empty());
         let wrong = |name: &str| stored.foreign(&format!("the stored {name} means nothing"));
         let load = &mut self.load;
@@ -54,6 +55,8 @@ impl Asked {
             };
             load.crop = Some(list(text, ',').filter(is_inside).ok_or_else(|| wrong("crop window"))?);
         }
+
+        // Scene and camera
         if let (AccelKind::Embree, Some(accel)) = (self.accel, stored.header.setting("lumiris:accel")) {
             self.accel = accel.parse().map_err(|_| wrong("ray tracer"))?;
         }
@@ -73,6 +76,8 @@ impl Asked {
         if let (None, Some(text)) = (load.time, note("time_in_scene")) {
             load.time = Some(text.parse().ok().filter(|t| f32::is_finite(*t)).ok_or_else(|| wrong("time"))?);
         }
+
+        // Filter and layers
         self.box_filter |= note("box_filter").is_some();
         if let (None, Some(text)) = (&self.aovs, note(AOV)) {
             self.aovs = Some(aovs(text).ok_or_else(|| wrong("list of layers"))?);
@@ -80,8 +85,10 @@ impl Asked {
         Ok(())
     }
 
-    /// What may differ between parts, and what going on needs. `plan` is what was chosen by measurements.
+    /// Notes, which may differ between parts; some are needed to resume. `plan` is the text of the settings chosen by
+    /// measurements.
     pub(super) fn notes(&self, plan: Option<String>, camera: &Camera) -> Vec<(String, String)> {
+        // One note per option that is given
         let LoadOptions { resolution, crop, environment, scene, camera: camera_name, camera_auto, light_units, time } =
             &self.load;
         let names = |aovs: &Vec<Aov>| match aovs[..] {
@@ -102,18 +109,20 @@ impl Asked {
             (PLAN_NOTE, plan),
             (AOV, self.aovs.as_ref().map(names)),
         ];
+
+        // Notes of the camera
         let notes = notes.into_iter().filter_map(|(key, value)| Some((key.to_owned(), value?)));
         notes.chain(CameraMatrices::of(camera).notes()).collect()
     }
 
-    /// What parts of an image have in common.
+    /// Settings that all parts of an image have in common.
     pub(super) fn described(&self, job: &RenderJob, settings: &RenderSettings) -> Vec<(String, String)> {
         let mut entries = output::metadata(&job.world.scene.film, job.settings());
         entries.push(("lumiris:accel".to_owned(), <&str>::from(self.accel).to_owned()));
         let layers = [(settings.with_features, FEATURES), (settings.with_replicas, "variance")];
         let layers: Vec<&str> = layers.into_iter().filter(|(has, _)| *has).map(|(_, name)| name).collect();
         entries.push((LAYERS.to_owned(), layers.join(" ")));
-        // What of a scene is shown, where its file does not say so alone
+        // Choices among the contents of the scene file, where the file does not decide
         let LoadOptions { camera_auto, light_units, time, .. } = &self.load;
         let Choices { cameras, scenes, camera, scene } = &job.world.scene.choices;
         let one_of = |index: &Option<usize>, names: &[String]| {
@@ -129,7 +138,7 @@ impl Asked {
             ("time_in_scene", time.map(|time| time.to_string())),
         ];
         entries.extend(shown.into_iter().filter_map(|(key, value)| Some((key.to_owned(), value?))));
-        // One entry for each name
+        // Join values with the same name
         let mut joined: Vec<(String, String)> = Vec::new();
         for (key, value) in entries {
             match joined.iter_mut().find(|(other, _)| *other == key) {
@@ -141,32 +150,32 @@ impl Asked {
     }
 }
 
-/// The layers that a note tells; `None` if there is no such layer.
+/// The layers listed in a note; `None` if one of them does not exist.
 fn aovs(text: &str) -> Option<Vec<Aov>> {
     text.split(',').filter(|name| *name != "none").map(|name| name.parse().ok()).collect()
 }
 
-/// The layers that a rendering was asked for.
+/// The layers requested for a rendering.
 pub(super) fn asked_aovs(header: &FilmHeader) -> Option<Vec<Aov>> {
     header.note(AOV).and_then(aovs)
 }
 
-/// True if the sums have the features of first surfaces.
+/// True if the sums include features of the first surfaces.
 pub(super) fn has_features(header: &FilmHeader) -> bool {
     header.setting(LAYERS).is_some_and(|layers| layers.split(' ').any(|name| name == FEATURES))
 }
 
-/// Where the camera stood, as columns of 4 × 4 matrices.
+/// Camera transforms, as columns of 4 × 4 matrices.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct CameraMatrices {
-    /// From world space to the space of the camera.
+    /// From world space to camera space.
     pub camera_from_world: Option<[f32; 16]>,
-    /// From world space to the image.
+    /// From world space to normalised device coordinates.
     pub ndc_from_world: Option<[f32; 16]>,
 }
 
 impl CameraMatrices {
-    /// Those of a camera.
+    /// The matrices of a camera.
     pub fn of(camera: &Camera) -> Self {
         CameraMatrices {
             camera_from_world: Some(camera.camera_from_world().to_cols_array()),
@@ -174,14 +183,14 @@ impl CameraMatrices {
         }
     }
 
-    /// As notes of a part.
+    /// The matrices as notes of a part.
     fn notes(&self) -> impl Iterator<Item = (String, String)> {
         let text = |m: [f32; 16]| m.map(|v| v.to_string()).join(",");
         let matrices = MATRICES.into_iter().zip([self.camera_from_world, self.ndc_from_world]);
         matrices.filter_map(move |(key, m)| Some((key.to_owned(), text(m?))))
     }
 
-    /// From the notes of a part.
+    /// The matrices in the notes of a part.
     pub fn from_notes<'a>(note: impl Fn(&str) -> Option<&'a str>) -> Self {
         let [camera_from_world, ndc_from_world] = MATRICES.map(|key| list(note(key)?, ','));
         CameraMatrices { camera_from_world, ndc_from_world }

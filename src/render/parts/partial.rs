@@ -1,18 +1,18 @@
-//! A file that is being written: under a name of its own beside the one that it will have, and by one process at a time.
+//! A file that is being written, under a temporary name, by one process at a time.
 //!
-//! Two processes may be told to write the same file: a task that a queue starts again while the node that seemed lost goes on,
-//! or a command that is given twice. Each of them replaces the whole file, so the last one stays; what they may not do is
-//! write into one another's half of a file, hence the lock.
+//! Two processes can write the same file: a queue restarts a task while its lost node is still running, or a command is
+//! given twice. Each replaces the whole file, so the last one wins. A lock prevents them from writing into the same
+//! temporary file.
 
 use lumiris_formats::output::Destination;
 use std::fs::{File, TryLockError, remove_file};
 use std::io;
 use std::path::{Path, PathBuf};
 
-/// Attempts to lock the file: another process may rename it in between.
+/// Attempts to lock the file: another process may rename it between opening and locking.
 const ATTEMPTS: u32 = 100;
 
-/// A file on its way to its name.
+/// A file with a temporary name.
 #[derive(Debug)]
 pub(super) struct Partial {
     file: File,
@@ -21,7 +21,7 @@ pub(super) struct Partial {
 }
 
 impl Partial {
-    /// Writes a file that is to be called `path`; what is left of it goes if that fails.
+    /// Writes a file that will be named `path`. Removes it if that fails.
     pub(super) fn write(path: &Path, write: impl FnOnce(&mut File) -> io::Result<()>) -> io::Result<Partial> {
         let mut partial = Partial::create(path)?;
         match write(&mut partial.file) {
@@ -33,7 +33,7 @@ impl Partial {
         }
     }
 
-    /// An empty file.
+    /// Creates an empty file, or empties an existing one.
     fn create(path: &Path) -> io::Result<Partial> {
         let destination = Destination::of(path)?;
         if destination.is_stream() {
@@ -59,7 +59,7 @@ impl Partial {
         Err(io::Error::new(io::ErrorKind::ResourceBusy, "other processes are writing it"))
     }
 
-    /// Gives the file its name when all of it is on the disk.
+    /// Renames the file after all of it is on the disk.
     pub(super) fn end(self) -> io::Result<()> {
         let ended = self.destination.replace_by(&self.name);
         if ended.is_err() {
@@ -68,20 +68,20 @@ impl Partial {
         ended
     }
 
-    /// Removes the file, which would keep a full disk full.
+    /// Removes the file, so that it does not keep a full disk full.
     fn remove(self) {
         let _ = remove_file(&self.name);
     }
 }
 
-/// The name under which a file is written.
+/// The temporary name of a file.
 fn partial_path(path: &Path) -> PathBuf {
     let mut name = path.as_os_str().to_owned();
     name.push(".tmp");
     PathBuf::from(name)
 }
 
-/// True if the file still has the name, which it had when it was opened.
+/// True if `name` still refers to the opened file.
 #[cfg(unix)]
 fn has_name(file: &File, name: &Path) -> io::Result<bool> {
     use std::os::unix::fs::MetadataExt;
@@ -93,7 +93,7 @@ fn has_name(file: &File, name: &Path) -> io::Result<bool> {
     }
 }
 
-/// The same where open files cannot be renamed.
+/// Always true on systems where open files cannot be renamed.
 #[cfg(not(unix))]
 fn has_name(_file: &File, _name: &Path) -> io::Result<bool> {
     Ok(true)
@@ -116,7 +116,7 @@ mod tests {
             "{error}"
         );
         first.end().unwrap();
-        // The next one begins anew, whatever an earlier one has left
+        // The next writer starts with an empty file, whatever an earlier one left
         std::fs::write(folder.path().join("a.part.tmp"), "half of a file that is long").unwrap();
         let next = write("next").unwrap();
         assert_eq!(std::fs::read(&path).unwrap(), b"first");

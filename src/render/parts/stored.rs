@@ -1,4 +1,4 @@
-//! What a rendering goes on from: a checkpoint or an unfinished part.
+//! Stored sums that a rendering resumes from: a checkpoint or an unfinished part.
 
 use super::error::PartError;
 use super::file::FilmReader;
@@ -9,22 +9,22 @@ use crate::settings::Settings;
 use crate::settings::table::rows;
 use std::path::{Path, PathBuf};
 
-/// The sums that a rendering goes on from.
+/// The contents of a file of sums.
 #[derive(Debug)]
 pub struct Stored {
     /// The file.
     pub path: PathBuf,
-    /// What it belongs to.
+    /// Scene, settings, samples and pixels.
     pub header: FilmHeader,
-    /// Its sums.
+    /// The sums.
     pub tiles: Vec<StoredTile>,
-    /// How far its cells are, where pixels share paths.
+    /// Progress of cells, where pixels share paths.
     pub cells: CellProgress,
 }
 
 impl Stored {
-    /// Reads a file. `checkpoint` is where the rendering will store itself: if that is the same file, and there is none yet,
-    /// it begins.
+    /// Reads a file. Returns `None` if the file does not exist and is also the path for the checkpoints of the
+    /// rendering, which then starts from the beginning.
     pub fn read(path: &Path, checkpoint: Option<&Path>) -> Result<Option<Stored>, PartError> {
         if checkpoint == Some(path) && !path.exists() {
             return Ok(None);
@@ -35,7 +35,7 @@ impl Stored {
         Ok(Some(Stored { path: path.to_owned(), header, tiles, cells: reader.cells() }))
     }
 
-    /// Applies its settings, in the order of the table. What it does not have does not apply.
+    /// Applies the stored settings, in the order of the table. Settings that are not stored stay unchanged.
     pub fn apply(&self, settings: &mut Settings) -> Result<(), PartError> {
         for row in rows() {
             if let Some(value) = self.header.setting(&format!("lumiris:{}", row.key)) {
@@ -46,7 +46,7 @@ impl Stored {
         Ok(())
     }
 
-    /// The samples per pixel by which it was prepared.
+    /// Samples per pixel that the rendering was prepared for.
     pub fn spp(&self) -> Result<u32, PartError> {
         let spp = self.header.setting("lumiris:spp").and_then(|text| text.parse().ok());
         spp.ok_or_else(|| self.foreign("there is no number of samples"))

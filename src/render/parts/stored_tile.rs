@@ -1,4 +1,4 @@
-//! The sums of a tile in a file.
+//! Encoding of the sums of a tile.
 
 use super::error::PartError;
 use super::header::FilmHeader;
@@ -9,31 +9,36 @@ use crate::film::replicas::ReplicaAccumulator;
 use crate::render::tiles::Tile;
 use std::sync::Arc;
 
-/// The sums of a tile, as they were stored.
+/// The sums of a tile as read from a file.
 #[derive(Debug)]
 pub struct StoredTile {
-    /// Its pixels.
+    /// The pixels.
     pub bounds: PixelBounds,
     /// Index of the next sample of its pixels.
     pub done: u32,
     pub(super) sums: PackedSums,
-    /// The same of the layers by lights.
+    /// Sums of the light-group layers.
     pub(super) layers: Vec<PackedSums>,
     pub(super) replicas: Vec<ReplicaAccumulator>,
     /// Sums of values and control variates, of the pixels and then of the replicas.
     pub(super) controls: PackedRows,
-    /// What later samples follow from.
+    /// State of the fits that later samples depend on.
     memory: [Vec<f32>; 2],
 }
 
 impl StoredTile {
-    /// The tile that goes on from here; `empty` is one without samples. The records of a cache are counted anew.
+    /// Converts to a tile that continues from here. `empty` makes a tile without samples. Cache records are counted
+    /// again.
     pub(in crate::render) fn restore(self, empty: impl Fn(PixelBounds) -> Tile) -> Result<Tile, PartError> {
         let mut tile = empty(self.bounds);
+
+        // The replicas have to be of the same pixels
         let pixels = |replicas: &[ReplicaAccumulator]| replicas.iter().map(|r| r.pixel).collect::<Vec<_>>();
         if pixels(&tile.replicas) != pixels(&self.replicas) {
             return Err(PartError::Sums("the pixels that are estimated twice are not the same"));
         }
+
+        // Fits
         if !tile.fits.restore(self.memory) || tile.fits.sum_count() != self.controls.len() {
             return Err(PartError::Sums("there are not as many control variates"));
         }
@@ -43,17 +48,21 @@ impl StoredTile {
         });
         tile.fits.pack(&mut Vec::new());
         (tile.replicas, tile.done) = (self.replicas, self.done);
+
+        // Light-group layers
         if tile.layers.len() != self.layers.len() {
             return Err(PartError::Sums("there are not as many light groups"));
         }
         tile.layers = self.layers.into_iter().map(Arc::new).collect();
+
+        // Pixels
         let mut sums = self.sums.unpacked();
         sums.iter_mut().for_each(|sums| sums.records = 0);
         tile.set_sums(&sums, &mut Vec::new());
         Ok(tile)
     }
 
-    /// Reads a tile of what the header says; `None` if it is none.
+    /// Reads a tile within the extent of the header; `None` if it is invalid.
     pub(super) fn read(decoder: &mut Decoder<'_>, header: &FilmHeader) -> Option<Self> {
         let (image, samples) = (&header.bounds, &header.samples);
         let mut word = || decoder.word();
@@ -64,7 +73,7 @@ impl StoredTile {
         if !is_inside || bounds.area() == 0 || done < samples.start || done > samples.end {
             return None;
         }
-        // As many as there are bytes for, whatever the numbers say
+        // Counts are not trusted: memory grows with the bytes that are read
         let mut pixels =
             || Some(PackedSums::of(&(0..bounds.area()).map(|_| decoder.pixel()).collect::<Option<Vec<_>>>()?));
         let sums = pixels()?;

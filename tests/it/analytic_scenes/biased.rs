@@ -1,4 +1,4 @@
-//! Forms that fit their coefficients to the samples they are applied to: biased by O(1/N).
+//! Estimator forms that fit coefficients to their own samples have a bias of O(1/N).
 
 use super::Scene;
 use super::power::{Budget, POWER, image_means, moments};
@@ -7,12 +7,12 @@ use lumiris::settings::{EstimatorKind, OcvForm, OcvSettings, OptimalForm, Sampli
 use lumiris_numbers::estimators::stats::sidak;
 use lumiris_test_support::significance::{detectable_deviation, is_beyond};
 
-/// N, samples of each estimate.
+/// N, the number of samples per estimate.
 const SAMPLES: u32 = 64;
 const SCENES: [&str; 5] = ["half-environment", "hidden-rectangle", "many-points", "rectangle", "sphere"];
 const BUDGET: Budget = Budget { edge: 4, images: 32 };
 
-/// Each form with the relative bias that it has in no scene. At N = 64 they were measured, with errors up to 0.07 %, as
+/// Each form with an upper bound of its relative bias over all scenes. Measured at N = 64, with errors up to 0.07 %:
 /// −2.95 % (`sphere`), +0.31 % (`hidden-rectangle`), −1.74 % (`sphere`) and +0.01 %.
 fn forms() -> [(Configuration, f64); 4] {
     let base = Configuration { samples: SAMPLES, ..BASE };
@@ -50,7 +50,7 @@ fn forms_that_fit_their_own_samples_are_biased_by_little() {
                 100.0 * limit,
                 100.0 * noticed
             );
-            // What is multiplied may be biased the other way
+            // The factor may have the opposite sign of the bias
             let is_noticed = noticed < 2.0 * limit && is_biased(1.0 + 3.0 * limit) && is_biased(1.0 - 3.0 * limit);
             if is_biased(1.0) || !is_noticed {
                 faults.push(found);

@@ -1,12 +1,12 @@
-//! Scenes whose answer is known: every one with every integrator, estimator, light choice, sampler and ray tracer.
+//! Scenes with known answers: each with every integrator, estimator, light choice, sampler and ray tracer.
 //!
-//! The answer stands in the scene file beside its derivation, with the bias that every row of the scene has to notice
-//! at the level of the whole set (Šidák-corrected) with a power of 0.99. `make test-power` renders as much as that
-//! needs, `make test` as much as notices a bias [`QUICK`]`.goal` times as large. Both then multiply what they rendered
-//! by a wrong factor, which the same tests have to reject. Seeds are fixed.
+//! The answer is in the scene file with its derivation, together with the bias that every row of the scene must detect
+//! at the level of the whole set (Šidák-corrected) with a power of 0.99. `make test-power` renders enough samples for
+//! that; `make test` renders enough to detect a bias [`QUICK`]`.goal` times as large. Both then multiply the rendered
+//! values by a wrong factor, which the same tests must reject. Seeds are fixed.
 //!
-//! In reading order: [`rows`] (the configurations), [`power`] (how much is rendered, and what its t-test notices),
-//! [`biased`] (forms that are biased, and by how much).
+//! Reading order: [`rows`] (the configurations), [`power`] (amounts of samples and the power of the t-tests),
+//! [`biased`] (biased forms and their bias).
 
 mod biased;
 mod power;
@@ -22,13 +22,12 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 
-/// What `make test` renders.
+/// Effort of `make test`.
 const QUICK: Effort = Effort { goal: 6.0, min_images: 16 };
-/// What `make test-power` renders.
+/// Effort of `make test-power`.
 const FULL: Effort = Effort { goal: 1.0, min_images: 64 };
 
-/// An environment variable: the names of the scenes that are rendered, where it is not all of them. The level stays the
-/// same.
+/// Environment variable with the names of the scenes to render; all if it is not set. It does not change the level.
 const ONLY: &str = "POWER_SCENES";
 
 /// A scene of `scenes/analytic`.
@@ -37,7 +36,7 @@ struct Scene {
     path: PathBuf,
     /// Radiance of every pixel.
     answer: [f64; 3],
-    /// Relative bias that every row has to notice.
+    /// Relative bias that every row must detect.
     detects: f64,
 }
 
@@ -48,14 +47,14 @@ impl Scene {
     }
 }
 
-/// The numbers in a comment of a scene file.
+/// Parses the numbers of a comment in a scene file.
 fn numbers(path: &Path, key: &str) -> Vec<f64> {
     let text = std::fs::read_to_string(path).unwrap();
     let line = text.lines().find_map(|l| l.strip_prefix(key)).unwrap_or_else(|| panic!("{} has {key}", path.display()));
     line.split_whitespace().map(|v| v.parse().unwrap()).collect()
 }
 
-/// The known radiance of a scene file.
+/// The known radiance in a scene file.
 pub(crate) fn answer(path: &Path) -> [f64; 3] {
     numbers(path, "# answer:").try_into().unwrap()
 }
@@ -70,7 +69,7 @@ fn scenes() -> Vec<Scene> {
     scenes
 }
 
-/// What is wrong with a row: its answer, or what it notices.
+/// Faults of a row: a wrong answer, or too little power.
 fn faults(outcome: &Outcome<'_>, effort: &Effort, level: f64) -> Vec<String> {
     let mut faults = Vec::new();
     let name = outcome.row.name();
@@ -86,7 +85,7 @@ fn faults(outcome: &Outcome<'_>, effort: &Effort, level: f64) -> Vec<String> {
     faults
 }
 
-/// What passes although its values are multiplied by a factor that is as wrong as the test has to notice.
+/// Rows that pass although their values are multiplied by a factor which the test must reject.
 fn missed(outcomes: &[Outcome<'_>], effort: &Effort, level: f64) -> Vec<String> {
     let factors = |o: &Outcome<'_>| [1.0 + o.row.goal(effort), 1.0 - o.row.goal(effort)];
     let misses = outcomes.iter().flat_map(|o| {
@@ -96,14 +95,14 @@ fn missed(outcomes: &[Outcome<'_>], effort: &Effort, level: f64) -> Vec<String> 
     misses.collect()
 }
 
-/// The share of the rows with noise that notice just the bias which they should notice with [`POWER`].
+/// The share of noisy rows that reject a bias which they should detect with a probability of [`POWER`].
 fn share_found(outcomes: &[Outcome<'_>], level: f64) -> (f64, usize) {
     let noisy: Vec<_> = outcomes.iter().filter(|o| o.has_noise()).collect();
     let found = noisy.iter().filter(|o| o.rejected(1.0 + o.detectable(level), level)[o.channel()]);
     (found.count() as f64 / noisy.len() as f64, noisy.len())
 }
 
-/// A line for each scene: what its rows notice.
+/// Prints one line per scene with the bias that its rows detect.
 fn print_summary(out: &mut dyn Write, outcomes: &[Outcome<'_>], level: f64) {
     writeln!(out, "| scene | rows | camera samples | notices, median | notices, worst row |\n|---|---|---|---|---|")
         .unwrap();
@@ -116,7 +115,7 @@ fn print_summary(out: &mut dyn Write, outcomes: &[Outcome<'_>], level: f64) {
     }
 }
 
-/// Renders every row, prints what the tests notice, and complains about what they found.
+/// Renders every row, prints the detectable biases, and fails with a list of all faults.
 fn check(effort: &Effort) {
     let mut scenes = scenes();
     let level = level(&scenes);
@@ -125,7 +124,7 @@ fn check(effort: &Effort) {
     }
     let outcomes = render_rows(&scenes, effort, level);
 
-    // Standard output itself, which is shown though the test passes
+    // Standard output itself, which is visible although the test passes
     let mut out = std::io::stdout().lock();
     if effort.goal == FULL.goal {
         print_table(&mut out, &outcomes, level);

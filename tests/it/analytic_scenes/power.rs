@@ -1,10 +1,10 @@
-//! How many images each row needs, what its t-test then notices, and the table that says so.
+//! Number of images per row, the power of its t-test, and the table of both.
 //!
-//! The noise of a row is the relative standard deviation of one camera sample. It stands in
-//! `docs/measurements/power/rows.csv` and says how many images, of seeds of their own, a test needs to notice a bias.
-//! The means of the images are independent whatever the sampler does within an image, and Student's t-test compares
-//! them with the answer. What a test notices is computed from the spread of its own images; a stale table makes it
-//! notice less, which is an error.
+//! The noise of a row is the relative standard deviation of one camera sample. It is stored in
+//! `docs/measurements/power/rows.csv`, and determines the number of images, with different seeds, that a test needs to
+//! detect a bias. The means of the images are independent, whatever the sampler does within an image. Student's t-test
+//! compares them with the answer. The detectable bias is computed from the spread of the rendered images: if the table
+//! is out of date, the test detects less, which is an error.
 
 use super::Scene;
 use super::rows::{Configuration, SPP, configurations, job};
@@ -17,21 +17,21 @@ use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
-/// Probability that any test of the whole set rejects a renderer that is right.
+/// Probability that any test of the whole set rejects a correct renderer.
 const SIGNIFICANCE: f64 = 1e-3;
-/// Probability that a bias of the size stated is noticed.
+/// Probability of detecting a bias of the stated size.
 pub(super) const POWER: f64 = 0.99;
-/// What f32 arithmetic may be off where there is no noise, relative.
+/// Relative error of f32 arithmetic, allowed for rows without noise.
 const ROUNDING: f64 = 3e-5;
-/// Factor of the standard error below what the power needs: most rows then notice the bias with a power far above.
+/// Factor by which the standard error is smaller than necessary, so that most rows have a much higher power.
 const MARGIN: f64 = 1.2;
 /// Images of rows without noise.
 const EXACT_IMAGES: u32 = 8;
-/// How often a row is rendered at most, until its images notice the bias.
+/// Maximum number of attempts to render enough images for a row.
 const ATTEMPTS: u32 = 4;
-/// An environment variable: the noise is measured anew, and the table written.
+/// Environment variable: measure the noise again and write the table.
 pub(super) const MEASURE: &str = "MEASURE_POWER";
-/// Images by which the noise of a row is first measured.
+/// Images for the first measurement of a row's noise.
 const PILOT_IMAGES: u32 = 32;
 
 /// Images of a row.
@@ -43,22 +43,22 @@ pub(super) struct Budget {
     pub images: u32,
 }
 
-/// How much is rendered.
+/// Amount of rendering.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Effort {
-    /// The bias that rows have to notice, over that of their scene.
+    /// Detectable bias of the rows over their scene's.
     pub goal: f64,
-    /// Fewest images of a row with noise; twice as many before pixels are added to them.
+    /// Smallest number of images of a noisy row; twice as many before images get more pixels.
     pub min_images: u32,
 }
 
-/// A scene with one of the configurations.
+/// A scene with a configuration.
 pub(super) struct Row<'a> {
     pub scene: &'a Scene,
     pub configuration: Configuration,
 }
 
-/// What was rendered for a row.
+/// The rendered images of a row.
 pub(super) struct Outcome<'a> {
     pub row: Row<'a>,
     pub budget: Budget,
@@ -66,13 +66,13 @@ pub(super) struct Outcome<'a> {
     pub images: Vec<[f64; 3]>,
 }
 
-/// Level of each test of the set.
+/// Significance level of each test of the set.
 pub(super) fn level(scenes: &[Scene]) -> f64 {
     let rows: usize = scenes.iter().map(|scene| configurations(&scene.name).len()).sum();
     sidak(SIGNIFICANCE, rows * 3)
 }
 
-/// Means of images with seeds from `seed` on.
+/// Means of images with the seeds `seed`, `seed` + 1, ….
 pub(super) fn image_means(path: &Path, c: &Configuration, budget: Budget, seed: u32) -> Vec<[f64; 3]> {
     let mut job = job(path, c, budget.edge);
     let settings = RenderSettings { threads: Some(1), spp: SPP, ..RenderSettings::default() };
@@ -85,13 +85,13 @@ pub(super) fn image_means(path: &Path, c: &Configuration, budget: Budget, seed: 
     (0..budget.images).map(&mut image).collect()
 }
 
-/// Moments of a channel of images whose values are multiplied by `factor`.
+/// Moments of a channel of images, multiplied by `factor`.
 pub(super) fn moments(images: &[[f64; 3]], channel: usize, factor: f64) -> Welford {
     images.iter().map(|p| p[channel] * factor).collect()
 }
 
 impl<'a> Row<'a> {
-    /// Images that notice the bias. Where they turn out to be noisier than was known, others take their place.
+    /// Renders enough images to detect the bias. If they are noisier than in the table, a larger set replaces them.
     fn render_until_noticed(self, mut noise: f64, effort: &Effort, level: f64) -> Outcome<'a> {
         let goal = self.goal(effort);
         let mut outcome = Outcome { row: self, budget: Budget { edge: 4, images: 0 }, images: Vec::new() };
@@ -106,26 +106,26 @@ impl<'a> Row<'a> {
         outcome
     }
 
-    /// Scene and settings.
+    /// Name of scene and settings.
     pub(super) fn name(&self) -> String {
         format!("{},{}", self.scene.name, self.configuration)
     }
 
-    /// The bias that has to be noticed.
+    /// The bias that must be detected.
     pub(super) fn goal(&self, effort: &Effort) -> f64 {
         effort.goal * self.scene.detects + 2.0 * self.tolerance()
     }
 
-    /// The first seed, far from those of other rows.
+    /// The first seed, far from other rows' seeds.
     fn seed(&self) -> u32 {
         // FNV-1a
         self.name().bytes().fold(0x811c_9dc5, |hash, byte| (hash ^ u32::from(byte)).wrapping_mul(0x0100_0193))
     }
 
-    /// What the mean may be off without noise, relative.
+    /// Allowed relative error of the mean without noise.
     fn tolerance(&self) -> f64 {
-        // An image shows so little of its scene that interpolation makes no error that counts, but for a spot whose
-        // falloff is steeper than the gradients of sources know
+        // An image shows so little of its scene that the interpolation error is negligible, except for a spot whose
+        // falloff is steeper than the gradients of its sources
         match self.configuration.cached {
             None => ROUNDING,
             Some(Cached::All) if self.scene.name == "spot-falloff" => 5e-3,
@@ -133,7 +133,7 @@ impl<'a> Row<'a> {
         }
     }
 
-    /// Images that notice the bias, of a row with this noise.
+    /// The images needed to detect the bias, for a row with this noise.
     fn budget(&self, noise: f64, effort: &Effort, level: f64) -> Budget {
         if noise <= self.tolerance() {
             return Budget { edge: 4, images: EXACT_IMAGES };
@@ -146,13 +146,13 @@ impl<'a> Row<'a> {
         Budget { edge, images: images(edge).max(effort.min_images) }
     }
 
-    /// Pixels along an edge that an image can have.
+    /// Possible numbers of pixels along an edge.
     fn edges(&self) -> &[u32] {
-        // Records of irradiance serve all pixels of an image: more of them tell nothing new
+        // All pixels of an image use the same irradiance records, so more pixels add no information
         if self.configuration.cached.is_some() { &[4] } else { &[16, 8, 4] }
     }
 
-    /// The noise by other images than those that are judged.
+    /// Measures the noise with other images than those that are tested.
     fn pilot(&self) -> f64 {
         let budget = Budget { edge: self.edges()[self.edges().len() / 2], images: PILOT_IMAGES };
         self.noise(budget, &self.render(budget, 1 << 31))
@@ -162,7 +162,7 @@ impl<'a> Row<'a> {
         image_means(&self.scene.path, &self.configuration, budget, self.seed().wrapping_add(salt))
     }
 
-    /// Relative standard deviation of a camera sample, the largest of the channels.
+    /// Relative standard deviation of a camera sample; the largest of the channels.
     fn noise(&self, budget: Budget, images: &[[f64; 3]]) -> f64 {
         let samples = f64::from(budget.edge * budget.edge * SPP);
         let relative = |c: usize| moments(images, c, 1.0).variance().sqrt() / self.scene.answer[c];
@@ -171,7 +171,7 @@ impl<'a> Row<'a> {
 }
 
 impl Outcome<'_> {
-    /// Whether the t-tests of the channels reject the values that were rendered, multiplied by `factor`.
+    /// True for each channel whose t-test rejects the rendered values multiplied by `factor`.
     pub(super) fn rejected(&self, factor: f64, level: f64) -> [bool; 3] {
         std::array::from_fn(|c| {
             let (values, answer) = (moments(&self.images, c, factor), self.row.scene.answer[c]);
@@ -180,7 +180,7 @@ impl Outcome<'_> {
         })
     }
 
-    /// Whether its answer comes with noise, and not but rounding or interpolation.
+    /// True if the answer has noise, not only rounding or interpolation errors.
     pub(super) fn has_noise(&self) -> bool {
         self.images.len() > EXACT_IMAGES as usize
     }
@@ -190,7 +190,7 @@ impl Outcome<'_> {
         self.images.len() as u64 * u64::from(self.budget.edge.pow(2) * SPP)
     }
 
-    /// Mean, and its error, of each channel.
+    /// Mean of each channel with its standard error.
     pub(super) fn means(&self) -> [(f64, f64); 3] {
         std::array::from_fn(|c| moments(&self.images, c, 1.0)).map(|w| (w.mean(), w.standard_error()))
     }
@@ -201,11 +201,11 @@ impl Outcome<'_> {
         (0..3).max_by(|a, b| relative(a).total_cmp(&relative(b))).unwrap()
     }
 
-    /// The bias that is noticed in every channel.
+    /// The bias that is detected in every channel.
     pub(super) fn detectable(&self, level: f64) -> f64 {
         let error = moments(&self.images, self.channel(), 1.0).standard_error();
         let relative = error / self.row.scene.answer[self.channel()];
-        // The mean may be within the tolerance on the other side
+        // The mean may be off by the tolerance in the other direction
         detectable_bias(relative, self.images.len() as u64, level, POWER) + 2.0 * self.row.tolerance()
     }
 
@@ -225,14 +225,14 @@ impl Outcome<'_> {
     }
 }
 
-/// Where the table is.
+/// Path of the table.
 fn table_path() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/measurements/power/rows.csv")
 }
 
 const HEADER: &str = "scene,integrator estimator sampler,samples,mean,truth,sigma,detectable bias %,noise of a sample";
 
-/// The noise of the rows as it was last measured.
+/// The noise of the rows in the table.
 fn measured_noise() -> HashMap<String, f64> {
     let text = std::fs::read_to_string(table_path()).unwrap_or_default();
     let entry = |line: &str| {
@@ -267,9 +267,12 @@ pub(super) fn print_table(out: &mut dyn std::io::Write, outcomes: &[Outcome<'_>]
 
 /// Renders all rows of the scenes.
 pub(super) fn render_rows<'a>(scenes: &'a [Scene], effort: &Effort, level: f64) -> Vec<Outcome<'a>> {
+    // Noise from the table, or measured
     let known = if std::env::var_os(MEASURE).is_some() { HashMap::new() } else { measured_noise() };
     let rows = scenes.iter().flat_map(|scene| configurations(&scene.name).into_iter().map(move |c| (scene, c)));
     let rows: Vec<(&Scene, Configuration)> = rows.collect();
+
+    // Render on all cores, each row on one thread
     let outcomes = Mutex::new(Vec::new());
     let next = AtomicUsize::new(0);
     let work = || {
@@ -286,6 +289,8 @@ pub(super) fn render_rows<'a>(scenes: &'a [Scene], effort: &Effort, level: f64) 
         let threads = std::thread::available_parallelism().map_or(1, usize::from);
         (0..threads).for_each(|_| drop(scope.spawn(work)));
     });
+
+    // In the order of the rows
     let mut outcomes = outcomes.into_inner().unwrap();
     outcomes.sort_by_key(|(index, _)| *index);
     outcomes.into_iter().map(|(_, outcome)| outcome).collect()

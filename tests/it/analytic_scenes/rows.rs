@@ -1,4 +1,4 @@
-//! The rows of the table: every integrator, estimator, light choice, sampler and ray tracer.
+//! The rows of the table: integrators, estimators, light choices, samplers and ray tracers.
 
 use crate::visibility_cache::{CacheContents, cache_with};
 use lumiris::import::{LoadOptions, load};
@@ -13,30 +13,30 @@ use lumiris_numbers::samplers::SamplerKind;
 use std::fmt;
 use std::path::Path;
 
-/// Settings of a renderer that has to give the known answer.
+/// Settings that must give the known answer.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Configuration {
-    /// What records of an irradiance cache hold; paths are traced if there is none.
+    /// Light stored in the records of an irradiance cache; `None` for path tracing.
     pub cached: Option<Cached>,
     pub estimator: EstimatorKind,
     pub heuristic: Heuristic,
     pub samples: u32,
-    /// Of `ocv`.
+    /// For `ocv`.
     pub ocv: OcvSettings,
     pub optimal_mis: OptimalForm,
     pub correlated_technique: SamplingTechnique,
     pub bsdf_fraction: f32,
-    /// Probability of choosing an infinite light; `None` where it follows from the lights.
+    /// Probability of choosing an infinite light; `None` for the automatic value.
     pub infinite_fraction: Option<f32>,
-    /// Of `ris`.
+    /// For `ris`.
     pub proposals: u32,
     pub strata: Strata,
     pub points: ProposalPoints,
     pub target: Target,
     pub light_sampler: LightSamplerKind,
-    /// What photons tell of the visibility of lights.
+    /// The light visibility cache.
     pub visibility_cache: CacheContents,
-    /// Of `contributing`.
+    /// For `contributing`.
     pub noncontributing_samples: u32,
     pub sampler: SamplerKind,
     pub accel: AccelKind,
@@ -45,7 +45,7 @@ pub(super) struct Configuration {
 /// Camera samples per pixel.
 pub(super) const SPP: u32 = 16;
 
-/// What a row has that says nothing else.
+/// Default configuration of the rows.
 pub(super) const BASE: Configuration = Configuration {
     cached: None,
     estimator: EstimatorKind::Mis,
@@ -67,7 +67,7 @@ pub(super) const BASE: Configuration = Configuration {
     accel: AccelKind::Embree,
 };
 
-/// Those that are not the base's.
+/// Samplers other than the default.
 const SAMPLERS: [SamplerKind; 3] = [SamplerKind::Independent, SamplerKind::Stratified, SamplerKind::Sobol];
 
 fn path_configurations() -> Vec<Configuration> {
@@ -101,9 +101,9 @@ fn cached_configurations() -> Vec<Configuration> {
     ]
 }
 
-/// A scene for the weights of techniques alone: two kinds of light, of which one hides the other, both seen by both techniques.
+/// Scene for MIS weights only: two kinds of light, one of which occludes the other, both sampled by both techniques.
 const OF_WEIGHTS: &str = "lamp-in-sky";
-/// A scene that has the rows of weights as well: a BSDF of two lobes.
+/// Scene with the rows for MIS weights in addition: a BSDF with two lobes.
 const OF_LOBES: &str = "phong-normal";
 
 /// All rows of a scene.
@@ -119,7 +119,7 @@ pub(super) fn configurations(scene: &str) -> Vec<Configuration> {
     all
 }
 
-/// Everything that weights of techniques depend on, for every estimator that has it.
+/// Settings that affect MIS weights, for every estimator with these settings.
 fn weight_configurations() -> Vec<Configuration> {
     const HEURISTICS: [Heuristic; 3] = [Heuristic::Balance, Heuristic::Power, Heuristic::Maximum];
     let mis = BASE;
@@ -131,6 +131,7 @@ fn weight_configurations() -> Vec<Configuration> {
     let ris = of(EstimatorKind::Ris);
     let contributing = Configuration { visibility_cache: CacheContents::Right, ..of(EstimatorKind::Contributing) };
 
+    // Heuristics, BSDF fractions and fractions of infinite lights
     let mut all = Vec::new();
     for heuristic in HEURISTICS {
         all.extend([1, 2, 5].map(|samples| Configuration { heuristic, samples, ..pixels }));
@@ -148,14 +149,18 @@ fn weight_configurations() -> Vec<Configuration> {
     all
 }
 
-/// Everything that asks photons which lights are seen, whatever they say.
+/// All uses of the light visibility cache, with correct and wrong contents.
 fn visibility_cache_configurations() -> Vec<Configuration> {
     use CacheContents::{Absent, Empty, Right, Wrong};
     let base = &BASE;
     let light_sampler = LightSamplerKind::Photons;
+
+    // Choosing lights
     let mut all = [Absent, Empty, Right, Wrong]
         .map(|visibility_cache| Configuration { visibility_cache, light_sampler, ..*base })
         .to_vec();
+
+    // Resampling by visibility
     let ris = Configuration {
         estimator: EstimatorKind::Ris,
         heuristic: Heuristic::Balance,
@@ -178,6 +183,8 @@ fn visibility_cache_configurations() -> Vec<Configuration> {
     let control = Configuration { target: Target::VisibilityControl, ..ris };
     all.extend([Absent, Right, Wrong].map(|visibility_cache| Configuration { visibility_cache, ..control }));
     all.push(Configuration { visibility_cache: Wrong, strata: Strata::None, ..control });
+
+    // Other estimators
     let ocv = Configuration { estimator: EstimatorKind::Ocv, samples: 5, light_sampler, ..*base };
     all.extend([Right, Wrong].map(|visibility_cache| Configuration { visibility_cache, ..ocv }));
     all.push(Configuration { visibility_cache: Right, estimator: EstimatorKind::OptimalMis, samples: 8, ..ocv });
@@ -236,20 +243,23 @@ fn ris_configurations(base: &Configuration) -> Vec<Configuration> {
     all
 }
 
-/// The name of a choice, as on the command line.
+/// The command-line name of a choice.
 fn name(choice: impl Into<&'static str>) -> &'static str {
     choice.into()
 }
 
-/// Integrator, estimator and sampler, and what differs from the base.
+/// Writes integrator, estimator and sampler, and all differences from the default.
 impl fmt::Display for Configuration {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        // Always written
         match self.cached {
             Some(cached) => write!(f, "irradiance-cache {} ", name(cached))?,
             None => write!(f, "path ")?,
         }
         write!(f, "{} {} N={}", name(self.estimator), name(self.sampler), self.samples)?;
         self.write_estimator(f)?;
+
+        // Written if not the default
         if self.light_sampler != BASE.light_sampler {
             write!(f, " lights={}", name(self.light_sampler))?;
         }
@@ -271,6 +281,7 @@ impl fmt::Display for Configuration {
 
 impl Configuration {
     fn write_estimator(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        // Settings of the estimator
         match self.estimator {
             EstimatorKind::Auto | EstimatorKind::Mc => {}
             EstimatorKind::Mis => {
@@ -312,14 +323,15 @@ impl Configuration {
         Ok(())
     }
 
-    /// The heuristic, if it is not the base's.
+    /// Writes the heuristic if it is not the default.
     fn write_heuristic(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         if self.heuristic == BASE.heuristic { Ok(()) } else { write!(f, " {}", name(self.heuristic)) }
     }
 }
 
-/// The scene with these settings, as an image of `edge` × `edge` pixels of the same rectangle.
+/// Loads the scene with these settings, as an image of `edge` × `edge` pixels of the same rectangle.
 pub(super) fn job(path: &Path, c: &Configuration, edge: u32) -> RenderJob {
+    // Estimator
     let options = LoadOptions { resolution: Some([edge; 2]), ..LoadOptions::default() };
     let mut loaded = load(path, &options).map_err(|d| d.to_string()).unwrap();
     assert_eq!(loaded.settings.sampling.spp, SPP, "{}", path.display());
@@ -338,12 +350,16 @@ pub(super) fn job(path: &Path, c: &Configuration, edge: u32) -> RenderJob {
     settings.ris.target = c.target;
     settings.light_sampler = c.light_sampler;
     settings.contributing.noncontributing_samples = Some(c.noncontributing_samples);
+
+    // Integrator
     if let Some(cached) = c.cached {
         settings.kind = IntegratorKind::IrradianceCache;
         settings.cache.cached = cached;
         settings.cache.samples = 64;
         settings.cache.passes = 32;
     }
+
+    // Sampler, ray tracer and visibility cache
     loaded.settings.sampling.sampler = c.sampler;
     let mut job = loaded.job(c.accel, None).unwrap();
     let visibility_cache = cache_with(&job, c.visibility_cache);

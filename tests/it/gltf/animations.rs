@@ -1,11 +1,11 @@
-//! Animations of glTF scenes at a time, and the camera that frames them.
+//! Animations of glTF scenes, and the automatic camera.
 
 use super::{container, floats, triangle};
 use lumiris::geometry::Shape;
 use lumiris::import::{LoadOptions, load};
 use lumiris_numbers::math::{Vec2, Vec3};
 
-/// A triangle that an animation moves, turns and bends: keys at 1 s and 3 s.
+/// A triangle that is translated, rotated and deformed by an animation with keys at 1 s and 3 s.
 fn animated(rest: &str) -> Vec<u8> {
     let json = format!(
         r#"{{"asset":{{"version":"2.0"}},"scenes":[{{"nodes":[0]}}],"nodes":[{{"mesh":0,"weights":[0.25]}}],
@@ -57,10 +57,10 @@ fn animations_move_nodes_and_bend_meshes_at_a_time() {
         let off = found.iter().zip(expected).map(|(a, b)| (*a - Vec3::from(b)).length()).fold(0.0, f32::max);
         assert!(off < 1e-4, "{time:?}: {found:?}");
     };
-    // At rest: the weight of the node
+    // Without a time: the weight of the node
     near(None, [[0.0, 0.0, 0.0], [1.5, 0.0, 0.0], [0.0, 1.0, 1.0]]);
     near(Some(0.0), [[10.0, 0.0, 0.0], [11.0, 0.0, 0.0], [10.0, 1.0, 0.0]]);
-    // Half of the way: turned by 45°; steps have not been made
+    // Half-way: rotated by 45°; step interpolation is still at the first key
     let half = std::f32::consts::FRAC_1_SQRT_2;
     near(Some(2.0), [[15.0, 0.0, 0.0], [15.0 + half, half, 0.0], [15.0 - half, half, 0.0]]);
     near(Some(7.0), [[20.0, 0.0, 0.0], [20.0, 3.0, 0.0], [19.0, 0.0, 4.0]]);
@@ -92,7 +92,7 @@ fn a_camera_that_frames_an_animation_is_the_same_at_all_times_and_sees_all_of_it
     let first = view(1.0);
     for time in [0.0, 1.7, 2.0, 3.0, 9.0] {
         assert_eq!(view(time), first, "at {time} s");
-        // What is seen lies between the rays of the corners
+        // All of the scene is between the rays of the image corners
         let (_, [(o, a), (_, b), (_, c), (_, d)]) = first;
         let bounds = at(time).geometry.world_bounds();
         for p in [bounds.min, bounds.max] {

@@ -1,4 +1,4 @@
-//! What glTF scenes say of missing and broken files, and that nothing panics.
+//! Missing and broken files of glTF scenes are errors, never panics.
 
 use super::{VALUES, floats, loaded, replaced, triangle};
 use lumiris::import::{LoadOptions, load};
@@ -7,11 +7,14 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 
 #[test]
 fn what_is_not_read_is_an_error_with_its_place() {
+    // A container with one change
     let folder = tempfile::tempdir().unwrap();
     let changed = |from: &str, to: &str| {
         let to = format!("{to:0$}", from.len());
         loaded(folder.path(), &replaced(&triangle(), from, &to)).map(|_| ()).unwrap_err()
     };
+
+    // Errors with their positions
     let error = changed(r#""extensionsUsed":["KHR_lights_punctual"]"#, r#""extensionsRequired":["KHR_draco_mesh"]"#);
     assert!(error.contains("extensionsRequired[0]") && error.contains("KHR_draco_mesh"), "{error}");
     let error = changed(r#""count":3,"type":"VEC3""#, r#""count":9,"type":"VEC3""#);
@@ -31,7 +34,7 @@ fn what_is_not_read_is_an_error_with_its_place() {
     assert!(error.contains("has version 1,"), "{error}");
 }
 
-/// A triangle in text, whose positions, base colour and emission are in files.
+/// A triangle in a text file, with positions, base colour and emission in other files.
 const WITH_FILES: &str = r#"{"asset":{"version":"2.0"},"nodes":[{"mesh":0}],
     "meshes":[{"primitives":[{"attributes":{"POSITION":0},"material":0}]}],
     "materials":[{"pbrMetallicRoughness":{"baseColorTexture":{"index":0}},
@@ -59,7 +62,7 @@ fn missing_buffers_images_and_environments_are_one_list_with_places() {
     }
     assert!(text.contains("5 files cannot") && text.contains("sky.hdr: no such file, asked for by --env"), "{text}");
 
-    // Where the buffers are there, the images are still missing
+    // With the buffers in place, the images are still missing
     for (name, bytes) in [("a.bin", floats(&VALUES[..9])), ("b .bin", vec![0; 4])] {
         std::fs::write(folder.path().join(name), bytes).unwrap();
     }

@@ -21,7 +21,7 @@ fn unlit_surfaces_emit_the_colours_of_their_vertices_and_others_do_not() {
         let [Light::Area(light)] = &loaded.scene.lights.lights[..] else { panic!("{:?}", loaded.scene.lights) };
         light.clone()
     };
-    // The colours are (0, 0, 0), (2, 0, 0) and (0, 0, 4)
+    // The vertex colours are (0, 0, 0), (2, 0, 0) and (0, 0, 4)
     let factor = r#""pbrMetallicRoughness":{"baseColorFactor":[0.5,0.5,0.5,1]}"#;
     let unlit = light(&format!(r#"{factor},"extensions":{{"KHR_materials_unlit":{{}}}}"#)).mean_radiance();
     assert!((unlit - Rgb::new(1.0 / 3.0, 0.0, 2.0 / 3.0)).map(f32::abs).max_component() < 1e-6, "{unlit:?}");
@@ -67,12 +67,12 @@ fn texture_coordinates_beyond_the_second_are_told_once() {
     assert!(!said.contains("TEXCOORD_1"), "{said}");
 }
 
-/// A box 2 wide, with glass that bends nothing and absorbs, seen from outside in white surroundings.
+/// A box of width 2 of absorbing glass that does not refract, from outside in white surroundings.
 fn glass(volume: &str) -> Vec<u8> {
     glass_of(1.0, &format!(r#""KHR_materials_volume":{{{volume}}}"#))
 }
 
-/// A box 2 wide of glass of an index, with extensions, seen from outside in white surroundings.
+/// A box of width 2 of glass with the index `ior` and extensions, from outside in white surroundings.
 fn glass_of(ior: f32, extensions: &str) -> Vec<u8> {
     let json = format!(
         r#"{{"asset":{{"version":"2.0"}},"scenes":[{{"nodes":[0,1]}}],
@@ -89,7 +89,7 @@ fn glass_of(ior: f32, extensions: &str) -> Vec<u8> {
     );
     let corner = |i: usize| [0, 1, 2].map(|axis| if i >> axis & 1 == 1 { 1.0 } else { -1.0 });
     let mut bytes = floats(&(0..8).flat_map(corner).collect::<Vec<f32>>());
-    // Seen from outside, corners go counterclockwise
+    // Counterclockwise from outside
     for [a, b, c, d] in [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]] {
         bytes.extend([a, b, c, a, c, d]);
     }
@@ -103,7 +103,7 @@ fn load_glass(folder: &Path, bytes: &[u8]) -> Loaded {
     load(&path, &options).map_err(|r| r.to_string()).unwrap()
 }
 
-/// The mean colour that is seen.
+/// The mean colour of the image.
 fn color_of(folder: &Path, bytes: &[u8], spp: u32) -> [f32; 3] {
     let job = load_glass(folder, bytes).job(AccelKind::Embree, None).unwrap();
     let settings = RenderSettings { spp, ..RenderSettings::default() };
@@ -128,7 +128,7 @@ fn dispersion_has_the_abbe_number_of_the_file_and_leaves_white_light_white() {
     for (ior, volume) in [(1.5, ""), (1.0, solid), (0.0, solid)] {
         assert!(!load_glass(folder.path(), &with(ior, volume)).scene.materials.has_dispersion(), "{ior} {volume}");
     }
-    // Smooth glass without absorption loses nothing of even light, whatever its wavelength
+    // Smooth glass without absorption loses no uniform light at any wavelength
     let plain = color_of(folder.path(), &glass_of(1.5, &format!(r#""KHR_materials_volume":{{{solid}}}"#)), 1024);
     let dispersed = color_of(folder.path(), &with(1.5, solid), 1024);
     for (a, b) in plain.into_iter().zip(dispersed) {
@@ -144,16 +144,17 @@ fn light_in_a_volume_has_the_colour_of_its_distance() {
         let off = found.iter().zip(expected).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
         assert!(off < 2e-3, "{volume}: {found:?}, not {expected:?}");
     };
-    // Two units of the box are four times the distance
+    // The box is two units wide, four times the attenuation distance
     let attenuation = r#""attenuationColor":[0.9,0.5,1],"attenuationDistance":0.5"#;
     near(&format!(r#""thicknessFactor":1,{attenuation}"#), [0.9_f32.powi(4), 0.5_f32.powi(4), 1.0]);
     near(attenuation, [1.0; 3]);
     near(r#""thicknessFactor":1,"attenuationColor":[0.9,0.5,1]"#, [1.0; 3]);
 }
 
-/// A square of −1..1 with texture coordinates as images have them (0), turned by 90° (1), and tangents along x whose fourth
-/// components are −1 (`TANGENT` 4) and 1 (5); an orthographic camera sees it from +z.
+/// A square of −1..1 with texture coordinates as in images (set 0) or rotated by 90° (set 1), and tangents along x with
+/// the fourth component −1 (`TANGENT` 4) or 1 (`TANGENT` 5). An orthographic camera looks at it from +z.
 fn square(nodes: &str, attributes: &str, rest: &str) -> Vec<u8> {
+    // Document
     let accessor = |(i, width): (usize, usize)| {
         format!(r#"{{"bufferView":0,"byteOffset":{},"componentType":5126,"count":4,"type":"VEC{width}"}}"#, 64 * i)
     };
@@ -167,6 +168,8 @@ fn square(nodes: &str, attributes: &str, rest: &str) -> Vec<u8> {
         "bufferViews":[{{"buffer":0,"byteLength":390}}],"buffers":[{{"byteLength":390}}],{rest}}}"#,
         accessors.join(",")
     );
+
+    // Buffer
     let corners = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]];
     let bytes = |element: &dyn Fn([f32; 2]) -> Vec<f32>| {
         let mut bytes = floats(&corners.iter().flat_map(|&c| element(c)).collect::<Vec<f32>>());
@@ -184,7 +187,7 @@ fn square(nodes: &str, attributes: &str, rest: &str) -> Vec<u8> {
     container(&json, [all.concat(), vec![0, 1, 2, 0, 2, 3]].concat())
 }
 
-/// The channels of an image of 16 × 16 pixels, and their names.
+/// The channel names and values of an image of 16 × 16 pixels.
 fn image_of(bytes: &[u8]) -> (Vec<String>, Vec<f32>) {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.glb");
@@ -211,7 +214,7 @@ fn emitted_and_unlit_images_are_filtered_as_their_samplers_say() {
                 "images":[{{"uri":"data:image/png;base64,{image}"}}]"#
             );
             let (names, data) = image_of(&square(r#"{"mesh":0}"#, "", &rest));
-            // Within the quadrant, two pixels from the next: the pixel filter has a radius of 1.5
+            // Inside the quadrant, two pixels from the next; the pixel filter has a radius of 1.5
             let pixel = &data[names.len() * (16 * 5 + 5)..][..3];
             let is_red = (pixel[0] - 1.0).abs() < 1e-3 && pixel[1].max(pixel[2]) < 1e-3;
             assert_eq!(is_red, is_nearest, "{material} {filter}: {pixel:?}");
@@ -240,7 +243,7 @@ fn normal_maps_have_the_bitangents_of_their_tangents_or_of_their_texture_coordin
         (plain, "", 0, up),
         (plain, r#","TANGENT":5"#, 0, up),
         (plain, r#","TANGENT":4"#, 0, down),
-        // A mirror image, which only turns what is along x
+        // A mirrored node flips only the component along x
         (mirrored, r#","TANGENT":5"#, 0, up),
         (mirrored, r#","TANGENT":4"#, 0, down),
         (plain, r#","TEXCOORD_1":3"#, 0, up),

@@ -1,5 +1,4 @@
-//! glTF scenes: what small ones become, that they look like the same scenes of pbrt, and that broken ones are refused
-//! without a panic.
+//! glTF scenes: contents of small files, agreement with the same scenes in pbrt format, and errors without panics.
 
 mod animations;
 mod broken;
@@ -16,7 +15,7 @@ use lumiris_numbers::math::{Bounds3, Vec2, Vec3};
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
-/// A container of some JSON and bytes.
+/// A container with a JSON document and a buffer.
 fn container(json: &str, mut bytes: Vec<u8>) -> Vec<u8> {
     let mut text = json.as_bytes().to_vec();
     text.resize(text.len().next_multiple_of(4), b' ');
@@ -35,7 +34,7 @@ fn floats(values: &[f32]) -> Vec<u8> {
     values.iter().flat_map(|v| v.to_le_bytes()).collect()
 }
 
-/// A container of a triangle with a principled material, a light and a camera.
+/// A container with a triangle of a principled material, a light and a camera.
 fn triangle() -> Vec<u8> {
     let json = r#"{"asset":{"version":"2.0"},"scene":0,"extensionsUsed":["KHR_lights_punctual"],
         "extensions":{"KHR_lights_punctual":{"lights":[{"type":"point","intensity":683}]}},
@@ -61,8 +60,8 @@ fn loaded(folder: &Path, bytes: &[u8]) -> Result<Loaded, String> {
     load(&path, &LoadOptions::default()).map_err(|report| report.to_string())
 }
 
-/// Bounds of the scene of `nodes` and `rest`, whose accessors have `values`: three vectors each, but a matrix for the
-/// third one.
+/// Bounds of the scene of `nodes` and `rest`. The accessors have `values`: three vectors each, except for the third
+/// one, which has a matrix.
 fn bounds(nodes: &str, rest: &str, values: &[f32]) -> Result<(Bounds3, Loaded), String> {
     let json = format!(
         r#"{{"asset":{{"version":"2.0"}},"scenes":[{{"nodes":[0,1]}}],"nodes":[{nodes}],{rest},
@@ -81,21 +80,21 @@ fn bounds(nodes: &str, rest: &str, values: &[f32]) -> Result<(Bounds3, Loaded), 
     Ok((loaded.scene.geometry.world_bounds(), loaded))
 }
 
-/// A triangle, the changes of its vertices, and a translation by (0, 0, 5).
+/// A triangle, morph offsets of its vertices, and a translation by (0, 0, 5).
 const VALUES: [f32; 34] = [
     0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, // vertices
     0.0, 0.0, 0.0, 2.0, 0.0, 0.0, 0.0, 0.0, 4.0, // changes
     1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 5.0, 1.0,
 ];
 
-/// A file in which a text is another of the same length.
+/// A file with one text replaced by another of the same length.
 fn replaced(file: &[u8], from: &str, to: &str) -> Vec<u8> {
     assert_eq!(from.len(), to.len());
     let at = file.windows(from.len()).position(|w| w == from.as_bytes()).unwrap();
     [&file[..at], to.as_bytes(), &file[at + from.len()..]].concat()
 }
 
-/// A file of one pixel.
+/// An image of one pixel.
 const PIXEL: &str = "iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAIAAACQd1PeAAAADElEQVR4nGNoaPgPAAODAgAApfuJAAAAAElFTkSuQmCC";
 
 #[test]
@@ -116,7 +115,7 @@ fn lights_are_in_watts_or_in_the_candela_of_emission() {
         let options = LoadOptions { light_units, ..LoadOptions::default() };
         load(&path, &options).unwrap().scene.lights.lights[0].phi(1.0)
     };
-    // Blanks make up for the length of the word
+    // Blanks compensate for the different lengths
     let [point, sun] = [("point", 8), ("directional", 2)]
         .map(|(kind, blanks)| format!("\"type\":\"{kind}\",\"intensity\":683}}]}}}},\n{:blanks$}\"scenes\"", ""));
     let sun = replaced(&triangle(), &point, &sun);
@@ -160,7 +159,7 @@ fn a_scene_looks_like_the_same_scene_of_pbrt() {
         let settings = RenderSettings { spp: 16, ..RenderSettings::default() };
         channels(&render(&job, &settings, &AtomicBool::new(false), &|_| ()).unwrap().film, &[], None).data
     });
-    // The cameras are not the same to the bit, so a few samples at edges may differ
+    // The cameras differ by rounding, so a few samples at edges may differ
     let different = a.iter().zip(&b).filter(|(a, b)| (*a - *b).abs() > 1e-3 * a.abs().max(1e-3)).count();
     assert!(different * 50 < a.len(), "{different} of {} values differ", a.len());
     let [sum_a, sum_b]: [f32; 2] = [&a, &b].map(|data| data.iter().sum());
@@ -171,7 +170,7 @@ fn a_scene_looks_like_the_same_scene_of_pbrt() {
 fn an_environment_is_seen_as_it_is_stored() {
     let folder = tempfile::tempdir().unwrap();
     let (path, sky) = (folder.path().join("a.gltf"), folder.path().join("sky.pfm"));
-    // Columns of 90°: the first two meet in direction −z; the lower row is the first one
+    // Columns of 90°: the first two meet in direction −z; the lower row is stored first
     let colors = |row: f32| [[1.0, 0.0, row], [0.0, 1.0, row], [0.0, 0.0, row], [0.0, 0.0, row]].concat();
     std::fs::write(&sky, [b"PF\n4 2\n-1.0\n".to_vec(), floats(&colors(0.0)), floats(&colors(1.0))].concat()).unwrap();
     let json = r#"{"asset":{"version":"2.0"},"nodes":[{"camera":0}],
@@ -199,7 +198,7 @@ fn orthographic_cameras_see_all_that_they_ask_for() {
         std::fs::write(&path, json).unwrap();
         let scene = load(&path, &LoadOptions { resolution, ..LoadOptions::default() }).unwrap().scene;
         let inverse = scene.camera.ndc_from_world().unwrap().inverse();
-        // From corner to corner of the image, whatever it calls them
+        // Distance between opposite corners of the image, in either order
         let corners = [Vec3::ZERO, Vec3::new(1.0, 1.0, 0.0)].map(|ndc| inverse.project_point3(ndc));
         (scene.film.resolution, (corners[1] - corners[0]).abs().truncate())
     };
@@ -211,7 +210,7 @@ fn orthographic_cameras_see_all_that_they_ask_for() {
     near(seen(None, high), ([360, 720], [2.0, 4.0]));
     near(seen(Some([50, 100]), high), ([50, 100], [2.0, 4.0]));
     near(seen(Some([100, 100]), high), ([100, 100], [4.0, 4.0]));
-    // The width is what the height follows
+    // The height follows from the width
     near(seen(Some([100, 400]), high), ([100, 400], [2.0, 8.0]));
     near(seen(None, r#""ymag":3,"#), ([720, 720], [6.0, 6.0]));
     near(seen(None, r#""xmag":0,"ymag":0,"#), ([1280, 720], [2.0 * 16.0 / 9.0, 2.0]));

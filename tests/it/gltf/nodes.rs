@@ -1,4 +1,4 @@
-//! Nodes of glTF scenes: instances, skins, weights, scales, chains, and what is hidden.
+//! Nodes of glTF scenes: instances, skins, weights, scales, chains, and visibility.
 
 use super::{VALUES, bounds, container, floats, loaded};
 use lumiris::geometry::Shape;
@@ -84,7 +84,7 @@ fn meshes_that_stand_twice_are_instances() {
 #[test]
 fn nodes_with_a_scale_of_zero_flatten_their_meshes() {
     let mesh = r#""meshes":[{"primitives":[{"attributes":{"POSITION":1,"NORMAL":0}}]}]"#;
-    // With a z of its own
+    // With different z
     let mut values = VALUES;
     values[9..18].copy_from_slice(&[0.0, 0.0, 0.0, 1.0, 0.0, 2.0, 0.0, 1.0, 4.0]);
     values[..9].copy_from_slice(&[0.6, 0.0, 0.8, 0.6, 0.0, 0.8, 0.6, 0.0, 0.8]);
@@ -93,7 +93,7 @@ fn nodes_with_a_scale_of_zero_flatten_their_meshes() {
     assert_eq!((one.min, one.max), (Vec3::new(0.0, 0.0, 7.0), Vec3::new(1.0, 1.0, 7.0)));
     let hit = loaded.scene.geometry.surface_hit(0, 0, u32::MAX, [0.2, 0.2], 0.0);
     assert!((hit.n - Vec3::Z).length() < 1e-6 && (hit.ns - Vec3::Z).length() < 1e-6, "{hit:?}");
-    // Beside instances, which have inverses
+    // Together with instances, which need inverse matrices
     let nodes = format!(r#"{{"children":[2,3]}},{flat},{{"mesh":0}},{{"mesh":0,"translation":[1,0,0]}}"#);
     let (all, loaded) = bounds(&nodes, mesh, &values).unwrap();
     let geometry = &loaded.scene.geometry;
@@ -102,7 +102,7 @@ fn nodes_with_a_scale_of_zero_flatten_their_meshes() {
     assert!(loaded.job(AccelKind::Embree, None).is_ok());
 }
 
-/// A document of `n` nodes in a chain, which have a mesh and a material each.
+/// A document with a chain of `n` nodes, each with a mesh and a material.
 fn chain(n: usize) -> String {
     let list = |item: &dyn Fn(usize) -> String| (0..n).map(item).collect::<Vec<_>>().join(",");
     let children = |i: usize| if i + 1 < n { format!(r#","children":[{}]"#, i + 1) } else { String::new() };
@@ -128,6 +128,7 @@ fn chains_of_nodes_may_be_as_deep_as_they_are_long() {
 
 #[test]
 fn primitives_take_their_own_vertices_of_a_shared_accessor() {
+    // A mesh with three of 40 vertices
     let json = r#"{"asset":{"version":"2.0"},"nodes":[{"mesh":0}],
         "meshes":[{"primitives":[{"attributes":{"POSITION":0,"COLOR_0":0},"indices":1}]}],
         "accessors":[{"bufferView":0,"componentType":5126,"count":40,"type":"VEC3"},
@@ -140,6 +141,8 @@ fn primitives_take_their_own_vertices_of_a_shared_accessor() {
         let folder = tempfile::tempdir().unwrap();
         loaded(folder.path(), &container(json, bytes))
     };
+
+    // Only these are stored
     let scene = with([30, 4, 17]).unwrap().scene;
     let Shape::Mesh(mesh) = &scene.geometry.geometries[0].shape else { panic!("a mesh") };
     assert_eq!((mesh.positions().len(), mesh.colors.len()), (3, 3));

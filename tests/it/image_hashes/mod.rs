@@ -1,9 +1,9 @@
 //! Images that must not change by a bit: a list of scenes × integrators × estimators × samplers, each with the hash of
 //! its raw film.
 //!
-//! The list is `list.txt`. A change that is meant to change images writes it anew,
-//! `LUMIRIS_BLESS=1 cargo test --test it image_hashes`, and says which rows and why. The rows hold for every machine,
-//! Embree and operating system: what they depend on is arithmetic that IEEE 754 defines.
+//! The list is `list.txt`. A change that is meant to change images writes the list again with `LUMIRIS_BLESS=1 cargo
+//! test --test it image_hashes`, and reports the changed rows and the reason. The rows are valid for every machine,
+//! Embree and operating system, since they depend only on arithmetic defined by IEEE 754.
 
 use lumiris::film::Film;
 use lumiris::import::{LoadOptions, load};
@@ -14,7 +14,7 @@ use std::fmt::Write;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 
-/// Scenes: a name, the file, width and height. Those of `scenes/analytic` are open, and lose nearly all photons: they
+/// Scenes: name, file, width and height. The scenes of `scenes/analytic` are open and lose nearly all photons, so they
 /// have no rows with photons.
 const SCENES: [(&str, &str, [u32; 2]); 5] = [
     ("gallery", "scenes/demo/gallery.pbrt", [40, 24]),
@@ -24,7 +24,7 @@ const SCENES: [(&str, &str, [u32; 2]); 5] = [
     ("half-sky", "scenes/analytic/half-environment.pbrt", [8, 8]),
 ];
 
-/// Integrators: a name and the directive, as in a scene file.
+/// Integrators: name, and directive as in a scene file.
 const INTEGRATORS: [(&str, &str); 22] = [
     ("direct mc", r#""direct" "string estimator" "mc" "integer samples" 2"#),
     ("direct mis", r#""direct" "string estimator" "mis""#),
@@ -73,13 +73,13 @@ const INTEGRATORS: [(&str, &str); 22] = [
     ("direct ocv pixels", r#""direct" "string estimator" "ocv" "integer samples" 4"#),
 ];
 
-/// Samplers, which take turns over the integrators.
+/// Samplers, distributed over scenes and integrators in turn.
 const SAMPLERS: [&str; 4] = ["zsobol", "independent", "sobol", "stratified"];
 
-/// Samples per pixel: a block of three lengths for what is fitted in blocks.
+/// Samples per pixel: the smallest number with blocks of three lengths, for estimators that fit in blocks.
 const SPP: u32 = 4;
 
-/// FNV-1a, 64 bits: a hash of fixed definition.
+/// FNV-1a, 64 bits: a hash with a fixed definition.
 struct Hash(u64);
 
 impl Hash {
@@ -90,7 +90,7 @@ impl Hash {
     }
 }
 
-/// The hash of all sums that an image is made of.
+/// The hash of all sums of a film.
 fn hash(film: &Film) -> u64 {
     let mut hash = Hash(0xcbf2_9ce4_8422_2325);
     for p in film.pixels() {
@@ -102,7 +102,7 @@ fn hash(film: &Film) -> u64 {
     hash.0
 }
 
-/// An image of 64 × 64 coloured tiles of many sizes, as text.
+/// An image of 64 × 64 pixels with coloured tiles of many sizes, as text.
 fn tiles() -> String {
     let mut text = String::from("P3\n64 64\n255\n");
     for y in 0..64_u32 {
@@ -138,6 +138,7 @@ fn row(folder: &Path, scene: &str, size: [u32; 2], sampler: &str, integrator: &s
 
 #[test]
 fn images_have_the_hashes_of_the_list() {
+    // Hash all images
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("tiles.ppm"), tiles()).unwrap();
     let mut found = String::new();
@@ -152,6 +153,7 @@ fn images_have_the_hashes_of_the_list() {
         }
     }
 
+    // Compare with the list
     let list = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/it/image_hashes/list.txt");
     if std::env::var_os("LUMIRIS_BLESS").is_some() {
         std::fs::write(&list, &found).unwrap();

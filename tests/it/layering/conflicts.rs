@@ -1,4 +1,4 @@
-//! No file of the repository has marks of a merge that was left half done.
+//! No file of the repository has conflict markers of an unfinished merge.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -7,14 +7,15 @@ use std::process::Command;
 /// Folders that are never committed, for sources without a repository.
 const NOT_COMMITTED: [&str; 2] = ["target", ".git"];
 
-/// Lines that git leaves where two changes meet. A line of equals signs alone may also underline a heading.
+/// Returns the line of the first conflict marker. Lines of equals signs are ignored, since they can underline a
+/// heading.
 fn conflict(text: &[u8]) -> Option<usize> {
     let is_mark =
         |line: &[u8]| [b'<', b'>', b'|'].iter().any(|&mark| line.starts_with(&[mark; 7]) && line.get(7) == Some(&b' '));
     text.split(|&b| b == b'\n').position(is_mark).map(|line| line + 1)
 }
 
-/// The tracked files; all files where git, or its repository, is missing.
+/// The tracked files; all files if git or its repository is missing.
 fn files(root: &Path) -> Vec<PathBuf> {
     let tracked = Command::new("git").args(["ls-files", "-z"]).current_dir(root).output();
     if let Some(output) = tracked.ok().filter(|output| output.status.success() && !output.stdout.is_empty()) {
@@ -40,7 +41,7 @@ fn no_file_has_marks_of_a_merge() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let files = files(root);
     assert!(files.iter().any(|path| path.ends_with("docs/architecture.md")), "the documents are looked at");
-    // A tracked file may have been removed from the folder
+    // A tracked file may have been deleted from the working tree
     let read = files.iter().filter_map(|path| Some((path, fs::read(path).ok()?)));
     let marked = read.filter_map(|(path, text)| Some(format!("{}:{}", path.display(), conflict(&text)?)));
     let marked: Vec<String> = marked.collect();

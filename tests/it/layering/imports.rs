@@ -1,4 +1,4 @@
-//! Imports of a crate, read from its sources as text.
+//! Imports of a crate, parsed from the text of its sources.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -15,12 +15,12 @@ struct Source {
     code: String,
 }
 
-/// One module names something of another.
+/// An import from another module.
 #[derive(Debug)]
 pub(super) struct Import {
-    /// The module that imports.
+    /// The importing module.
     pub from: Module,
-    /// The module that defines what is imported.
+    /// The module that defines the imported item.
     pub to: Module,
     /// The importing file.
     pub file: String,
@@ -43,7 +43,7 @@ impl Crate {
         Crate { name: name.to_owned(), sources }
     }
 
-    /// Files in which another crate is named.
+    /// Files that name another crate.
     pub(super) fn files_that_name<'a>(&'a self, name: &str) -> impl Iterator<Item = &'a str> {
         let path = format!("{name}::");
         let names = move |s: &&Source| {
@@ -60,7 +60,7 @@ impl Crate {
         for source in &self.sources {
             for path in paths(&source.code) {
                 let Some(mut path) = absolute(&source.module, &path) else { continue };
-                // A name that a module re-exports belongs to the module that defines it.
+                // An item that a module re-exports belongs to the module that defines it
                 let mut to = self.longest_module(&path);
                 while let Some(target) = path.get(to.len()).and_then(|name| re_exports.get(&to)?.get(name)) {
                     path = [target.clone(), path.split_off(to.len())].concat();
@@ -77,7 +77,7 @@ impl Crate {
         imports
     }
 
-    /// Names that `pub use` of a file brings from modules of the crate, with those modules.
+    /// Names that a file re-exports with `pub use` from modules of the crate, with those modules.
     fn re_exports(&self, source: &Source) -> BTreeMap<String, Module> {
         let mut names = BTreeMap::new();
         for statement in source.code.split(';').filter_map(|s| s.rsplit_once("pub use ")) {
@@ -94,7 +94,7 @@ impl Crate {
         names
     }
 
-    /// The module that a path names, or the one that holds what it names.
+    /// The module named by a path, or the module that contains the named item.
     fn longest_module(&self, path: &[String]) -> Module {
         let is_module = |n: &usize| self.sources.iter().any(|s| s.module == path[..*n]);
         path[..(0..=path.len()).rev().find(is_module).unwrap_or(0)].to_vec()
@@ -102,6 +102,7 @@ impl Crate {
 }
 
 fn visit(folder: &Path, module: &mut Module, sources: &mut Vec<Source>) {
+    // Sources without tests, folders recursively
     for entry in fs::read_dir(folder).unwrap() {
         let path = entry.unwrap().path();
         let stem = path.file_stem().unwrap().to_string_lossy().into_owned();
@@ -123,7 +124,7 @@ fn visit(folder: &Path, module: &mut Module, sources: &mut Vec<Source>) {
     }
 }
 
-/// The text without comments, and without the unit tests at its foot.
+/// The text without comments, and without the unit tests at its end.
 fn code_of(text: &str) -> String {
     let code = text.split("#[cfg(test)]\nmod tests {").next().unwrap_or_default();
     code.lines().map(|line| line.split("//").next().unwrap_or_default()).collect::<Vec<_>>().join("\n")
@@ -138,7 +139,7 @@ fn paths(code: &str) -> Vec<Vec<String>> {
             if before.ends_with(|c: char| c == '_' || c == ':' || c.is_alphanumeric()) || before.ends_with("pub(in ") {
                 continue;
             }
-            // A use tree ends at its semicolon, another path where its words end.
+            // A use tree ends at its semicolon, other paths at their last word
             let line = before.rsplit(['\n', ';']).next().unwrap_or_default().trim();
             let rest = &code[i..];
             let end = if line.ends_with("use") {
@@ -152,8 +153,9 @@ fn paths(code: &str) -> Vec<Vec<String>> {
     found
 }
 
-/// The paths of a use tree: `a::{b, c::d}` is `a::b` and `a::c::d`.
+/// Expands a use tree: `a::{b, c::d}` is `a::b` and `a::c::d`.
 fn expand(tree: &str) -> Vec<Vec<String>> {
+    // Without braces
     let tree = tree.trim();
     let Some((head, rest)) = tree.split_once('{') else {
         let plain = tree.split(" as ").next().unwrap_or_default();
@@ -161,6 +163,8 @@ fn expand(tree: &str) -> Vec<Vec<String>> {
         let keeps_self = plain.starts_with("self::").then(|| "self".to_owned());
         return vec![keeps_self.into_iter().chain(words.map(str::to_owned)).collect()];
     };
+
+    // Split at the commas outside of inner braces
     let inner = rest.rsplit_once('}').map_or(rest, |(inner, _)| inner);
     let (mut parts, mut depth, mut start) = (Vec::new(), 0, 0);
     for (i, c) in inner.char_indices() {
@@ -175,6 +179,8 @@ fn expand(tree: &str) -> Vec<Vec<String>> {
         }
     }
     parts.push(&inner[start..]);
+
+    // Expand each part
     let head = head.trim_end_matches("::");
     let below = |part: &str| expand(&format!("{head}::{}", part.trim()));
     parts.iter().filter(|part| !part.trim().is_empty()).flat_map(|part| below(part)).collect()

@@ -1,8 +1,8 @@
-//! What may import what: crates, the renderer's modules by layer, and no circles inside a folder. And no file has
-//! marks of a merge that was left half done ([`conflicts`]).
+//! Allowed imports: between crates, between the renderer's modules by layer, and without cycles inside a folder. No
+//! file has conflict markers of an unfinished merge ([`conflicts`]).
 //!
-//! [`imports`] reads the sources. A folder's `mod.rs` is its interface: it declares and re-exports the files of the
-//! folder, and they use what it defines; that alone is no circle.
+//! [`imports`] parses the sources. A folder's `mod.rs` is its interface: it declares and re-exports the files of the
+//! folder, and they use its items; this alone is no cycle.
 
 mod conflicts;
 mod imports;
@@ -28,7 +28,7 @@ const CRATES: &[(&str, &str, &[&str])] = &[
     ("crates/test-support", "lumiris_test_support", &["lumiris_numbers"]),
 ];
 
-/// Modules of the renderer by layer; a module may import from strictly smaller layers.
+/// Modules of the renderer by layer. A module may import only from lower layers.
 const LAYERS: &[&[&str]] = &[
     &["imaging"],
     &["textures", "geometry", "bsdfs", "media", "cameras", "film"],
@@ -41,7 +41,7 @@ const LAYERS: &[&[&str]] = &[
     &["render"],
 ];
 
-/// Modules of the arithmetic and what each may import.
+/// Modules of the numbers crate, with the modules that each may import.
 const NUMBERS: &[(&str, &[&str])] = &[("math", &[]), ("estimators", &["math"]), ("samplers", &["math"])];
 
 fn workspace() -> Vec<Crate> {
@@ -95,7 +95,7 @@ fn modules_import_only_from_lower_layers() {
     assert!(violations.is_empty(), "{}", violations.join("\n"));
 }
 
-/// What imports what inside each folder: folder, then importer, then imported.
+/// Import graphs inside each folder: folder, importing file, imported files.
 fn graphs(krate: &Crate) -> BTreeMap<String, BTreeMap<String, BTreeSet<String>>> {
     let mut graphs: BTreeMap<_, BTreeMap<_, BTreeSet<_>>> = BTreeMap::new();
     for Import { from, to, .. } in krate.imports() {
@@ -107,7 +107,7 @@ fn graphs(krate: &Crate) -> BTreeMap<String, BTreeMap<String, BTreeSet<String>>>
     graphs
 }
 
-/// What can be reached from `start`.
+/// All nodes that are reachable from `start`.
 fn reachable<'a>(graph: &'a BTreeMap<String, BTreeSet<String>>, start: &str) -> BTreeSet<&'a str> {
     let mut found = BTreeSet::new();
     let mut open = vec![start];

@@ -1,4 +1,4 @@
-//! Media where estimators and ray tracers must agree: fog, smoke that glows, and surfaces that rays may pass.
+//! Media in which estimators and ray tracers must agree: fog, glowing smoke, and interface surfaces.
 
 use super::{BOX, assert_answer, assert_they_agree, camera, choose, estimators, grid, job, means, media};
 use crate::path_reuse::image_of_seed;
@@ -12,7 +12,7 @@ use lumiris::settings::{EstimatorKind, IntegratorSettings, Proposals, Target};
 use lumiris_numbers::math::Vec3;
 use std::sync::atomic::AtomicBool;
 
-/// Area lights, one at infinity and a glowing medium in fog before a wall.
+/// Area lights, an infinite light and a glowing medium, in fog in front of a wall.
 fn fog(depth: u32) -> String {
     camera("0.1 0.2 3", "", depth)
         + &format!(
@@ -30,8 +30,8 @@ fn fog(depth: u32) -> String {
         )
 }
 
-/// Light of area lights, of one at infinity and of a glowing medium in fog before a wall, by every estimator and both ray
-/// tracers: nobody knows the answer, but all agree on it. What glows beyond the last vertex counts.
+/// Area lights, an infinite light and a glowing medium, in fog in front of a wall, with every estimator and both ray
+/// tracers. The answer is unknown, but all agree on it. Emission beyond the last vertex counts.
 #[test]
 fn estimators_and_ray_tracers_agree_in_fog_with_surfaces() {
     for depth in [1, 4] {
@@ -47,7 +47,7 @@ fn estimators_and_ray_tracers_agree_in_fog_with_surfaces() {
     }
 }
 
-/// The same to half a percent: every estimator beside `mis` with two samples.
+/// The same to half a percent: every estimator against `mis` with two samples.
 #[test]
 #[ignore = "of `make test-power` only"]
 fn estimators_agree_in_fog_to_half_a_percent() {
@@ -64,10 +64,11 @@ fn estimators_agree_in_fog_to_half_a_percent() {
     }
 }
 
-/// Where media lie behind glass only, shadow segments never come into one: `mis` has its columns, and pixels share paths. A
+/// If all media are behind glass, shadow segments never enter one: `mis` has its columns, and pixels share paths. A
 /// wall behind a ball of coloured glass, in a corner of white walls.
 #[test]
 fn behind_glass_alone_media_leave_shadow_segments_and_shared_paths_as_they_are() {
+    // Scene
     let text = |sigma: &str| {
         camera("0.1 0.1 3", "", 6)
             + &format!(
@@ -81,6 +82,8 @@ fn behind_glass_alone_media_leave_shadow_segments_and_shared_paths_as_they_are()
                 Shape "trianglemesh" "point3 P" [-1 2 -0.5  1 2 -0.5  1 2 1.5  -1 2 1.5] "integer indices" [0 1 2 0 2 3]"#
             )
     };
+
+    // Estimators, with and without shared paths
     let mut job = job(&text("0.2 0.5 1"), AccelKind::Embree);
     assert!(allows(&job, Feature::Sharing));
     let mut answers = Vec::new();
@@ -96,11 +99,12 @@ fn behind_glass_alone_media_leave_shadow_segments_and_shared_paths_as_they_are()
     assert_they_agree(&answers, 0.1);
 }
 
-/// A sheet before a lamp, half of which is nothing and the other half black, lets half of the light through, without a medium
-/// as well: L = ρ/π · I/d² · 1/2.
+/// A sheet in front of a lamp, half interface and half black, transmits half of the light, also without media: L = ρ/π
+/// · I/d² · 1/2.
 #[test]
 fn surfaces_that_rays_may_pass_let_light_through_where_there_are_no_media() {
     for depth in [1, 4] {
+        // Scene
         let text = camera("0 0 1", "", depth)
             + r#"LightSource "point" "rgb I" [ 1 2 4 ] "point3 from" [ 0 0 2 ]
             Material "diffuse" "rgb reflectance" [ 0.5 0.5 0.5 ]
@@ -111,6 +115,8 @@ fn surfaces_that_rays_may_pass_let_light_through_where_there_are_no_media() {
             Shape "bilinearmesh" "point3 P" [ -9 -9 1.5  9 -9 1.5  -9 9 1.5  9 9 1.5 ]"#;
         let mut job = job(&text, AccelKind::Embree);
         assert!(job.world.scene.media.is_empty() && !allows(&job, Feature::Sharing));
+
+        // Every estimator has the answer
         let answer = [1.0, 2.0, 4.0].map(|i| 0.5 / std::f64::consts::PI * i / 4.0 * 0.5);
         for (name, settings) in estimators() {
             choose(&mut job, &settings);
@@ -118,16 +124,19 @@ fn surfaces_that_rays_may_pass_let_light_through_where_there_are_no_media() {
         }
         job.change(|s| (s.integrator.estimator, s.integrator.samples) = (EstimatorKind::Ocv, Some(4)));
         assert_answer(&mut job, 64, answer, 0.2, &format!("ocv, {depth} bounces"));
+
+        // The target Gv is refused
         job.change(|s| (s.integrator.estimator, s.integrator.ris.target) = (EstimatorKind::Ris, Target::Gv));
         let refused = render(&job, &RenderSettings::default(), &AtomicBool::new(false), &|_| ());
         assert!(refused.err().is_some_and(|error| error.to_string().contains("interface")));
     }
 }
 
-/// Beyond the last vertex, too, a medium glows: before a wall of reflectance ρ in what absorbs and emits, without end,
-/// L = L_e (1 − T) + T ρ L_e.
+/// A medium also glows beyond the last vertex. In front of a wall of reflectance ρ in an infinite absorbing and
+/// emitting medium, L = L_e (1 − T) + T ρ L_e.
 #[test]
 fn what_glows_beyond_the_last_vertex_lights_it() {
+    // Scene
     let camera = camera("0 0 2", "fire", 1).replace(
         "Translate",
         "MakeNamedMedium \"fire\" \"rgb sigma_a\" [0.3 0.6 1] \"rgb sigma_s\" [0 0 0] \"rgb Le\" [2 1 0.5]\nTranslate",
@@ -135,12 +144,16 @@ fn what_glows_beyond_the_last_vertex_lights_it() {
     let text = camera
         + r#"MediumInterface "" "fire" Material "diffuse" "rgb reflectance" [0.5 0.5 0.8]
         Shape "trianglemesh" "point3 P" [-90 -90 0  90 -90 0  90 90 0  -90 90 0] "integer indices" [0 1 2 0 2 3]"#;
+
+    // Answer
     let le = [2.0, 1.0, 0.5];
     let (sigma, rho) = ([0.3_f64, 0.6, 1.0], [0.5, 0.5, 0.8]);
     let answer = std::array::from_fn(|c| {
         let t = (-2.0 * sigma[c]).exp();
         le[c] * (1.0 - t) + t * rho[c] * le[c]
     });
+
+    // Estimators
     let mut job = job(&text, AccelKind::Embree);
     for (estimator, settings) in estimators() {
         choose(&mut job, &settings);
@@ -148,8 +161,8 @@ fn what_glows_beyond_the_last_vertex_lights_it() {
     }
 }
 
-/// A wall beside what glows, of which the boundary lets half be seen: L = ρ/π ∫ σ_a L_e cos θ/r² dV over that half, where next to nothing
-/// is absorbed. Light samples find it, and so do paths alone.
+/// A wall beside a glowing medium whose boundary contains half of it: L = ρ/π ∫ σ_a L_e cos θ/r² dV over that half,
+/// with negligible absorption. Light samples find it, and so do BSDF paths.
 #[test]
 fn light_samples_find_what_glows_where_it_is_and_not_beyond_its_boundary() {
     let place = r#""point3 p0" [0.5 -0.5 -0.9] "point3 p1" [1.3 0.3 0.1] "integer nx" 4 "integer ny" 4 "integer nz" 4"#;
@@ -169,7 +182,7 @@ fn light_samples_find_what_glows_where_it_is_and_not_beyond_its_boundary() {
     let mut job = job(&text, AccelKind::Embree);
     let Medium::Heterogeneous(fire) = job.world.scene.media.media[0].clone() else { panic!("no grid") };
     let at = Vec3::new(0.1, -0.2, -1.0);
-    // By the rule of midpoints, in the unit cube, of which the boundary holds the lower half along x
+    // Midpoint rule in the unit cube; the boundary contains the lower half along x
     let (steps, mut irradiance) = (64, [0.0_f64; 3]);
     for i in 0..steps * steps * steps / 2 {
         let place = [i % (steps / 2), i / (steps / 2) % steps, i / (steps * steps / 2)];
@@ -192,11 +205,12 @@ fn light_samples_find_what_glows_where_it_is_and_not_beyond_its_boundary() {
     }
 }
 
-/// Smoke that glows and scatters, before a wall and around a glossy ball, with a lamp and a sky: nobody knows the answer, but all
-/// estimators agree on it.
+/// Smoke that glows and scatters, in front of a wall and around a glossy ball, with a lamp and a sky. The answer is
+/// unknown, but all estimators agree on it.
 #[test]
 fn estimators_agree_where_smoke_glows() {
     for depth in [1, 4] {
+        // Scene
         let text = camera("0.1 0.2 3", "", depth)
             + &format!(
                 r#"MakeNamedMedium "smoke" {} LightSource "infinite" "rgb L" [0.2 0.3 0.4]
@@ -207,6 +221,8 @@ fn estimators_agree_where_smoke_glows() {
                 "point3 P" [1.5 -0.5 0  1.9 -0.5 0.1  1.7 -0.2 0] "integer indices" [0 1 2]"#,
                 media(0.6, 0.8, r#""rgb Le" [3 2 1]"#)[1].1
             );
+
+        // Estimators
         let mut job = job(&text, AccelKind::Embree);
         let mut answers = Vec::new();
         for (name, settings) in estimators() {

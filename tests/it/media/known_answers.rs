@@ -1,10 +1,10 @@
-//! Media whose images are known: even light, the law of Beer, single scattering, coloured glass.
+//! Media with known images: uniform light, Beer's law, single scattering, coloured glass.
 
 use super::{BOX, assert_answer, camera, choose, cloud, estimators, in_even_light, job, media};
 use lumiris::scene::AccelKind;
 
-/// In even light, what only scatters is not seen: an environment of radiance 1 around a box of albedo 1, whatever the medium,
-/// phase function and estimator.
+/// In uniform light, a medium that only scatters is invisible: an environment of radiance 1 around a box of albedo 1,
+/// for every medium, phase function and estimator.
 #[test]
 fn a_medium_that_only_scatters_is_invisible_in_even_light() {
     let mut all = media(1.2, 0.0, "");
@@ -18,7 +18,7 @@ fn a_medium_that_only_scatters_is_invisible_in_even_light() {
     }
 }
 
-/// The same where it absorbs as much as it emits: L_e = 1 is the radiance of everything.
+/// A medium that emits as much as it absorbs is invisible, too: L_e = 1 is the radiance everywhere.
 #[test]
 fn a_medium_in_equilibrium_with_its_surroundings_is_invisible() {
     for (name, medium) in media(0.8, 1.0, r#""rgb Le" [1 1 1]"#) {
@@ -30,8 +30,8 @@ fn a_medium_in_equilibrium_with_its_surroundings_is_invisible() {
     }
 }
 
-/// Beer's law: T = exp(−σ d) of light behind a box of the thickness 2, exactly where the medium is homogeneous. In a grid, the
-/// density falls to one half of the outermost sample at the walls.
+/// Beer's law: T = exp(−σ d) for light behind a box of thickness 2, exact in homogeneous media. In a grid, the density
+/// falls to one half of the outermost sample at the walls.
 #[test]
 fn what_only_absorbs_weakens_light_by_the_law_of_beer() {
     let sigma = [0.3_f64, 0.9, 1.7];
@@ -54,7 +54,7 @@ fn what_only_absorbs_weakens_light_by_the_law_of_beer() {
     let two = format!(r#""string type" "uniformgrid" {colors} "float density" [1 3] "integer nz" 2 {bounds}"#);
     let mut two = job(&slab(&two), AccelKind::Embree);
     assert_answer(&mut two, 64, sigma.map(|s| 2.0 * (-3.5 * s).exp()), 0.4, "a grid of two samples");
-    // The medium moves with the transformation where it is defined
+    // The medium has the transformation of its definition
     let moved = r#"AttributeBegin Translate 0 0 0.5 Rotate 90 0 0 1 Scale 2 2 0.25
         MakeNamedMedium "ink" "string type" "uniformgrid" "rgb sigma_a" [0.3 0.9 1.7] "rgb sigma_s" [0 0 0] "float density" 1
         "point3 p0" [-1 -1 -1] "point3 p1" [1 1 1] AttributeEnd"#;
@@ -69,8 +69,8 @@ fn what_only_absorbs_weakens_light_by_the_law_of_beer() {
     );
 }
 
-/// A point light beside the line of sight, in fog that goes on for ever, before a black wall: single scattering is
-/// ∫ σ_s p I/r² exp(−σ_t (t + r)) dt, by quadrature.
+/// A point light beside the viewing ray, in infinite fog in front of a black wall: single scattering is ∫ σ_s p I/r²
+/// exp(−σ_t (t + r)) dt, computed by quadrature.
 #[test]
 fn single_scattering_of_a_point_light_is_that_of_quadrature() {
     let (sigma_s, sigma_a, g, depth, beside) = ([0.5_f64, 0.2, 0.05], [0.1_f64, 0.3, 0.0], 0.35_f64, 4.0_f64, 0.7_f64);
@@ -101,7 +101,7 @@ fn single_scattering_of_a_point_light_is_that_of_quadrature() {
     };
     let colors = r#""rgb sigma_s" [0.5 0.2 0.05] "rgb sigma_a" [0.1 0.3 0] "float g" 0.35"#;
     let homogeneous = format!(r#""string type" "homogeneous" {colors}"#);
-    // A grid whose density is 1 wherever the light goes
+    // A grid whose density is 1 in the whole region of the light
     let grid = format!(
         r#""string type" "uniformgrid" {colors} "float density" [{}] "integer nx" 4 "integer ny" 4 "integer nz" 4
         "point3 p0" [-40 -40 -40] "point3 p1" [40 40 40]"#,
@@ -118,8 +118,8 @@ fn single_scattering_of_a_point_light_is_that_of_quadrature() {
     }
 }
 
-/// A ray along the axis of a glass ball that absorbs, in even light: R + (1 − R)² T/(1 − R T), R = 0.04. The ball stands in
-/// fog of its own, which is of a box.
+/// A ray along the axis of an absorbing glass ball in uniform light: R + (1 − R)² T/(1 − R T), R = 0.04. Then the same
+/// ball in a box of fog.
 #[test]
 fn coloured_glass_absorbs_along_every_inner_reflection() {
     let sigma = [0.2_f64, 0.7, 1.5];
@@ -135,14 +135,14 @@ fn coloured_glass_absorbs_along_every_inner_reflection() {
     });
     let mut ball = job(&(camera("0 0 3", "", 40) + &glass("")), AccelKind::Embree);
     assert_answer(&mut ball, 256, through, 0.05, "a ball");
-    // Nested in grey fog, which takes exp(−0.5 · 0.3) on either side
+    // Inside grey fog, which transmits exp(−0.5 · 0.3) on either side
     let text = camera("0 0 3", "", 40)
         + r#"MakeNamedMedium "grey" "rgb sigma_a" [0.3 0.3 0.3] "rgb sigma_s" [0 0 0]"#
         + &glass("grey")
         + &format!(r#" Material "interface" MediumInterface "grey" "" {BOX}"#);
     let fog = (-0.5_f64 * 0.3 * 2.0).exp();
     assert_answer(&mut job(&text, AccelKind::Embree), 256, through.map(|l| l * fog), 0.05, "a ball in fog");
-    // The same by an instance, turned over by a mirror
+    // The same ball as a mirrored instance
     let instance =
         text.replace("AttributeBegin MediumInterface", r#"ObjectBegin "ball" AttributeBegin MediumInterface"#);
     let instance = instance.replace(

@@ -1,8 +1,8 @@
-//! Participating media: known answers, every estimator and medium, bits, and what is refused.
+//! Participating media: known answers, every estimator and medium, bit-identical images, and errors.
 //!
-//! A scene is a text with the answer of every pixel. Images of different seeds are independent; t-tests have a level of
-//! 10⁻⁵ for each channel, and must have the power to find the bias that they name (1.7 times that in `make test`, which renders
-//! half of the images).
+//! A scene is a text with one answer for all pixels. Images of different seeds are independent. t-tests have a level of
+//! 10⁻⁵ for each channel, and must have the power to detect the bias that they state (1.7 times that in `make test`,
+//! which renders half of the images).
 
 mod agreement;
 mod known_answers;
@@ -20,10 +20,10 @@ use lumiris_test_support::significance::{critical_t, detectable_deviation};
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
-/// Level of the test of a channel.
+/// Significance level of the test of a channel.
 const LEVEL: f64 = 1e-5;
 
-/// Images of a test.
+/// Number of images per test.
 fn images() -> u32 {
     by_power(32, 16)
 }
@@ -33,12 +33,13 @@ pub(crate) fn limit() -> f64 {
     critical_t(LEVEL, u64::from(images() - 1))
 }
 
-/// Whether a relative bias of `detects` is found with a probability of 0.99 where the mean has the standard error `relative`.
+/// True if a relative bias of `detects` is detected with a probability of 0.99 for a mean with the relative standard
+/// error `relative`.
 pub(crate) fn has_power(relative: f64, detects: f64) -> bool {
     detectable_deviation(LEVEL, 0.99, u64::from(images() - 1)) * relative < by_power(detects, 1.7 * detects)
 }
 
-/// A camera at `from` that looks along −z through a rectangle so small that all its rays are the same.
+/// A camera at `from` that looks along −z through a rectangle so small that all rays are the same.
 pub(crate) fn camera(from: &str, outside: &str, depth: u32) -> String {
     format!(
         r#"Translate {from} Scale -1 1 -1
@@ -64,7 +65,7 @@ fn film(job: &RenderJob, settings: RenderSettings) -> Film {
 /// Means and standard errors of the channels.
 pub(crate) type Answer = ([f64; 3], [f64; 3]);
 
-/// Those over images.
+/// Means and standard errors over images.
 pub(crate) fn means(job: &mut RenderJob, spp: u32) -> Answer {
     let image = |seed| {
         job.change(|s| s.sampling.seed = seed);
@@ -79,12 +80,13 @@ pub(crate) fn means(job: &mut RenderJob, spp: u32) -> Answer {
     (mean, [0, 1, 2].map(|c| variance(c).sqrt()))
 }
 
-/// The mean of every channel is the answer, and a relative bias of `detects` would be found with a probability above 0.99.
+/// The mean of every channel is the answer. A relative bias of `detects` would be detected with a probability above
+/// 0.99.
 #[track_caller]
 pub(crate) fn assert_answer(job: &mut RenderJob, spp: u32, answer: [f64; 3], detects: f64, what: &str) {
     let (mean, error) = means(job, spp);
     for c in 0..3 {
-        // Rounding of f32, where there is no noise
+        // Rounding error of f32, for images without noise
         let error = error[c] + 3e-5 * answer[c];
         let text = format!("{what}: channel {c} is {} ± {error}, not {}", mean[c], answer[c]);
         assert!((mean[c] - answer[c]).abs() < limit() * error, "{text}");
@@ -92,8 +94,8 @@ pub(crate) fn assert_answer(job: &mut RenderJob, spp: u32, answer: [f64; 3], det
     }
 }
 
-/// Means with their standard errors are those of all, weighted by what is known of each; a relative difference of `detects`
-/// would be found with a probability above 0.99.
+/// All means agree with their common mean, weighted by inverse variances. A relative difference of `detects` would be
+/// detected with a probability above 0.99.
 #[track_caller]
 pub(crate) fn assert_they_agree(answers: &[(String, Answer)], detects: f64) {
     for c in 0..3 {
@@ -108,7 +110,7 @@ pub(crate) fn assert_they_agree(answers: &[(String, Answer)], detects: f64) {
     }
 }
 
-/// All settings that know media.
+/// All estimators and settings that support media.
 pub(crate) fn estimators() -> Vec<(String, IntegratorSettings)> {
     let base = |estimator, samples: u32| IntegratorSettings { estimator, samples: Some(samples), ..Default::default() };
     let mut all: Vec<(String, IntegratorSettings)> = Vec::new();
@@ -129,7 +131,7 @@ pub(crate) fn estimators() -> Vec<(String, IntegratorSettings)> {
     all
 }
 
-/// Estimator, numbers of samples and target of `settings`.
+/// Sets the estimator, sample counts and target of `settings`.
 pub(crate) fn choose(job: &mut RenderJob, settings: &IntegratorSettings) {
     job.change(|s| {
         (s.integrator.estimator, s.integrator.samples) = (settings.estimator, settings.samples);
@@ -138,11 +140,11 @@ pub(crate) fn choose(job: &mut RenderJob, settings: &IntegratorSettings) {
     });
 }
 
-/// A medium in a box, or of which a box or a sphere is cut out.
+/// A box for media, or around a hole in the form of a box or a sphere.
 pub(crate) const BOX: &str = r#"Shape "trianglemesh" "point3 P" [-1 -1 -1  1 -1 -1  1 1 -1  -1 1 -1  -1 -1 1  1 -1 1  1 1 1  -1 1 1]
     "integer indices" [0 2 1 0 3 2  4 5 6 4 6 7  0 1 5 0 5 4  3 7 6 3 6 2  0 4 7 0 7 3  1 2 6 1 6 5]"#;
 
-/// Values of a grid of 4 × 4 × 4 samples that are far from constant.
+/// Values of a grid of 4 × 4 × 4 samples, far from constant.
 fn grid(channels: usize, scale: f32) -> String {
     let value = |i: usize| scale * (0.05 + ((i * 37 + 11) % 23) as f32 / 23.0);
     (0..64 * channels).map(|i| format!("{:.4} ", value(i))).collect()
@@ -153,7 +155,7 @@ fn media(scattering: f32, absorption: f32, more: &str) -> Vec<(&'static str, Str
     let (s, a) = (scattering, absorption);
     let colors =
         format!(r#""rgb sigma_s" [{} {} {}] "rgb sigma_a" [{} {} {}]"#, s, 0.5 * s, 0.15 * s, 0.2 * a, 0.6 * a, a);
-    // The box is between the inner samples: further out, a grid fades, and so does what it emits
+    // The box is between the inner samples: further out, the density and emission of a grid fade
     let place = r#""point3 p0" [-4 -4 -4] "point3 p1" [4 4 4] "integer nx" 4 "integer ny" 4 "integer nz" 4"#;
     vec![
         ("homogeneous", format!(r#""string type" "homogeneous" {colors} "float g" 0.4 {more}"#)),
@@ -190,7 +192,7 @@ fn cloud(scattering: f32, absorption: f32) -> String {
     )
 }
 
-/// A medium in a box, in even light of radiance 1 from everywhere.
+/// A medium in a box, in uniform light of radiance 1 from everywhere.
 fn in_even_light(medium: &str) -> RenderJob {
     let text = camera("0.3 0.2 3", "", 60)
         + &format!(

@@ -1,4 +1,4 @@
-//! What media leave of settings: threads, tiles, refusals, `auto`, and messages.
+//! Scenes with media and the settings: threads, tiles, refusals, `auto`, and messages.
 
 use super::{BOX, camera, cloud, film, job, media};
 use lumiris::import::cache::FileCache;
@@ -56,14 +56,14 @@ fn settings_that_leave_media_out_are_refused() {
         job.change(|s| s.integrator.kind = kind);
         assert!(error(&mut job).contains("direct and path"), "{kind:?}");
     }
-    // Paths are not shared, and say so
+    // Path reuse is disabled with a warning
     job.change(|s| (s.integrator.kind, s.integrator.path_reuse) = (IntegratorKind::Path, Some(4)));
     assert!(!allows(&job, Feature::Sharing));
     let plan = prepare(&mut job, &Preparation::on(None)).unwrap();
     assert!(plan.warnings.iter().any(|w| w.contains("media")), "{:?}", plan.warnings);
 }
 
-/// `auto` chooses among what knows media, and its image has the answer.
+/// `auto` chooses among the estimators that support media, and its image has the right mean.
 #[test]
 fn auto_knows_media() {
     let text = camera("0.3 0.2 3", "", 30).replace(
@@ -80,14 +80,15 @@ fn auto_knows_media() {
     job.pixel_samples = None;
     let film = film(&job, RenderSettings { spp: 2, ..RenderSettings::default() });
     let mean = film.pixels().iter().map(|p| p.mean()[0]).sum::<f64>() / film.len() as f64;
-    // 8192 samples of a standard deviation below 1
+    // 8192 samples with a standard deviation below 1
     assert!((mean - 1.0).abs() < 0.06, "{mean}");
 }
 
-/// Where media glow, `auto` chooses among what finds them by light samples.
+/// With emissive media, `auto` chooses an estimator that samples their emission as light.
 #[test]
 fn auto_has_light_samples_of_what_glows() {
     for (depth, edge) in [(1, 16), (5, 16)] {
+        // A scene with an emissive medium and 20 point lights
         let resolution = format!("\"integer xresolution\" {edge} \"integer yresolution\" {edge}");
         let mut text =
             camera("0.3 0.2 3", "", depth).replace("\"integer xresolution\" 4 \"integer yresolution\" 4", &resolution);
@@ -99,6 +100,8 @@ fn auto_has_light_samples_of_what_glows() {
         for i in 0..20 {
             text += &format!("LightSource \"point\" \"rgb I\" [ 1 1 1 ] \"point3 from\" [ {i} 3 0 ]\n");
         }
+
+        // `auto` chooses the estimator
         let mut job = job(&text, AccelKind::Embree);
         job.change(|s| {
             (s.integrator.estimator, s.sampling.spp) = (EstimatorKind::Auto, 512);
@@ -109,14 +112,17 @@ fn auto_has_light_samples_of_what_glows() {
     }
 }
 
-/// What a scene file says wrong is named with its place.
+/// Errors in a scene file are reported with their positions.
 #[test]
 fn faults_in_media_are_reported_with_their_places() {
+    // The error report of a scene with the medium
     let report = |medium: &str| {
         let text = format!("WorldBegin\nMakeNamedMedium \"m\" {medium}");
         let loaded = load_text(&text, "media", Path::new("."), &LoadOptions::default(), &FileCache::default());
         loaded.map(|_| ()).unwrap_err().to_string()
     };
+
+    // Wrong parameters and their messages
     let grid = r#""string type" "uniformgrid" "integer nx" 2"#;
     for (medium, fault) in [
         (r#""string type" "fog""#.to_owned(), "unknown medium `fog`"),
@@ -145,7 +151,7 @@ fn faults_in_media_are_reported_with_their_places() {
     }
 }
 
-/// Which media a scene has, and what of it is left out.
+/// Media without references leave the image unchanged.
 #[test]
 fn media_that_nothing_refers_to_leave_a_scene_as_it_is() {
     let unused = camera("0 0 3", "", 3)
@@ -156,9 +162,10 @@ fn media_that_nothing_refers_to_leave_a_scene_as_it_is() {
     assert!(job.world.scene.media.is_empty() && job.world.scene.surfaces.is_empty());
 }
 
-/// Features are those of the first surface behind media, also where every path ends before it.
+/// Features come from the first surface behind media, even where every path ends before it.
 #[test]
 fn features_are_those_of_the_first_surface_behind_media() {
+    // Dense fog before a diffuse square
     let text = camera("0 0 3", "", 3)
         + &format!(
             r#"MakeNamedMedium "fog" "rgb sigma_s" [9 9 9] "rgb sigma_a" [0 0 0] LightSource "infinite" "rgb L" [1 1 1]
@@ -166,6 +173,8 @@ fn features_are_those_of_the_first_surface_behind_media() {
             Material "diffuse" "rgb reflectance" [0.2 0.4 0.6]
             Shape "trianglemesh" "point3 P" [-9 -9 -2  9 -9 -2  9 9 -2  -9 9 -2] "integer indices" [0 1 2 0 2 3]"#
         );
+
+    // All camera rays hit the square: distance, albedo and normal
     let job = job(&text, AccelKind::Embree);
     let film = film(&job, RenderSettings { spp: 8, ..RenderSettings::default() });
     for p in film.pixels() {

@@ -1,18 +1,18 @@
-//! What the headers define by macro or inline function, and bindgen therefore cannot see.
+//! Macros and inline functions of the headers, for which bindgen generates no code.
 
 use super::*;
 
 /// Embree's major version: 3 or 4.
 pub const FAMILY: u32 = if cfg!(embree4) { 4 } else { 3 };
 
-/// Version of the headers found at build time, as `major * 10000 + minor * 100 + patch`. That of
-/// the library loaded is `rtcGetDeviceProperty(device, RTC_DEVICE_PROPERTY_VERSION)`.
+/// Version of the headers at build time, as `major * 10000 + minor * 100 + patch`. The version of the loaded library is
+/// `rtcGetDeviceProperty(device, RTC_DEVICE_PROPERTY_VERSION)`.
 pub const HEADER_VERSION: u32 = parse(env!("EMBREE_HEADER_VERSION"));
 
-/// `geomID`, `primID` or `instID` of a ray that hit nothing.
+/// `geomID`, `primID` or `instID` of a ray without a hit.
 pub const RTC_INVALID_GEOMETRY_ID: u32 = u32::MAX;
 
-/// The context `rtcInitIntersectContext` gives: incoherent rays, no filter, no instance.
+/// The context as initialised by `rtcInitIntersectContext`: incoherent rays, no filter, no instance.
 #[cfg(embree3)]
 #[must_use]
 pub const fn rtcInitIntersectContext() -> RTCIntersectContext {
@@ -23,7 +23,7 @@ pub const fn rtcInitIntersectContext() -> RTCIntersectContext {
     }
 }
 
-/// The arguments `rtcInitIntersectArguments` gives: incoherent rays, all features, no context, no
+/// The arguments as initialised by `rtcInitIntersectArguments`: incoherent rays, all features, no context, no
 /// callbacks.
 #[cfg(embree4)]
 #[must_use]
@@ -37,8 +37,7 @@ pub const fn rtcInitIntersectArguments() -> RTCIntersectArguments {
     }
 }
 
-/// The arguments `rtcInitOccludedArguments` gives: incoherent rays, all features, no context, no
-/// callbacks.
+/// The arguments as initialised by `rtcInitOccludedArguments`: incoherent rays, all features, no context, no callbacks.
 #[cfg(embree4)]
 #[must_use]
 pub const fn rtcInitOccludedArguments() -> RTCOccludedArguments {
@@ -51,7 +50,7 @@ pub const fn rtcInitOccludedArguments() -> RTCOccludedArguments {
     }
 }
 
-/// A decimal number that the build script wrote.
+/// Parses a decimal number written by the build script.
 const fn parse(digits: &str) -> u32 {
     let bytes = digits.as_bytes();
     let mut value = 0;

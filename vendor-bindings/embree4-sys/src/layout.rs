@@ -1,5 +1,5 @@
-//! The figures that `probe.c` asserts of the headers, asserted of the bindings. Both hold, so the
-//! structures have one layout on both sides.
+//! Asserts the same sizes and offsets for the bindings that `probe.c` asserts for the headers, so that the structures
+//! have one layout on both sides.
 
 use super::*;
 use std::mem::{align_of, offset_of, size_of};

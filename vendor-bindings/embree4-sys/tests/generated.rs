@@ -1,4 +1,4 @@
-//! Bindings that are made from the headers: they are those committed where these fit, and serve where none does.
+//! Generated bindings: identical to the committed ones if these fit the headers, and usable if no committed ones fit.
 #![cfg(feature = "generate-bindings")]
 
 use embree4_sys::{FAMILY, HEADER_VERSION};
@@ -6,7 +6,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// The two ways must agree to the letter. `LUMIRIS_BLESS=1` writes the committed file.
+/// Both must agree to the letter. `LUMIRIS_BLESS=1` writes the committed file.
 #[test]
 fn generated_and_committed_bindings_are_one_text() {
     let (generated, path) = (include_str!(env!("EMBREE_BINDINGS")), env!("EMBREE_COMMITTED_BINDINGS"));
@@ -24,13 +24,16 @@ fn generated_and_committed_bindings_are_one_text() {
     assert!(committed == generated, "{path}: first difference (committed, generated): {difference:?}");
 }
 
-/// A copy of the installed headers as those of a version, with one more member in hits.
+/// A copy of the installed headers with another version and an additional member in hits.
 fn headers_of(version: [u32; 3]) -> tempfile::TempDir {
+    // Folders
     let prefix = tempfile::tempdir().unwrap();
     let (include, lib) = (prefix.path().join(format!("include/embree{FAMILY}")), prefix.path().join("lib"));
     fs::create_dir_all(&include).unwrap();
     fs::create_dir_all(&lib).unwrap();
     fs::write(lib.join(format!("libembree{FAMILY}.so")), "").unwrap();
+
+    // Changed headers
     for entry in fs::read_dir(installed_headers()).unwrap() {
         let path = entry.unwrap().path();
         let mut text = fs::read_to_string(&path).unwrap();
@@ -49,7 +52,7 @@ fn headers_of(version: [u32; 3]) -> tempfile::TempDir {
     prefix
 }
 
-/// Where the headers lie that the build script found.
+/// The folder of the headers that the build script found.
 fn installed_headers() -> PathBuf {
     let prefixes = std::env::var_os("EMBREE_DIR").map(PathBuf::from).into_iter();
     let include = |prefix: PathBuf| prefix.join(format!("include/embree{FAMILY}"));
@@ -57,7 +60,7 @@ fn installed_headers() -> PathBuf {
     places.find(|place| place.join("rtcore.h").is_file()).expect("the headers that the build script found")
 }
 
-/// Checks this crate against headers, with or without the feature; the output of cargo.
+/// Checks this crate against headers, with or without the feature. Returns success and cargo's output.
 fn check(prefix: &Path, features: &[&str]) -> (bool, String) {
     let output = Command::new(env!("CARGO"))
         .args(["check", "--offline", "--package", "embree4-sys", "--target-dir", env!("CARGO_TARGET_TMPDIR")])

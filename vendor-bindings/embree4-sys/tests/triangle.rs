@@ -1,4 +1,4 @@
-//! One triangle: hits, misses, packets and errors, in whichever family the build script found.
+//! One triangle: hits, misses, packets and errors, in the family chosen by the build script.
 
 use embree4_sys::*;
 use std::ffi::{CStr, c_char, c_void};
@@ -92,7 +92,7 @@ fn a_ray_through_the_triangle_hits_it() {
     assert_eq!(found.hit.geomID, 0);
     assert_eq!(found.hit.primID, 0);
     assert_eq!(found.hit.instID, [RTC_INVALID_GEOMETRY_ID]);
-    // Embree divides by a reciprocal whose last bit is the processor's own.
+    // Embree divides by a reciprocal whose last bit depends on the processor
     for (value, expected) in [(found.ray.tfar, 1.0), (found.hit.u, 0.25), (found.hit.v, 0.5)] {
         assert!((value - expected).abs() <= 2.0 * f32::EPSILON * expected, "{value} {expected}");
     }
@@ -113,17 +113,17 @@ fn a_packet_of_eight_tells_the_occluded_rays_and_skips_invalid_lanes() {
 
     let triangle = Triangle::new();
     let mut rays = RTCRay8 {
-        // Lanes alternate between inside and outside.
+        // Lanes alternate between inside and outside
         org_x: [0.25, 2.0, 0.25, 2.0, 0.25, 2.0, 0.25, 2.0],
         org_y: [0.25; 8],
         org_z: [1.0; 8],
         dir_z: [-1.0; 8],
-        // Lane 2 ends above the triangle.
+        // Lane 2 ends above the triangle
         tfar: [2.0, 2.0, 0.5, 2.0, 2.0, 2.0, 2.0, 2.0],
         mask: [u32::MAX; 8],
         ..RTCRay8::default()
     };
-    // Lane 4 is off.
+    // Lane 4 is inactive
     let valid = Valid([-1, -1, -1, -1, 0, -1, -1, -1]);
     let valid = valid.0.as_ptr();
     // SAFETY: the scene is committed; `valid` and `rays` are aligned to 32 bytes by their types.

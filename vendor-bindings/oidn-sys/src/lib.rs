@@ -1,21 +1,21 @@
-//! Raw bindings to the part of Open Image Denoise 2 that Lumiris uses, loaded at run time.
+//! Raw bindings to the part of Open Image Denoise 2 used by Lumiris, loaded at run time.
 //!
-//! A device runs filters; a filter reads and writes images in memory of the caller, and is committed before it is
-//! executed. Objects are counted references, released once by who made them. Functions report errors by
-//! [`Api::get_device_error`] alone.
+//! A device runs filters. A filter reads and writes images in the caller's memory, and is committed before it is
+//! executed. Objects are reference-counted; their creator releases them once. Functions report errors only through
+//! [`Api::get_device_error`].
 
 use libloading::Library;
 use std::ffi::{OsStr, c_char, c_int, c_void};
 
-/// What the dynamic loader knows the library by.
+/// Name of the library for the dynamic loader.
 pub const LIBRARY_NAME: &str =
     if cfg!(target_os = "macos") { "libOpenImageDenoise.2.dylib" } else { "libOpenImageDenoise.so.2" };
 
-/// The processor as a device.
+/// The CPU as a device.
 pub const OIDN_DEVICE_TYPE_CPU: c_int = 1;
-/// Three 32-bit floats a pixel.
+/// Three 32-bit floats per pixel.
 pub const OIDN_FORMAT_FLOAT3: c_int = 3;
-/// There was no error.
+/// No error.
 pub const OIDN_ERROR_NONE: c_int = 0;
 
 /// A device.
@@ -32,22 +32,21 @@ pub struct OidnFilter {
     _private: [u8; 0],
 }
 
-/// Declares [`Api`], and by which name each function is looked up.
+/// Declares [`Api`], and the symbol of each function.
 macro_rules! api {
     ($($(#[doc = $doc:literal])* $symbol:literal fn $name:ident($($arg:ident: $type:ty),* $(,)?) $(-> $result:ty)?;)*) => {
-        /// The functions. All of them are unsafe to call: names end in a zero byte, objects are live, and images hold
-        /// what was said of them until the filter has been executed.
+        /// The functions. All of them are unsafe to call: names must end in a zero byte, objects must be live, and
+        /// images must be valid as described until the filter has been executed.
         #[derive(Clone, Copy, Debug)]
         pub struct Api {
             $($(#[doc = $doc])* pub $name: unsafe extern "C" fn($($arg: $type),*) $(-> $result)?,)*
         }
 
         impl Api {
-            /// Looks all functions up.
+            /// Looks up all functions.
             fn from_library(library: &Library) -> Result<Api, libloading::Error> {
                 $(
-                    // SAFETY: the type is that of the function in all versions that have it and its siblings; the
-                    // library is never closed.
+                    // SAFETY: the type is the function's in all versions of the library; the library is never closed.
                     let $name = unsafe {
                         *library.get::<unsafe extern "C" fn($($arg: $type),*) $(-> $result)?>($symbol.as_bytes())?
                     };
@@ -59,47 +58,48 @@ macro_rules! api {
 }
 
 api! {
-    /// Makes a device of an `OIDN_DEVICE_TYPE_…`; null if there is none.
+    /// Creates a device of an `OIDN_DEVICE_TYPE_…`; null if there is none.
     "oidnNewDevice\0" fn new_device(device_type: c_int) -> *mut OidnDevice;
-    /// Sets a parameter: `numThreads`, `verbose`.
+    /// Sets an integer parameter: `numThreads`, `verbose`.
     "oidnSetDeviceInt\0" fn set_device_int(device: *mut OidnDevice, name: *const c_char, value: c_int);
-    /// Sets a parameter: `setAffinity`.
+    /// Sets a boolean parameter: `setAffinity`.
     "oidnSetDeviceBool\0" fn set_device_bool(device: *mut OidnDevice, name: *const c_char, value: bool);
-    /// A parameter: `versionMajor`, `versionMinor`, `versionPatch`.
+    /// Gets a parameter: `versionMajor`, `versionMinor`, `versionPatch`.
     "oidnGetDeviceInt\0" fn get_device_int(device: *mut OidnDevice, name: *const c_char) -> c_int;
-    /// Makes the device ready.
+    /// Commits the device.
     "oidnCommitDevice\0" fn commit_device(device: *mut OidnDevice);
-    /// The first error since the last call, and its message, which lives until the next one. A null device stands for
-    /// those that could not be made.
+    /// The first error since the last call, with its message, which is valid until the next call. A null device reports
+    /// errors of devices that could not be created.
     "oidnGetDeviceError\0" fn get_device_error(device: *mut OidnDevice, message: *mut *const c_char) -> c_int;
-    /// Gives a device up.
+    /// Releases a device.
     "oidnReleaseDevice\0" fn release_device(device: *mut OidnDevice);
-    /// Makes a filter: `RT`.
+    /// Creates a filter: `RT`.
     "oidnNewFilter\0" fn new_filter(device: *mut OidnDevice, kind: *const c_char) -> *mut OidnFilter;
-    /// Names an image in memory: `color`, `albedo`, `normal`, `output`. Strides are in bytes; 0 stands for no gaps.
+    /// Sets an image in the caller's memory: `color`, `albedo`, `normal`, `output`. Strides are in bytes; 0 means no
+    /// gaps.
     "oidnSetSharedFilterImage\0" fn set_shared_filter_image(
         filter: *mut OidnFilter, name: *const c_char, data: *mut c_void, format: c_int, width: usize, height: usize,
         offset: usize, pixel_stride: usize, row_stride: usize,
     );
-    /// Sets a parameter: `hdr`, `cleanAux`.
+    /// Sets a boolean parameter: `hdr`, `cleanAux`.
     "oidnSetFilterBool\0" fn set_filter_bool(filter: *mut OidnFilter, name: *const c_char, value: bool);
-    /// Makes the filter ready.
+    /// Commits the filter.
     "oidnCommitFilter\0" fn commit_filter(filter: *mut OidnFilter);
     /// Runs the filter to its end.
     "oidnExecuteFilter\0" fn execute_filter(filter: *mut OidnFilter);
-    /// Gives a filter up.
+    /// Releases a filter.
     "oidnReleaseFilter\0" fn release_filter(filter: *mut OidnFilter);
 }
 
-/// Opens the library: a path, or a name that the dynamic loader looks for.
+/// Opens the library: a path, or a name for the dynamic loader.
 pub fn load(library: &OsStr) -> Result<Api, String> {
     let described = |error: libloading::Error| error.to_string();
-    // SAFETY: opening runs the initialisers of the library and of what it depends on, which the user chose by
-    // installing or naming it.
+    // SAFETY: opening runs the initialisers of the library and of its dependencies, which the user chose by installing
+    // or naming it.
     let opened = unsafe { Library::new(library) }.map_err(described)?;
     let api = Api::from_library(&opened)
         .map_err(|error| format!("{} is not Open Image Denoise 2: {error}", library.display()))?;
-    // Its functions live as long as the process
+    // The functions live as long as the process
     std::mem::forget(opened);
     Ok(api)
 }

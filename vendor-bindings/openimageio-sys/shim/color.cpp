@@ -1,4 +1,4 @@
-// The colour half of oiio_shim.h, over OpenImageIO 2.4 to 3.x: only calls that all of them have.
+// The colour functions of oiio_shim.h, for OpenImageIO 2.4 to 3.x: only calls that all versions have.
 #include "common.h"
 
 #include <OpenImageIO/color.h>
@@ -12,7 +12,7 @@ namespace {
 using shim::Failure;
 using shim::require;
 
-// Pixels that are transformed at once: ImageBuf counts columns by int.
+// Pixels per transform: ImageBuf counts columns by int.
 constexpr uint64_t kPixelsAtOnce = 1 << 20;
 
 std::string or_default(const char* name, const char* otherwise) {

@@ -1,4 +1,4 @@
-// What the two halves of the shim share: errors that do not cross the boundary.
+// Error handling shared by the files of the shim: errors do not cross the boundary.
 #ifndef LUMIRIS_OIIO_COMMON_H
 #define LUMIRIS_OIIO_COMMON_H
 
@@ -16,7 +16,7 @@
 
 namespace shim {
 
-// Thrown inside the shim only; guard() turns it into a code and a message.
+// Thrown inside the shim only; guard() converts it to a code and a message.
 struct Failure {
   OiioResult code;
   std::string message;
@@ -30,7 +30,7 @@ inline void copy_message(const char* message, char* error, size_t error_size) {
   error[length] = '\0';
 }
 
-// Runs `body`. Nothing it throws gets out.
+// Runs `body`. No exception leaves it.
 template <typename Body>
 int32_t guard(char* error, size_t error_size, Body body) noexcept {
   try {
@@ -55,7 +55,7 @@ inline void require(bool condition, const char* what) {
   if (!condition) throw Failure{OIIO_INVALID_ARGUMENT, what};
 }
 
-// A message is never empty: OpenImageIO may fail without saying why.
+// A message is never empty: OpenImageIO may fail without a message.
 inline std::string or_else(std::string message, const char* otherwise) {
   while (!message.empty() && (message.back() == '\n' || message.back() == ' ')) message.pop_back();
   return message.empty() ? std::string(otherwise) : message;

@@ -1,14 +1,14 @@
-/* C interface to the part of OpenImageIO that Lumiris uses: read any picture as 32-bit floats, write
-   pictures of one or several parts.
+/* C interface to the part of OpenImageIO used by Lumiris: read any image as 32-bit floats, write images
+   of one or several parts.
 
-   Rules of every function:
-   - No C++ exception leaves it. The result is an OiioResult; if it is not OIIO_OK and `error` is not
+   Rules for all functions:
+   - No C++ exception leaves them. The result is an OiioResult. If it is not OIIO_OK and `error` is not
      null, a message that ends in a zero byte is written to error[0 .. error_size].
-   - Paths and names are UTF-8 with a final zero byte. Returned strings belong to the handle they were
-     asked of and live until it is closed; those of functions without a handle live forever.
+   - Paths and names are UTF-8 with a final zero byte. Returned strings belong to the handle and are valid
+     until it is closed; strings from functions without a handle are valid forever.
    - A handle is used by one thread at a time. Different handles are independent.
 
-   src/types.rs and src/load.rs declare the same in Rust. A change here changes OIIO_SHIM_ABI in both. */
+   src/types.rs and src/load.rs declare the same in Rust. A change here must change OIIO_SHIM_ABI in both. */
 #ifndef LUMIRIS_OIIO_SHIM_H
 #define LUMIRIS_OIIO_SHIM_H
 
@@ -30,8 +30,8 @@ extern "C" {
 enum OiioResult {
   OIIO_OK = 0,
   OIIO_INVALID_ARGUMENT = 1, /* the caller's fault: null pointer, wrong index, wrong length */
-  OIIO_CANNOT_OPEN = 2,      /* missing, unreadable, not a picture, or the header is broken */
-  OIIO_UNSUPPORTED = 3,      /* deep or volume data; a format that cannot hold what was asked */
+  OIIO_CANNOT_OPEN = 2,      /* missing, unreadable, not an image, or the header is broken */
+  OIIO_UNSUPPORTED = 3,      /* deep or volume data; a format that cannot hold the requested data */
   OIIO_TOO_LARGE = 4,        /* the header asks for more memory than the caller allows */
   OIIO_CANNOT_READ = 5,      /* the pixels are damaged or missing */
   OIIO_CANNOT_WRITE = 6,     /* disk full, no permission, encoder failed */
@@ -56,9 +56,9 @@ enum OiioFormat {
 typedef struct OiioInput OiioInput;
 typedef struct OiioOutput OiioOutput;
 
-/* What the header of one subimage says. Not checked: a damaged file may say anything. */
+/* Header of a subimage. Not checked: a damaged file may contain any values. */
 typedef struct OiioSpec {
-  int32_t width, height, depth; /* data window, pixels; depth is 1 for pictures */
+  int32_t width, height, depth; /* data window, pixels; depth is 1 for images */
   int32_t x, y;                 /* data window, first pixel */
   int32_t full_x, full_y, full_width, full_height; /* display window */
   int32_t nchannels;
@@ -97,28 +97,28 @@ typedef struct OiioPart {
 
 /* ---- library ---- */
 
-/* OIIO_SHIM_ABI of the shim that was loaded. */
+/* OIIO_SHIM_ABI of the loaded shim. */
 OIIO_SHIM_API int32_t oiio_shim_abi(void);
-/* Version of the OpenImageIO library loaded, for instance "2.4.7". */
+/* Version of the loaded OpenImageIO library, for instance "2.4.7". */
 OIIO_SHIM_API const char* oiio_shim_version(void);
-/* Formats and their extensions: "openexr:exr,sxr,mxr;png:png;...". */
+/* Formats with their extensions: "openexr:exr,sxr,mxr;png:png;...". */
 OIIO_SHIM_API const char* oiio_shim_extensions(void);
 /* Sets a global attribute: "threads", "exr_threads", "limits:imagesize_MB", "limits:channels". */
 OIIO_SHIM_API int32_t oiio_shim_set_int(const char* name, int32_t value, char* error, size_t error_size);
 
 /* ---- colour ---- */
 
-/* Turns `count` floats, RGB triples of the colour space `input`, into the colours of a display by the OpenColorIO
-   configuration that $OCIO names. Empty `display` and `view` are the configuration's defaults, empty `looks` those of the
-   view. `chosen` gets "display\nview". OIIO_UNSUPPORTED if the configuration cannot be read, or has no such names, or
-   OpenImageIO was built without OpenColorIO; the pixels then are undefined. */
+/* Converts `count` floats, RGB triples of the colour space `input`, to display colours with the OpenColorIO
+   configuration named by $OCIO. Empty `display` and `view` mean the configuration's defaults, empty `looks` the
+   view's looks. `chosen` receives "display\nview". OIIO_UNSUPPORTED if the configuration cannot be read or has no
+   such names, or if OpenImageIO was built without OpenColorIO; the pixels are then undefined. */
 OIIO_SHIM_API int32_t oiio_shim_ocio_display(const char* input, const char* display, const char* view,
                                              const char* looks, float* pixels, uint64_t count, char* chosen,
                                              size_t chosen_size, char* error, size_t error_size);
 
 /* ---- reading ---- */
 
-/* Opens a file. unassociated_alpha 1: colours are as stored, not multiplied by alpha. */
+/* Opens a file. unassociated_alpha 1: colours as stored, not multiplied by alpha. */
 OIIO_SHIM_API int32_t oiio_shim_input_open(const char* path, int32_t unassociated_alpha, OiioInput** input,
                                            char* error, size_t error_size);
 /* Name of the file format: "openexr", "png", ... */
@@ -128,27 +128,27 @@ OIIO_SHIM_API int32_t oiio_shim_input_subimages(OiioInput* input, int32_t* count
 /* Header of a subimage. */
 OIIO_SHIM_API int32_t oiio_shim_input_spec(OiioInput* input, int32_t subimage, OiioSpec* spec, char* error,
                                            size_t error_size);
-/* Name and OiioFormat of a channel. Channels are in the file's order, which need not be that in which
-   they were written: find them by name. */
+/* Name and OiioFormat of a channel. Channels are in the file's order, which may differ from the order of
+   writing: find them by name. */
 OIIO_SHIM_API int32_t oiio_shim_input_channel(OiioInput* input, int32_t subimage, int32_t channel,
                                               const char** name, int32_t* format, char* error, size_t error_size);
-/* A metadata entry of a subimage, 0 <= index < spec.attributes. */
+/* Metadata entry of a subimage, 0 <= index < spec.attributes. */
 OIIO_SHIM_API int32_t oiio_shim_input_attribute(OiioInput* input, int32_t subimage, int32_t index,
                                                 OiioAttribute* attribute, char* error, size_t error_size);
-/* Number of floats that oiio_shim_input_read needs: width * height * nchannels. OIIO_TOO_LARGE if they
+/* Number of floats needed by oiio_shim_input_read: width * height * nchannels. OIIO_TOO_LARGE if they
    take more than max_bytes, OIIO_UNSUPPORTED if the subimage is deep, a volume, or empty. */
 OIIO_SHIM_API int32_t oiio_shim_input_float_count(OiioInput* input, int32_t subimage, uint64_t max_bytes,
                                                   uint64_t* count, char* error, size_t error_size);
-/* Reads all channels of a subimage, interleaved, top row first. `count` must be the one above. After an
-   error the pixels are undefined but initialised as they were. */
+/* Reads all channels of a subimage, interleaved, top row first. `count` must be the number above. After an
+   error the pixels have undefined values, but remain initialised. */
 OIIO_SHIM_API int32_t oiio_shim_input_read(OiioInput* input, int32_t subimage, float* pixels, uint64_t count,
                                            char* error, size_t error_size);
-/* A level of a subimage, of which 0 is the image itself. OIIO_UNSUPPORTED if the file has no such level, or if it is deep,
-   a volume, or empty. */
+/* Level of a subimage; level 0 is the image itself. OIIO_UNSUPPORTED if the file has no such level, or if it is
+   deep, a volume, or empty. */
 OIIO_SHIM_API int32_t oiio_shim_input_level(OiioInput* input, int32_t subimage, int32_t level, OiioLevel* out,
                                             char* error, size_t error_size);
-/* Reads `width` x `height` pixels of a level from column x and row y on, counted from the top left of the level, which
-   must hold them: the channels [channel_begin, channel_end), interleaved, top row first. `count` is
+/* Reads `width` x `height` pixels of a level from column x and row y on, counted from the level's top left. The
+   level must contain them. Channels are [channel_begin, channel_end), interleaved, top row first. `count` is
    width * height * (channel_end - channel_begin). */
 OIIO_SHIM_API int32_t oiio_shim_input_read_region(OiioInput* input, int32_t subimage, int32_t level, int32_t x,
                                                   int32_t y, int32_t width, int32_t height, int32_t channel_begin,
@@ -159,7 +159,7 @@ OIIO_SHIM_API void oiio_shim_input_close(OiioInput* input);
 
 /* ---- writing: create, add parts, attributes, open, write each part in order, close, free ---- */
 
-/* Chooses the encoder by the extension of the path. No file is made yet. */
+/* Chooses the encoder by the extension of the path. No file is created yet. */
 OIIO_SHIM_API int32_t oiio_shim_output_create(const char* path, OiioOutput** output, char* error,
                                               size_t error_size);
 /* Adds a part; parts are numbered from 0. Only OpenEXR files hold more than one. */
@@ -174,16 +174,16 @@ OIIO_SHIM_API int32_t oiio_shim_output_set_float(OiioOutput* output, int32_t par
                                                  char* error, size_t error_size);
 OIIO_SHIM_API int32_t oiio_shim_output_set_matrix(OiioOutput* output, int32_t part, const char* name,
                                                   const float* value, char* error, size_t error_size);
-/* Makes the file and writes its header. */
+/* Creates the file and writes its header. */
 OIIO_SHIM_API int32_t oiio_shim_output_open(OiioOutput* output, char* error, size_t error_size);
-/* Writes rows [row_begin, row_begin + rows) of the current part, 0 being the top, from
-   rows * width * nchannels interleaved floats in the order of channel_names. Rows come in order and
-   without gaps. After the last row of a part, the next call writes part + 1. */
+/* Writes rows [row_begin, row_begin + rows) of the current part (row 0 is the top) from
+   rows * width * nchannels interleaved floats in the order of channel_names. Rows must be written in order
+   and without gaps. After the last row of a part, the next call writes part + 1. */
 OIIO_SHIM_API int32_t oiio_shim_output_write(OiioOutput* output, int32_t part, int32_t row_begin, int32_t rows,
                                              const float* pixels, uint64_t count, char* error, size_t error_size);
-/* Ends the file, and reports whatever could not be stored, a full disk included. */
+/* Ends the file. Reports everything that could not be stored, including a full disk. */
 OIIO_SHIM_API int32_t oiio_shim_output_close(OiioOutput* output, char* error, size_t error_size);
-/* Frees; without a close before, the file is left incomplete. Null is allowed. */
+/* Frees the handle. Without a close before, the file is incomplete. Null is allowed. */
 OIIO_SHIM_API void oiio_shim_output_free(OiioOutput* output);
 
 #ifdef __cplusplus

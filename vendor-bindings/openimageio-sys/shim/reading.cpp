@@ -1,5 +1,4 @@
-// The library and the reading half of oiio_shim.h, over OpenImageIO 2.4 to 3.x: only calls that all
-// of them have.
+// The library and reading functions of oiio_shim.h, for OpenImageIO 2.4 to 3.x: only calls that all versions have.
 #include "common.h"
 
 #include <algorithm>
@@ -23,7 +22,7 @@ using shim::guard;
 using shim::or_else;
 using shim::require;
 
-// Subimages beyond this are not counted: each costs a seek, and no picture has as many.
+// Further subimages are not counted: each costs a seek, and no image has that many.
 constexpr int kMaxSubimages = 4096;
 
 OiioFormat format_of(TypeDesc type) {
@@ -62,7 +61,7 @@ struct OiioInput {
   std::map<int, std::unique_ptr<Part>> parts;
   int subimages = 0;  // 0: not counted yet
 
-  // OpenImageIO prints an error that nobody asked for when the reader is destroyed.
+  // OpenImageIO would print pending errors when the reader is destroyed.
   ~OiioInput() {
     if (input) drain();
   }
@@ -88,13 +87,13 @@ struct OiioInput {
     for (const auto& entry : part->spec.extra_attribs) {
       part->types.emplace_back(entry.type().c_str());
       part->values.push_back(ImageSpec::metadata_val(entry, false));
-      // A lone string comes in quotes, with its quotes and control characters escaped.
+      // A single string would be quoted, with its quotes and control characters escaped.
       if (entry.type() == OIIO::TypeString) part->values.back() = entry.get_string();
     }
     return *(parts[subimage] = std::move(part));
   }
 
-  // Number of floats of a subimage, after the checks on its header.
+  // Number of floats of a subimage, after checking its header.
   uint64_t float_count(int32_t subimage, uint64_t max_bytes) {
     const ImageSpec& spec = part(subimage).spec;
     if (spec.deep) throw Failure{OIIO_UNSUPPORTED, "deep images are not supported"};
@@ -103,9 +102,9 @@ struct OiioInput {
                              std::to_string(spec.nchannels) + " channels";
     if (spec.width <= 0 || spec.height <= 0 || spec.nchannels <= 0)
       throw Failure{OIIO_UNSUPPORTED, "the header says " + size};
-    // Each factor is below 2^31, so that the first product fits; the second is divided instead.
+    // Each factor is below 2^31, so the first product fits; the second is avoided by a division.
     const uint64_t row = uint64_t(spec.width) * uint64_t(spec.nchannels);
-    // A damaged header may ask for tiles that are larger than the picture; OpenImageIO would allocate them.
+    // A damaged header may ask for tiles larger than the image, which OpenImageIO would allocate.
     const uint64_t tile = uint64_t(std::max(spec.tile_width, 0)) * uint64_t(std::max(spec.tile_height, 0));
     if (tile > max_bytes / sizeof(float) / uint64_t(spec.nchannels))
       throw Failure{OIIO_TOO_LARGE, "the header asks for tiles of " + std::to_string(spec.tile_width) + " x " +
@@ -135,7 +134,7 @@ namespace {
 struct Span {
   int begin, end;
 
-  // The whole tiles that hold them, of a level that has `size` of them from 0 on; all where there are no tiles.
+  // The span of whole tiles that contain it, in a level of `size` columns or rows; everything if there are no tiles.
   Span of_tiles(int tile, int size) const {
     if (tile <= 0) return {0, size};
     return {begin / tile * tile, int(std::min<int64_t>(size, (int64_t(end) + tile - 1) / tile * tile))};
@@ -205,7 +204,7 @@ int32_t oiio_shim_input_subimages(OiioInput* input, int32_t* count, char* error,
   return guard(error, error_size, [&] {
     require(input != nullptr && count != nullptr, "null argument");
     if (input->subimages == 0) {
-      // Some formats say the number in the header; in others only seeking tells.
+      // Some formats have the number in the header; in others only seeking can find it.
       int number = input->part(0).spec.get_int_attribute("oiio:subimages", 0);
       if (number <= 0)
         for (number = 1; number < kMaxSubimages && input->seek(number);) ++number;
@@ -306,7 +305,7 @@ int32_t oiio_shim_input_read_region(OiioInput* input, int32_t subimage, int32_t 
     const uint64_t channels = uint64_t(channel_end - channel_begin);
     require(count == uint64_t(width) * uint64_t(height) * channels, "the number of floats is not that of the pixels");
 
-    // Files give whole tiles, or whole rows
+    // Files are read in whole tiles or whole rows.
     const bool tiled = spec.tile_width > 0 && spec.tile_height > 0;
     const Span columns = Span{x, x + width}.of_tiles(tiled ? spec.tile_width : 0, spec.width);
     const Span rows = tiled ? Span{y, y + height}.of_tiles(spec.tile_height, spec.height) : Span{y, y + height};

@@ -1,4 +1,4 @@
-// The writing half of oiio_shim.h, over OpenImageIO 2.4 to 3.x: only calls that all of them have.
+// The writing functions of oiio_shim.h, for OpenImageIO 2.4 to 3.x: only calls that all versions have.
 #include "common.h"
 
 #include <OpenImageIO/filesystem.h>
@@ -40,12 +40,11 @@ TypeDesc type_of(int32_t format) {
 
 // ---- a file whose every failed write is remembered ----
 
-// A full disk is not told to the encoders: they write the end of a file in destructors, where they
-// cannot report it, and libjpeg's answer is to end the process. So every write seems to succeed, the
-// first error is kept, and the shim asks for it after each step. proxytype() must not be "file", by
-// which encoders recognise OpenImageIO's own class and cast to it. tell() and flush() are not
-// overridden, since their constness differs between versions: the base class tells m_pos, and
-// finish() flushes.
+// Encoders are not told about a full disk: they write the end of a file in destructors, which cannot report errors, and
+// libjpeg would end the process. Therefore every write seems to succeed. The first error is stored, and the shim checks
+// for it after each step. proxytype() must not be "file", by which encoders recognise OpenImageIO's own class and cast
+// to it. tell() and flush() are not overridden, since their constness differs between versions: the base class uses
+// m_pos, and finish() flushes.
 class CheckedFile final : public OIIO::Filesystem::IOProxy {
  public:
   explicit CheckedFile(const std::string& path)
@@ -83,7 +82,7 @@ class CheckedFile final : public OIIO::Filesystem::IOProxy {
 
   size_t size() const override { return size_t(size_); }
 
-  // Closes the file; the first error of its life, or 0.
+  // Closes the file. Returns the first error of any operation, or 0.
   int finish() noexcept {
     if (file_ != nullptr && std::fclose(file_) != 0) remember();
     file_ = nullptr;
@@ -117,7 +116,7 @@ struct OiioOutput {
 
   std::string drain() { return output && output->has_error() ? output->geterror() : std::string(); }
 
-  // Throws if the encoder failed, or if the file did without the encoder's knowing.
+  // Throws if the encoder failed, or if the file failed without the encoder's knowledge.
   void check(bool ok, const char* what) {
     const std::string message = drain();
     const int reason = file ? file->first_error() : 0;
@@ -134,7 +133,7 @@ struct OiioOutput {
   void open() {
     require(!specs.empty(), "a file needs a part");
     require(part < 0 && !closed, "the file is already open");
-    // Others claim to hold several images, and TIFF then loses all but one without an error.
+    // Other formats claim to hold several images, but TIFF then loses all except one without an error.
     const std::string format = output->format_name();
     if (specs.size() > 1 && format != "openexr")
       throw Failure{OIIO_UNSUPPORTED, format + " files are written with one part only"};
@@ -151,7 +150,7 @@ struct OiioOutput {
 
   void write(int32_t to_part, int32_t row_begin, int32_t count_rows, const float* pixels, uint64_t count) {
     require(part >= 0 && !closed, "the file is not open");
-    // Enter the next part once this one is full.
+    // Begin the next part once this one is full.
     if (to_part == part + 1 && rows == specs[size_t(part)].height && size_t(to_part) < specs.size()) {
       check(output->open(path, specs[size_t(to_part)], ImageOutput::AppendSubimage),
             "cannot begin the next part");
@@ -217,7 +216,7 @@ int32_t oiio_shim_output_add_part(OiioOutput* output, const OiioPart* part, char
     spec.full_width = has_full ? part->full_width : part->width;
     spec.full_height = has_full ? part->full_height : part->height;
 
-    // Name the channels; a format per channel only where they differ.
+    // Name the channels; set a format per channel only if the formats differ.
     spec.channelnames.clear();
     std::vector<TypeDesc> formats;
     bool same = true;

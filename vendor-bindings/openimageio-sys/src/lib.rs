@@ -1,13 +1,11 @@
-//! Raw bindings to the part of OpenImageIO that Lumiris uses, loaded on first use.
+//! Raw bindings to the part of OpenImageIO used by Lumiris, loaded at first use.
 //!
-//! OpenImageIO's interface is C++, so a shim with a C interface (`shim/oiio_shim.h`, which documents
-//! each function) stands between. Linking OpenImageIO would load some 260 shared objects at every
-//! start of the process; the shim is therefore a shared object of its own, which [`load()`] opens when
-//! the first picture is read or written.
+//! OpenImageIO's interface is C++, so a shim with a C interface wraps it (`shim/oiio_shim.h`, which documents each
+//! function). Linking OpenImageIO would load some 260 shared objects at every start of the process. The shim is
+//! therefore a separate shared object, which [`load()`] opens when the first image is read or written.
 //!
-//! Every function that can fail returns an `OIIO_…` code and takes a buffer for the message, as
-//! `error, error_size`. Handles may move between threads, but two threads must not use one at
-//! once.
+//! Every function that can fail returns an `OIIO_…` code and takes a buffer for the message, as `error, error_size`.
+//! Handles may move between threads, but must not be used by two threads at once.
 
 mod load;
 mod types;

@@ -1,4 +1,4 @@
-//! Finding and opening the shim.
+//! Opens the shim.
 
 use crate::types::{OIIO_SHIM_ABI, OiioAttribute, OiioInput, OiioLevel, OiioOutput, OiioPart, OiioSpec};
 use libloading::Library;
@@ -9,26 +9,26 @@ use std::path::Path;
 use std::sync::OnceLock;
 use tempfile::NamedTempFile;
 
-/// The shim as the build script made it.
+/// The shim as built by the build script.
 static SHIM: &[u8] = include_bytes!(env!("LUMIRIS_OIIO_SHIM_BUILT"));
 
-/// Declares [`Api`] and how each function is looked up as `oiio_shim_<name>`.
+/// Declares [`Api`], and looks up each function as `oiio_shim_<name>`.
 macro_rules! api {
     ($($(#[doc = $doc:literal])* fn $name:ident($($arg:ident: $type:ty),* $(,)?) $(-> $result:ty)?;)*) => {
-        /// The functions of the shim; `shim/oiio_shim.h` documents them. All of them are unsafe to
-        /// call: pointers must be valid for what the header says, handles must be live.
+        /// The functions of the shim, documented in `shim/oiio_shim.h`. All of them are unsafe to call: pointers must
+        /// be valid as described in the header, handles must be live.
         #[derive(Clone, Copy, Debug)]
         pub struct Api {
             $($(#[doc = $doc])* pub $name: unsafe extern "C" fn($($arg: $type),*) $(-> $result)?,)*
         }
 
         impl Api {
-            /// Looks all functions up.
+            /// Looks up all functions.
             fn from_library(library: &Library) -> Result<Api, libloading::Error> {
                 $(
                     let name = concat!("oiio_shim_", stringify!($name), "\0");
-                    // SAFETY: the type is that of oiio_shim.h, whose version the caller compares
-                    // before it calls anything else; the library is never closed.
+                    // SAFETY: the type is declared in oiio_shim.h, whose version the caller compares before it calls
+                    // anything else; the library is never closed.
                     let $name = unsafe {
                         *library.get::<unsafe extern "C" fn($($arg: $type),*) $(-> $result)?>(name.as_bytes())?
                     };
@@ -40,17 +40,17 @@ macro_rules! api {
 }
 
 api! {
-    /// `OIIO_SHIM_ABI` of the shim loaded.
+    /// `OIIO_SHIM_ABI` of the loaded shim.
     fn abi() -> i32;
-    /// Version of the OpenImageIO loaded, for instance `2.4.7`. Lives forever.
+    /// Version of the loaded OpenImageIO, for instance `2.4.7`. Valid forever.
     fn version() -> *const c_char;
-    /// `openexr:exr,sxr,mxr;png:png;…`. Lives forever.
+    /// Formats with their extensions: `openexr:exr,sxr,mxr;png:png;…`. Valid forever.
     fn extensions() -> *const c_char;
     /// Sets a global attribute: `threads`, `exr_threads`, `limits:imagesize_MB`, `limits:channels`.
     fn set_int(name: *const c_char, value: i32, error: *mut c_char, error_size: usize) -> i32;
 
-    /// Turns RGB triples of a colour space into the colours of a display, by the configuration that
-    /// `$OCIO` names. `chosen` gets the display and the view, one per line.
+    /// Converts RGB triples of a colour space to display colours, with the configuration named by `$OCIO`. `chosen`
+    /// receives the display and the view, one per line.
     fn ocio_display(
         input: *const c_char, display: *const c_char, view: *const c_char, looks: *const c_char,
         pixels: *mut f32, count: u64, chosen: *mut c_char, chosen_size: usize,
@@ -83,24 +83,24 @@ api! {
         input: *mut OiioInput, subimage: i32, index: i32, attribute: *mut OiioAttribute,
         error: *mut c_char, error_size: usize,
     ) -> i32;
-    /// Number of floats `input_read` needs; an error if they take more than `max_bytes`, or if the
-    /// subimage is deep, a volume, or empty.
+    /// Number of floats needed by `input_read`. Fails if they take more than `max_bytes`, or if the subimage is deep, a
+    /// volume, or empty.
     fn input_float_count(
         input: *mut OiioInput, subimage: i32, max_bytes: u64, count: *mut u64,
         error: *mut c_char, error_size: usize,
     ) -> i32;
-    /// Reads all channels, interleaved, top row first. `count` is that of `input_float_count`.
+    /// Reads all channels, interleaved, top row first. `count` is the result of `input_float_count`.
     fn input_read(
         input: *mut OiioInput, subimage: i32, pixels: *mut f32, count: u64,
         error: *mut c_char, error_size: usize,
     ) -> i32;
-    /// A level of the pyramid of a subimage, of which 0 is the image itself.
+    /// A level of the pyramid of a subimage; level 0 is the image itself.
     fn input_level(
         input: *mut OiioInput, subimage: i32, level: i32, out: *mut OiioLevel,
         error: *mut c_char, error_size: usize,
     ) -> i32;
-    /// Reads `width` × `height` pixels of a level from column `x` and row `y` on: the channels from `channel_begin` to
-    /// before `channel_end`, interleaved, top row first. `count` is the number of these floats.
+    /// Reads `width` × `height` pixels of a level from column `x` and row `y` on: the channels
+    /// `channel_begin..channel_end`, interleaved, top row first. `count` is the total number of floats.
     fn input_read_region(
         input: *mut OiioInput, subimage: i32, level: i32, x: i32, y: i32, width: i32, height: i32,
         channel_begin: i32, channel_end: i32, pixels: *mut f32, count: u64,
@@ -109,7 +109,7 @@ api! {
     /// Closes and frees; null is allowed.
     fn input_close(input: *mut OiioInput);
 
-    /// Chooses the encoder by the extension of the path; no file is made yet.
+    /// Chooses the encoder by the extension of the path. No file is created yet.
     fn output_create(
         path: *const c_char, output: *mut *mut OiioOutput, error: *mut c_char, error_size: usize,
     ) -> i32;
@@ -137,30 +137,30 @@ api! {
         output: *mut OiioOutput, part: i32, name: *const c_char, value: *const f32,
         error: *mut c_char, error_size: usize,
     ) -> i32;
-    /// Makes the file and writes its header.
+    /// Creates the file and writes its header.
     fn output_open(output: *mut OiioOutput, error: *mut c_char, error_size: usize) -> i32;
-    /// Writes `rows` rows from `row_begin` on, 0 being the top, in order and without gaps; after the
-    /// last row of a part the next call writes `part + 1`.
+    /// Writes `rows` rows from `row_begin` on (0 is the top), in order and without gaps. After the last row of a part,
+    /// the next call writes `part + 1`.
     fn output_write(
         output: *mut OiioOutput, part: i32, row_begin: i32, rows: i32, pixels: *const f32,
         count: u64, error: *mut c_char, error_size: usize,
     ) -> i32;
-    /// Ends the file, and reports whatever could not be stored, a full disk included.
+    /// Ends the file. Reports everything that could not be stored, including a full disk.
     fn output_close(output: *mut OiioOutput, error: *mut c_char, error_size: usize) -> i32;
-    /// Frees; without `output_close` before, the file is left incomplete. Null is allowed.
+    /// Frees the handle. Without `output_close` before, the file is incomplete. Null is allowed.
     fn output_free(output: *mut OiioOutput);
 }
 
 /// The shim, opened by the first call. An error is final: later calls return it again.
 ///
-/// It is the file that `$LUMIRIS_OIIO_SHIM` names, or else the copy held in the executable, which is opened from memory, or
-/// from a temporary file of the user where that cannot be. No other place is looked at, since whoever can write there
-/// would run code in this process.
+/// The shim is the file named by `$LUMIRIS_OIIO_SHIM`, else the copy inside the executable. The copy is opened from
+/// memory, or from a temporary file of the user if that is impossible. No other locations are searched: whoever can
+/// write there could run code in this process.
 pub fn load() -> Result<&'static Api, String> {
     API.get_or_init(find).as_ref().map_err(Clone::clone)
 }
 
-/// True if [`load`] has loaded it.
+/// True if [`load`] has succeeded.
 pub fn is_loaded() -> bool {
     matches!(API.get(), Some(Ok(_)))
 }
@@ -176,16 +176,16 @@ fn find() -> Result<Api, String> {
     if let Ok(path) = in_memory() {
         return open(&path).map_err(|reason| format!("cannot load OpenImageIO: {reason}"));
     }
-    // Once open, the library needs its name no more
+    // Once open, the library does not need its name any more
     let file = temporary().map_err(|error| format!("cannot load OpenImageIO: temporary file: {error}"))?;
     open(file.path()).map_err(|reason| format!("cannot load OpenImageIO: {reason}"))
 }
 
-/// Opens one file and checks that it is of this version.
+/// Opens a file and checks its interface version.
 fn open(path: &Path) -> Result<Api, String> {
     let described = |error: libloading::Error| format!("{}: {error}", path.display());
-    // SAFETY: opening runs the initialisers of OpenImageIO and of what it depends on, which the
-    // user chose by installing or naming the library.
+    // SAFETY: opening runs the initialisers of OpenImageIO and of its dependencies, which the user chose by installing
+    // or naming the library.
     let library = unsafe { Library::new(path) }.map_err(described)?;
     let api = Api::from_library(&library).map_err(described)?;
     // SAFETY: `abi` has this type in all versions.
@@ -193,13 +193,13 @@ fn open(path: &Path) -> Result<Api, String> {
     if abi != OIIO_SHIM_ABI {
         return Err(format!("{}: interface version {abi}, not {OIIO_SHIM_ABI}", path.display()));
     }
-    // Its functions live as long as the process.
+    // The functions live as long as the process
     std::mem::forget(library);
     Ok(api)
 }
 
-/// The copy of the executable as a file that has no name, and its path, which is valid in this process alone. It remains open:
-/// debuggers and backtraces open the library by that path.
+/// The executable's copy as a file without a name. Returns its path, which is valid in this process only. The file
+/// remains open, since debuggers and backtraces open the library by that path.
 #[cfg(target_os = "linux")]
 fn in_memory() -> io::Result<std::path::PathBuf> {
     use std::os::fd::{AsRawFd, IntoRawFd};
@@ -207,13 +207,13 @@ fn in_memory() -> io::Result<std::path::PathBuf> {
     let mut file = std::fs::File::from(fd);
     file.write_all(SHIM)?;
     let path = format!("/proc/self/fd/{}", file.as_raw_fd()).into();
-    // Without /proc there is none
+    // Fails without /proc
     std::fs::metadata(&path)?;
     let _ = file.into_raw_fd();
     Ok(path)
 }
 
-/// The copy of the executable as a temporary file that only the user can read and write.
+/// The executable's copy as a temporary file that only the user can read and write.
 fn temporary() -> io::Result<NamedTempFile> {
     let mut file = tempfile::Builder::new().prefix("lumiris-oiio-").suffix(".so").tempfile()?;
     file.write_all(SHIM)?;
@@ -233,7 +233,7 @@ mod tests {
         open(file.path()).unwrap();
     }
 
-    /// Code of the shim that came from a folder could be replaced by whoever can write there.
+    /// A shim loaded from a folder could be replaced by whoever can write there.
     #[test]
     #[cfg(target_os = "linux")]
     fn the_shim_is_opened_from_memory_and_not_from_where_it_was_built() {

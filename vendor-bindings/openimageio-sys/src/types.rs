@@ -3,16 +3,16 @@
 use std::ffi::{c_char, c_void};
 use std::mem::size_of;
 
-/// Version of the interface; the shim tells its own by `Api::abi`.
+/// Version of the interface. The shim reports its own by `Api::abi`.
 pub const OIIO_SHIM_ABI: i32 = 3;
 
 /// Success.
 pub const OIIO_OK: i32 = 0;
 /// The caller's fault: null pointer, wrong index, wrong length.
 pub const OIIO_INVALID_ARGUMENT: i32 = 1;
-/// Missing, unreadable, not a picture, or the header is broken.
+/// Missing, unreadable, not an image, or the header is broken.
 pub const OIIO_CANNOT_OPEN: i32 = 2;
-/// Deep or volume data, or a format that cannot hold what was asked.
+/// Deep or volume data, or a format that cannot hold the requested data.
 pub const OIIO_UNSUPPORTED: i32 = 3;
 /// The header asks for more memory than the caller allows.
 pub const OIIO_TOO_LARGE: i32 = 4;
@@ -25,7 +25,7 @@ pub const OIIO_OUT_OF_MEMORY: i32 = 7;
 /// Any other C++ exception.
 pub const OIIO_EXCEPTION: i32 = 8;
 
-/// A channel type that is none of the others.
+/// Any other channel type.
 pub const OIIO_FORMAT_UNKNOWN: i32 = 0;
 /// Unsigned 8-bit integers; 0…255 is 0…1 as a float.
 pub const OIIO_FORMAT_U8: i32 = 1;
@@ -58,7 +58,7 @@ pub struct OiioOutput {
     _opaque: [u8; 0],
 }
 
-/// What the header of one subimage says. Not checked: a damaged file may say anything.
+/// Header of a subimage. Not checked: a damaged file may contain any values.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct OiioSpec {
@@ -66,7 +66,7 @@ pub struct OiioSpec {
     pub width: i32,
     /// Height of the data window (pixels).
     pub height: i32,
-    /// 1 for pictures, more for volumes.
+    /// 1 for images, more for volumes.
     pub depth: i32,
     /// First column of the data window (pixels).
     pub x: i32,
@@ -100,9 +100,9 @@ pub struct OiioLevel {
     pub width: i32,
     /// Height (pixels).
     pub height: i32,
-    /// Width of its tiles (pixels); 0 if it is stored in rows.
+    /// Width of its tiles (pixels); 0 if stored in rows.
     pub tile_width: i32,
-    /// Height of its tiles (pixels); 0 if it is stored in rows.
+    /// Height of its tiles (pixels); 0 if stored in rows.
     pub tile_height: i32,
 }
 
@@ -128,7 +128,7 @@ pub struct OiioAttribute {
 pub struct OiioPart {
     /// Name of the part, or null.
     pub name: *const c_char,
-    /// For instance `zip`, `piz`, `dwaa:45`, `jpeg:90`, or null for the format's default.
+    /// For instance `zip`, `piz`, `dwaa:45`, `jpeg:90`; null for the format's default.
     pub compression: *const c_char,
     /// Width of the data window (pixels).
     pub width: i32,
@@ -142,9 +142,9 @@ pub struct OiioPart {
     pub full_x: i32,
     /// First row of the display window (pixels).
     pub full_y: i32,
-    /// Width of the display window (pixels); 0: that of the data window.
+    /// Width of the display window (pixels); 0 for the data window's.
     pub full_width: i32,
-    /// Height of the display window (pixels); 0: that of the data window.
+    /// Height of the display window (pixels); 0 for the data window's.
     pub full_height: i32,
     /// Number of channels.
     pub nchannels: i32,
@@ -154,7 +154,7 @@ pub struct OiioPart {
     pub channel_formats: *const i32,
 }
 
-// The shim asserts the same figures.
+// The shim asserts the same sizes
 const _: () = {
     assert!(size_of::<OiioSpec>() == 14 * 4);
     assert!(size_of::<OiioLevel>() == 4 * 4);

@@ -1,4 +1,4 @@
-//! What cannot be read or written is an error with a message: never a crash, never a wrong success.
+//! Impossible reads and writes are errors with messages: never a crash, never a false success.
 
 mod common;
 
@@ -30,12 +30,12 @@ fn a_message_is_cut_to_the_buffer_and_ends_in_zero() {
     let path = c("/no/such/directory/picture.exr");
     let mut input = std::ptr::null_mut();
     let mut message = [0x7F_i8 as std::ffi::c_char; 8];
-    // SAFETY: seven bytes and a zero fit the eight of the buffer that the call is told of.
+    // SAFETY: seven bytes and a zero fit into the buffer of eight bytes.
     let code = unsafe { (api().input_open)(path.as_ptr(), 0, &mut input, message.as_mut_ptr(), 8) };
     assert_eq!(code, OIIO_CANNOT_OPEN);
     assert!(input.is_null());
     assert_eq!(string(message.as_ptr()).len(), 7);
-    // SAFETY: no buffer is allowed too.
+    // SAFETY: a null buffer is allowed, too.
     let code = unsafe { (api().input_open)(path.as_ptr(), 0, &mut input, std::ptr::null_mut(), 0) };
     assert_eq!(code, OIIO_CANNOT_OPEN);
 }
@@ -58,7 +58,7 @@ fn wrong_indices_and_lengths_are_refused() {
     let input = Input::open(&path, false).unwrap();
     assert!(input.spec(1).is_err());
     assert_eq!(input.spec(-1).unwrap_err().0, OIIO_INVALID_ARGUMENT);
-    // After an error the handle still works.
+    // The handle still works after an error
     assert_eq!(input.read(0, LIMIT).unwrap(), noise(48));
 
     let part = Part { name: "", compression: "", width: 4, height: 4, channels: &RGB_FLOAT };
@@ -99,14 +99,14 @@ fn an_unwritable_place_is_an_error() {
     assert!(message.contains("No such file"), "{message}");
 }
 
-/// `/dev/full` accepts being opened and refuses every write.
+/// `/dev/full` can be opened, but refuses every write.
 #[cfg(target_os = "linux")]
 #[test]
 fn a_full_disk_is_an_error_in_six_formats() {
     for (extension, channels) in
         [("exr", RGB_FLOAT), ("png", RGB_U8), ("hdr", RGB_FLOAT), ("tga", RGB_U8), ("jpg", RGB_U8), ("tif", RGB_FLOAT)]
     {
-        // A small picture fits the buffers, so that only the end of the file meets the disk.
+        // A small image fits into the buffers, so only the end of the file reaches the disk
         for size in [4, 200] {
             let path = temp(&format!("full_{size}.{extension}"));
             let _ = fs::remove_file(&path);
@@ -120,6 +120,7 @@ fn a_full_disk_is_an_error_in_six_formats() {
 
 #[test]
 fn a_truncated_picture_is_an_error_or_pixels_but_never_a_crash() {
+    // Images cut at 32 positions
     let (width, height) = (40, 30);
     for (extension, channels) in
         [("png", RGB_U8), ("jpg", RGB_U8), ("hdr", RGB_FLOAT), ("tga", RGB_U8), ("exr", RGB_FLOAT), ("tif", RGB_U8)]
@@ -168,7 +169,7 @@ fn flipped_bytes_are_an_error_or_pixels_but_never_a_crash() {
 fn colours_that_are_no_triples_and_names_that_are_null_are_the_callers_fault() {
     let (mut pixels, mut chosen) = ([0.5_f32; 4], [0 as std::ffi::c_char; 16]);
     let (empty, data) = (c(""), pixels.as_mut_ptr());
-    // SAFETY: the name ends in a zero byte or is null, `data` holds four floats, `chosen` 16 bytes.
+    // SAFETY: the name ends in a zero byte or is null; `data` holds four floats, `chosen` 16 bytes.
     let mut display = |name: *const std::ffi::c_char, count| unsafe {
         let name_of_all = empty.as_ptr();
         check(|e, n| {

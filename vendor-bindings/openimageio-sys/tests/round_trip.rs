@@ -1,11 +1,11 @@
-//! What is written is read again.
+//! Files that are written can be read again.
 
 mod common;
 
 use common::*;
 use openimageio_sys::*;
 
-/// The metadata of both parts are those that were written.
+/// Asserts the metadata written to both parts.
 fn assert_metadata(input: &Input) {
     let attributes = input.attributes(0);
     let value = |name: &str| (attributes[name].0.as_str(), attributes[name].1.as_str());
@@ -39,7 +39,7 @@ fn an_exr_of_two_parts_keeps_channels_formats_and_metadata() {
     output.set_string(1, "lumiris:part", "second part");
     output.open().unwrap();
 
-    // The first part in two steps, the second at once.
+    // The first part in two steps, the second at once
     let first = noise(9 * 5 * 6);
     let second: Vec<f32> = noise(9 * 5 * 2).iter().map(|v| v * 1e6).collect();
     output.write(0, 0, 2, &first[..9 * 2 * 6]).unwrap();
@@ -55,7 +55,7 @@ fn an_exr_of_two_parts_keeps_channels_formats_and_metadata() {
     assert_eq!((spec.width, spec.height, spec.depth, spec.nchannels), (9, 5, 1, 6));
     assert_eq!((spec.full_width, spec.full_height, spec.deep), (9, 5, 0));
 
-    // Channels come in another order, with the formats they were written in.
+    // Channels are in another order, with their original formats
     let found = input.channels(0);
     let pixels = input.read(0, LIMIT).unwrap();
     for (c, (name, format)) in beauty.iter().enumerate() {
@@ -100,7 +100,7 @@ fn unassociated_alpha_leaves_colours_as_stored() {
     let path = temp("alpha.png");
     let part = Part { name: "", compression: "", width: 2, height: 1, channels: &rgba };
     let output = Output::create(&path, &[part]).unwrap();
-    // The writer shall not divide by alpha either.
+    // The writer must not divide by alpha either
     let name = c("oiio:UnassociatedAlpha");
     // SAFETY: the handle is live, the name ends in a zero byte.
     check(|e, n| unsafe { (api().output_set_int)(output.0, 0, name.as_ptr(), 1, e, n) }).unwrap();

@@ -1,4 +1,4 @@
-//! Embree and the BVH on the same rays, and the check itself on a tracer that is wrong.
+//! Embree and the BVH on the same rays, and the check itself on a faulty tracer.
 
 use super::{Family, crosscheck};
 use lumiris::accel::bvh::Bvh;
@@ -25,13 +25,13 @@ fn embree_and_the_bvh_agree_on_every_family_of_rays() {
     assert_eq!(report.tallies.len(), 5);
     for (family, tally) in &report.tallies {
         assert!(tally.rays > 10_000 && tally.hits > 100, "{family:?} {tally:?}");
-        // Rays at the borders of open surfaces are a matter of rounding; others hardly ever are.
+        // At the borders of open surfaces rounding decides; elsewhere it rarely does
         assert!(*family == Family::Edge || tally.edge_flips * 1000 < tally.rays, "{family:?} {tally:?}");
     }
     assert_eq!(report.disagreements(), 0, "{report:#?}");
 }
 
-/// A tracer that loses one hit in a thousand.
+/// A tracer that reports a wrong result for one ray in a thousand.
 struct Leaky(Bvh);
 
 impl Accel for Leaky {

@@ -1,4 +1,4 @@
-//! Options that several subcommands share, as typed.
+//! Command-line options shared by several subcommands.
 
 use super::denoise_args::DenoiseArgs;
 use super::exr::ExrArgs;
@@ -20,7 +20,7 @@ use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 use strum::VariantNames;
 
-/// An AOV, or none.
+/// Parses the name of an AOV, or `none`.
 pub(super) fn aov() -> impl TypedValueParser<Value = Option<Aov>> {
     let names = Aov::VARIANTS.iter().copied().chain(["none"]);
     PossibleValuesParser::new(names).try_map(|name| if name == "none" { Ok(None) } else { name.parse().map(Some) })
@@ -42,30 +42,30 @@ pub(super) struct SceneArgs {
     /// Crop window, in fractions of the image [default: the file's]
     #[arg(long, value_name = "X0,X1,Y0,Y1", value_parser = parse_crop)]
     pub crop: Option<[f32; 4]>,
-    /// Image of the environment of a glTF scene: latitude and longitude, or a square of equal areas
+    /// Environment map of a glTF scene: latitude–longitude, or square in the equal-area octahedral mapping
     #[arg(long, value_name = "FILE")]
     pub environment: Option<PathBuf>,
     /// Scene of a glTF file, by its name or its index [default: the file's]
     #[arg(long, value_name = "NAME|INDEX")]
     pub scene_in_file: Option<String>,
-    /// Camera of a glTF scene, by its name or its index, which `lumiris info` lists [default: the first]
+    /// Camera of a glTF scene, by name or by index as listed by `lumiris info` [default: the first]
     #[arg(long, value_name = "NAME|INDEX", conflicts_with = "camera_auto")]
     pub camera: Option<String>,
-    /// Frame a glTF scene from the front and somewhat above, whatever its cameras
+    /// Place an automatic camera in front of and slightly above a glTF scene, instead of its own cameras
     #[arg(long)]
     pub camera_auto: bool,
-    /// What candela and lux of lights in a glTF file are beside emission: with `watt`, 683 of them are 1 W/sr and 1 W/m², as in files of Blender; with
-    /// `candela` they are taken as they are, with emission in cd/m², as glTF has it [default: watt]
+    /// Units of glTF punctual lights. `watt`: candela and lux are divided by 683 lm/W, as in files of Blender.
+    /// `candela`: they are taken as they are, and emission is in cd/m², as in the glTF specification [default: watt]
     #[arg(long, value_name = "UNIT", value_parser = named::<LightUnits>())]
     pub light_units: Option<LightUnits>,
-    /// Time (s) at which the animations of a glTF scene are seen [default: without animations]
+    /// Time (s) of a glTF scene's animations [default: animations are ignored]
     #[arg(long, value_name = "SECONDS", value_parser = parse_time_in_scene)]
     pub time_in_scene: Option<f32>,
-    /// What the scene has of a sequence, if it is a frame of one.
+    /// Sequence data, if the scene is a frame of an animation.
     #[arg(skip)]
     pub frame: Option<FrameOf>,
-    /// Memory that the textures of the scene may take, such as 2GB, or `off`: what does not fit is read by tiles from a
-    /// temporary file (in TMPDIR). The image is the same to the bit [default: off]
+    /// Memory for the textures of the scene, such as 2GB, or `off`. The rest is read by tiles from a temporary file (in
+    /// TMPDIR). Images are bit-identical [default: off]
     #[arg(long, value_name = "SIZE", value_parser = parse_limit)]
     pub texture_memory: Option<MemoryLimit>,
     /// Use a box filter of one pixel instead of the file's pixel filter
@@ -74,8 +74,8 @@ pub(super) struct SceneArgs {
     /// Ray tracer
     #[arg(long, default_value = "embree", value_parser = named::<AccelKind>())]
     pub accel: AccelKind,
-    /// Rays per Embree packet: 1, 4, 8 or 16; affects speed only, not the image [default: what the processor is fastest
-    /// with]
+    /// Rays per Embree packet: 1, 4, 8 or 16; affects speed only, not the image [default: the fastest for the
+    /// processor]
     #[arg(long, value_name = "W", value_parser = parse_packet_width)]
     pub packet_width: Option<u32>,
     /// Threads [default: all cores]
@@ -87,12 +87,12 @@ pub(super) struct SceneArgs {
 }
 
 impl SceneArgs {
-    /// The scene as messages name it.
+    /// Name of the scene in messages.
     pub(super) fn name(&self) -> Cow<'_, str> {
         if is_standard_input(&self.scene) { "<stdin>".into() } else { self.scene.to_string_lossy() }
     }
 
-    /// How the scene is loaded.
+    /// Options for loading the scene.
     pub(super) fn load_options(&self) -> LoadOptions {
         LoadOptions {
             resolution: self.resolution,
@@ -107,7 +107,7 @@ impl SceneArgs {
     }
 }
 
-/// Options of `render` that `-h` shows, beside itself.
+/// Options of `render` that `-h` lists, in addition to `-h` itself.
 const IN_SHORT_HELP: [&str; 24] = [
     "output",
     "quiet",
@@ -135,7 +135,7 @@ const IN_SHORT_HELP: [&str; 24] = [
     "resume",
 ];
 
-/// Leaves all others to `--help`.
+/// Hides options that are not in [`IN_SHORT_HELP`] from `-h`.
 pub(super) fn in_short_help(option: Arg) -> Arg {
     let is_hidden = option.get_long().is_some_and(|name| !IN_SHORT_HELP.contains(&name));
     option.hide_short_help(is_hidden)
@@ -144,42 +144,42 @@ pub(super) fn in_short_help(option: Arg) -> Arg {
 /// `lumiris render`
 #[derive(Args, Clone, Debug)]
 pub(super) struct RenderArgs {
-    // First: the fields that follow take their values from the command line
+    // First, because later fields take their values from the command line
     #[command(flatten)]
     pub output_options: OutputOptions,
     #[command(flatten)]
     pub scene: SceneArgs,
-    /// Output image; may be given several times. EXR stores all channels; PNG, JPEG, TIFF and TGA the tone-mapped image; .part
-    /// what `lumiris merge` needs
-    /// [default: the name in the file, or SCENE.exr]
+    /// Output image; may be given several times. EXR stores all channels; PNG, JPEG, TIFF and TGA the tone-mapped
+    /// image; .part the input of `lumiris merge` [default: the name in the file, or SCENE.exr]
     #[arg(short, long, value_name = "FILE")]
     pub output: Vec<PathBuf>,
-    /// Frames of an animation, such as 1-48, 1-48:2 or 5,10-20: `####` in SCENE, and in the FILEs of --output, --checkpoint and
-    /// --resume, becomes the number of the frame; a glTF scene needs none (--fps)
+    /// Frames of an animation, such as 1-48, 1-48:2 or 5,10-20. `####` becomes the frame number in SCENE and in the
+    /// FILEs of --output, --checkpoint and --resume. A glTF scene needs no `####` (see --fps)
     #[arg(long, value_name = "LIST", value_parser = parse_frames, requires = "output")]
     pub frames: Option<FrameList>,
-    /// With --frames of a glTF scene without ####: frames per second; frame n is the scene at the time n/F
+    /// With --frames and a glTF scene without ####: frames per second; frame n is at the time n/F
     #[arg(long, value_name = "F", default_value_t = 24.0, value_parser = parse_fps, requires = "frames")]
     pub fps: f32,
-    /// With --frames: whether each frame has a seed of its own, which follows from --seed and its number, and stands in its
-    /// metadata
+    /// With --frames: whether each frame has its own seed, computed from --seed and the frame number. The seed is in
+    /// the metadata
     #[arg(
         long, value_name = "on|off", default_value = "on", action = ArgAction::Set, value_parser = BoolishValueParser::new(),
         requires = "frames"
     )]
     pub seed_per_frame: bool,
-    /// With --frames: leave out those whose images are there, and were not cut short by Ctrl-C
+    /// With --frames: skip frames whose images exist and were not interrupted by Ctrl-C
     #[arg(long, requires = "frames")]
     pub skip_existing: bool,
-    /// Render for this many seconds from the start of the program (with --frames: of each frame), loading and pilots included, or
-    /// until --spp, if it is given, is reached before
+    /// Stop after this many seconds, counted from the start of the program (with --frames: of each frame), loading and
+    /// pilots included. With --spp, stop earlier if that is reached
     #[arg(long, value_name = "SECONDS", value_parser = parse_seconds)]
     pub time: Option<f64>,
-    /// Try settings before, and take what is a tenth more efficient than the rule's: for long renders. `lumiris plan` stores it
+    /// Test settings first, and use the best if it is at least a tenth more efficient than the default rule's. For long
+    /// renders. `lumiris plan` stores the result
     #[arg(long, hide_short_help = true, conflicts_with_all = ["plan", "part", "samples_from", "samples_to"])]
     pub tune: bool,
-    /// AOVs: additional channels of EXR files, or `none`, which saves the time for them [default: all, and ratio with
-    /// --proposals optimal]
+    /// AOVs: additional channels of EXR files. `none` saves their time [default: all, and ratio with --proposals
+    /// optimal]
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = aov())]
     pub aov: Option<Vec<Option<Aov>>>,
     #[command(flatten)]
@@ -193,8 +193,8 @@ pub(super) struct RenderArgs {
     /// Write times and counts of every stage
     #[arg(long, value_name = "FILE.json")]
     pub stats: Option<PathBuf>,
-    /// Memory that the process may take, such as 24GB, or `off`: what will not fit is refused before it is rendered
-    /// [default: what the machine and its control groups have]
+    /// Memory limit of the process, such as 24GB, or `off`. A render that would exceed it is refused before it starts
+    /// [default: the memory of the machine and its control groups]
     #[arg(long, value_name = "SIZE", value_parser = parse_limit)]
     pub memory_limit: Option<MemoryLimit>,
     /// Print no progress, only warnings and errors
@@ -204,7 +204,7 @@ pub(super) struct RenderArgs {
     pub parts: PartArgs,
 }
 
-/// True for `-`: a pbrt scene whose files are relative to the working directory.
+/// True for `-`: a pbrt scene from the standard input, whose files are relative to the working directory.
 pub(super) fn is_standard_input(scene: &Path) -> bool {
     scene.as_os_str() == "-"
 }
@@ -242,7 +242,7 @@ fn parse_packet_width(text: &str) -> Result<u32, String> {
     }
 }
 
-/// Understands a time of a scene, which may lie before its start.
+/// Parses a time (s) of the animations. It may be negative.
 fn parse_time_in_scene(text: &str) -> Result<f32, String> {
     text.parse::<f32>().ok().filter(|s| s.is_finite()).ok_or_else(|| "expected a number of seconds".to_owned())
 }

@@ -16,7 +16,7 @@ use serde_json::json;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-/// What to measure.
+/// Measurements of `lumiris bench`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum Subject {
     /// Proposals, and the times of all stages
@@ -29,7 +29,7 @@ enum Subject {
     Photons,
     /// A whole frame, and the share of a bare Embree loop over its rays
     Frame,
-    /// Everything so far
+    /// All of the above
     All,
     /// Efficiency of settings: 1/(error × CPU time)
     Efficiency,
@@ -38,7 +38,7 @@ enum Subject {
 /// `lumiris bench`
 #[derive(Args, Clone, Debug)]
 pub(super) struct BenchArgs {
-    /// What to measure
+    /// Measurement
     #[arg(default_value = "all")]
     subject: Subject,
     #[command(flatten)]
@@ -57,16 +57,21 @@ pub(super) struct BenchArgs {
 }
 
 pub(super) fn run(args: &BenchArgs) -> anyhow::Result<ExitCode> {
+    // Efficiency has its own options and report
     if args.subject == Subject::Efficiency {
         efficiency(&args.scene, &args.efficiency, args.json.as_deref())?;
         return Ok(ExitCode::SUCCESS);
     }
+
+    // Check the arguments before the scene is loaded
     if args.scene.accel != AccelKind::Embree {
         bail!("bench measures Embree; leave out --accel");
     }
     args.json.as_deref().map_or(Ok(()), check_writable)?;
     let (mut job, Setup { times, given, .. }) = load_job(&args.scene)?;
     plan(&args.scene, (&mut job, &given), &Preparation::default(), false)?;
+
+    // Measure
     let asked = |subject| args.subject == subject || args.subject == Subject::All;
     let settings = BenchSettings {
         intersect: asked(Subject::Intersect),
@@ -81,6 +86,8 @@ pub(super) fn run(args: &BenchArgs) -> anyhow::Result<ExitCode> {
     let frame = if asked(Subject::Frame) { Some(frame()?) } else { None };
     let photons = if asked(Subject::Photons) { photons(args, &job)? } else { None };
     let report = measure(job, &settings)?;
+
+    // Write the JSON report
     if let Some(path) = &args.json {
         let mut value = serde_json::to_value(&report)?;
         let name = args.scene.scene.display().to_string();
@@ -92,6 +99,8 @@ pub(super) fn run(args: &BenchArgs) -> anyhow::Result<ExitCode> {
         write_text(path, &serde_json::to_string_pretty(&value)?)
             .with_context(|| format!("cannot write {}", path.display()))?;
     }
+
+    // Print the tables
     frame.iter().try_for_each(|report| progress::print(frame_table(report).trim_end()))?;
     photons.iter().try_for_each(|report| progress::print(&photon_table(report)))?;
     if settings.intersect || settings.t1 || settings.t2 {
@@ -131,6 +140,7 @@ fn photons(args: &BenchArgs, job: &RenderJob) -> anyhow::Result<Option<PhotonRep
 }
 
 fn table(report: &Report) -> String {
+    // Stages
     let mut text = format!("{} camera rays, one thread\n", report.camera_rays);
     if !report.stages.is_empty() {
         text += &format!("\n{:<22}{:>10}{:>12}{:>10}\n", "stage", "seconds", "items", "ns/item");
@@ -139,6 +149,8 @@ fn table(report: &Report) -> String {
         let each = stage.seconds * 1e9 / stage.items.max(1) as f64;
         text += &format!("{:<22}{:>10.4}{:>12}{each:>10.1}\n", stage.name, stage.seconds, stage.items);
     }
+
+    // Rays
     if let Some([ours, bare]) = report.build_seconds {
         text += &format!("\nbuild on all cores: renderer {ours:.3} s, bare {bare:.3} s\n");
         text += "ratio: speed of the renderer by that of the bare loop, from medians of batches; of turns: median of whole runs (range)\n";

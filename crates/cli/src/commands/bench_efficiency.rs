@@ -22,12 +22,12 @@ use std::path::{Path, PathBuf};
 #[derive(Args, Clone, Debug)]
 #[command(next_help_heading = "Efficiency")]
 pub(super) struct EfficiencyArgs {
-    /// Settings to compare, as options of render: 'mis8=--estimator mis --samples 8'; all are compared with the first.
-    /// May be given several times [default: mis, ris, ocv and contributing with 1, 2, 4 and 8 samples, by the light tree
-    /// and by photons]
+    /// Settings to compare, as options of render: 'mis8=--estimator mis --samples 8'. All are compared with the first.
+    /// May be given several times [default: mis, ris, ocv and contributing with 1, 2, 4 and 8 samples, with the light
+    /// tree and with photons]
     #[arg(long = "case", value_name = "NAME=OPTIONS", value_parser = parse_case)]
     cases: Vec<NamedOptions>,
-    /// Further scenes
+    /// Additional scenes
     #[arg(long, value_name = "SCENE", num_args = 1..)]
     more_scenes: Vec<PathBuf>,
     /// Integrators, one after the other [default: --integrator]
@@ -36,25 +36,25 @@ pub(super) struct EfficiencyArgs {
     /// Seeds of each setting
     #[arg(long, value_name = "N", default_value_t = 2, value_parser = clap::value_parser!(u32).range(2..=1000))]
     seeds: u32,
-    /// Options that all settings but the first get besides, as further settings: 'adaptive=--allocation adaptive'. May be
-    /// given several times
+    /// Additional options for all settings but the first; they are measured with and without: 'adaptive=--allocation
+    /// adaptive'. May be given several times
     #[arg(long = "variant", value_name = "NAME=OPTIONS", value_parser = parse_case)]
     variants: Vec<NamedOptions>,
-    /// Find errors against two references of N samples per pixel, by `--estimator auto` and the integrator, whose noise drops
-    /// out; without them, errors are variances between seeds
+    /// Measure errors against two references of N samples per pixel (`--estimator auto`, same integrator); their noise
+    /// cancels. Without references, errors are variances between seeds
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     reference_spp: Option<u32>,
-    /// Keep the references in this folder, and use those of the same scene and settings that are there, which are of the
-    /// program that made them
+    /// Keep the references in this folder, and reuse stored ones of the same scene and settings. The program version
+    /// that rendered them is not checked
     #[arg(long, value_name = "DIR", requires = "reference_spp")]
     references: Option<PathBuf>,
-    /// Before, render all settings but the first once with N samples per pixel, and leave out those that have less than half of
-    /// the efficiency of the best by every error, with each of the variants and without
+    /// Screening pass: render all settings but the first once with N samples per pixel. Skip settings with less than
+    /// half the efficiency of the best by every error measure, separately for each variant
     #[arg(long, value_name = "N", requires = "reference_spp", value_parser = clap::value_parser!(u32).range(1..))]
     screen_spp: Option<u32>,
 }
 
-/// Share of the best efficiency in a first look below which a case is left out.
+/// A case is skipped if its efficiency in the screening pass is below this share of the best.
 const LEFT_OUT_BELOW: f64 = 0.5;
 
 /// Options with a name.
@@ -70,13 +70,13 @@ fn parse_case(text: &str) -> Result<NamedOptions, String> {
     Ok(NamedOptions { name: name.trim().to_owned(), options })
 }
 
-/// Estimators, numbers of samples and light samplers that are compared by default.
+/// The default cases: estimators × light samplers × sample counts.
 fn default_cases(base: &Settings) -> Vec<Case> {
     let kinds = [EstimatorKind::Mis, EstimatorKind::Ris, EstimatorKind::Ocv, EstimatorKind::Contributing];
     let lights = [LightSamplerKind::Tree, LightSamplerKind::Photons];
     let mut cases = vec![Case { name: "default".to_owned(), settings: *base }];
     for (estimator, light_sampler) in kinds.iter().flat_map(|kind| lights.iter().map(move |lights| (*kind, *lights))) {
-        // The lights of contributing are found by photons in any case
+        // `contributing` always finds its lights by photons
         if (estimator, light_sampler) == (EstimatorKind::Contributing, LightSamplerKind::Tree) {
             continue;
         }
@@ -92,7 +92,7 @@ fn default_cases(base: &Settings) -> Vec<Case> {
     cases
 }
 
-/// What was measured of a scene.
+/// The results of a scene.
 #[derive(Serialize)]
 struct Table {
     scene: String,
@@ -102,26 +102,26 @@ struct Table {
     seeds: u32,
     reference_spp: Option<u32>,
     rows: Vec<Row>,
-    /// Settings that a first look left out.
+    /// Settings that the screening pass skipped.
     left_out: Vec<LeftOut>,
 }
 
-/// Settings of little efficiency.
+/// Settings that the screening pass skipped for low efficiency.
 #[derive(Clone, Debug, Serialize)]
 struct LeftOut {
     name: String,
-    /// Relative to the best of those with the same variant in a first look, by each of [`ERRORS`].
+    /// Efficiency in the screening pass by each of [`ERRORS`], relative to the best with the same variant.
     relative: [f64; 3],
 }
 
 impl LeftOut {
-    /// The efficiency by the error that favours it most.
+    /// The largest of the relative efficiencies.
     fn best(&self) -> f64 {
         self.relative.into_iter().fold(0.0, f64::max)
     }
 }
 
-/// The cases without those that are left out, and these.
+/// Splits the cases into those to measure and those to skip.
 fn sorted_out(cases: Vec<Case>, relative: &[[f64; 3]]) -> (Vec<Case>, Vec<LeftOut>) {
     let (kept, left_out): (Vec<_>, Vec<_>) =
         cases.into_iter().zip(relative).partition(|(_, relative)| relative.iter().any(|r| *r >= LEFT_OUT_BELOW));
@@ -129,8 +129,8 @@ fn sorted_out(cases: Vec<Case>, relative: &[[f64; 3]]) -> (Vec<Case>, Vec<LeftOu
     (kept.into_iter().map(|(case, _)| case).collect(), left_out.collect())
 }
 
-/// Measures all scenes and prints a table of each, and one of what the first settings are by the best of the others. The JSON
-/// file is written after each table, so that what was measured is there if a scene cannot be rendered.
+/// Measures all scenes. Prints a table per scene, then a summary: the efficiency of the first settings relative to the
+/// best of the others. The JSON file is rewritten after each table, so that results are kept if a later scene fails.
 pub(super) fn efficiency(scene_args: &SceneArgs, own: &EfficiencyArgs, json: Option<&Path>) -> anyhow::Result<()> {
     let mut tables = Vec::new();
     let write = |tables: &[Table]| -> anyhow::Result<()> {
@@ -138,17 +138,19 @@ pub(super) fn efficiency(scene_args: &SceneArgs, own: &EfficiencyArgs, json: Opt
         write_text(path, &serde_json::to_string_pretty(tables)?)
             .with_context(|| format!("cannot write {}", path.display()))
     };
-    // Before hours are spent on what cannot be written
+    // Fail before hours are spent if the file cannot be written
     write(&tables)?;
     let variants: Vec<&str> = own.variants.iter().map(|variant| variant.name.as_str()).collect();
     let variants_and_none = || std::iter::once(None).chain(variants.iter().copied().map(Some));
     let variant_of = |name: &str| variants.iter().copied().find(|variant| is_variant(name, variant));
+
+    // Measure each scene with each integrator
     for path in std::iter::once(&scene_args.scene).chain(&own.more_scenes) {
         let mut scene = scene_args.clone();
         scene.scene.clone_from(path);
         let (mut job, Setup { files, .. }) = load_job_of(&scene, &FileCache::default(), None, None)?;
         let mut base = *job.settings();
-        // Cases with other numbers of samples are of the same textures
+        // Texture filtering is the same for cases with other sample counts
         base.sampling.footprint_spp = Some(base.sampling.footprint_spp());
         let references = own.reference_spp.map(|spp| References::new(spp, own.references.as_deref(), &scene, &files));
         let references = references.transpose()?;
@@ -165,6 +167,8 @@ pub(super) fn efficiency(scene_args: &SceneArgs, own: &EfficiencyArgs, json: Opt
             let references = references.as_ref().map(|r| r.images(&mut job, &base, &of_scene)).transpose()?;
             let observe = &mut |name: &str, seed| progress::say(&format!("{}: {name}, seed {seed}", path.display()));
             let failed = || format!("cannot render {}", path.display());
+
+            // Screening pass
             let mut left_out = Vec::new();
             if let Some((spp, references)) = own.screen_spp.zip(references.as_ref()) {
                 let others = cases.split_off(1);
@@ -178,6 +182,8 @@ pub(super) fn efficiency(scene_args: &SceneArgs, own: &EfficiencyArgs, json: Opt
                     left_out.extend(weak);
                 }
             }
+
+            // Measure the remaining cases
             let rows = measure_efficiency(&mut job, &cases, own.seeds, references.as_ref(), &of_scene, observe)
                 .with_context(failed)?;
             let table = Table {
@@ -196,6 +202,8 @@ pub(super) fn efficiency(scene_args: &SceneArgs, own: &EfficiencyArgs, json: Opt
             progress::print(&shown)?;
         }
     }
+
+    // Summaries
     for variant in variants_and_none() {
         if let Some(text) = summary(&tables, variant, |row| variant_of(&row.name) == variant) {
             progress::print(&text)?;
@@ -204,7 +212,7 @@ pub(super) fn efficiency(scene_args: &SceneArgs, own: &EfficiencyArgs, json: Opt
     Ok(())
 }
 
-/// Says why a case is left out, if it does not render a scene.
+/// True if a case can render the scene; otherwise prints the reason.
 fn is_possible(case: &Case, (job, scene): (&RenderJob, &Path)) -> bool {
     let refusal = features::refusal(job, &case.settings.integrator);
     if let Some(conflict) = refusal {
@@ -232,7 +240,7 @@ fn cases(args: &EfficiencyArgs, base: &Settings) -> Vec<Case> {
     cases
 }
 
-/// What the names of settings with a variant end with.
+/// The suffix of the names of cases with a variant.
 fn suffix(variant: &str) -> String {
     format!(", {variant}")
 }
@@ -241,7 +249,7 @@ fn is_variant(case: &str, variant: &str) -> bool {
     case.ends_with(&suffix(variant))
 }
 
-/// An efficiency, or a dash where it is within the noise.
+/// Formats an efficiency; a dash if it is not distinguishable from noise.
 fn known(efficiency: f64) -> String {
     if efficiency.is_finite() { format!("{efficiency:.2}") } else { "–".to_owned() }
 }
@@ -266,6 +274,8 @@ fn text(table: &Table) -> String {
         "MSE",
         "eff."
     );
+
+    // One line per row, and lines with the choices of `auto`, seeds of equal choices together
     for row in &table.rows {
         text += &format!("{:<28}{:>8.2}{:>10.5}", row.name, row.cpu_seconds, row.mean);
         for Efficiency { error, relative, interval } in [row.relmse, row.masked_mse] {
@@ -284,6 +294,8 @@ fn text(table: &Table) -> String {
             text += &format!("    chose {} (seed {})\n", chosen.join(", "), seeds.join(", "));
         }
     }
+
+    // Settings that were skipped
     if !table.left_out.is_empty() {
         let names: Vec<String> =
             table.left_out.iter().map(|row| format!("{} ({})", row.name, known(row.best()))).collect();
@@ -292,7 +304,7 @@ fn text(table: &Table) -> String {
     text.trim_end().to_owned()
 }
 
-/// Errors by which the first settings are compared with the best of the others.
+/// Error measures by which the first settings are compared with the best of the others.
 const ERRORS: [&str; 3] = ["relMSE", "MSE masked", "MSE"];
 
 /// Efficiency by each of [`ERRORS`].
@@ -300,29 +312,31 @@ fn efficiencies(row: &Row) -> [Efficiency; 3] {
     [row.relmse, row.masked_mse, row.mse]
 }
 
-/// The efficiency of the first settings by that of the best of the others of a variant, for each error, with intervals and
-/// geometric means; `None` if there are no others. The best are chosen by the images that are compared, so they are the
-/// luckiest too.
+/// The efficiency of the first settings relative to the best others of a variant, for each error measure, with
+/// intervals and geometric means. `None` if there are no others. The best are selected by the compared images
+/// themselves, so they are favoured by selection bias.
 fn summary(tables: &[Table], variant: Option<&str>, is_of_variant: impl Fn(&Row) -> bool) -> Option<String> {
     let title = format!("first row by the best of others in hindsight{}", variant.map(suffix).unwrap_or_default());
     let mut text = format!("\n{title:<48}{:>8}", "CPU s");
     ERRORS.iter().for_each(|name| text += &format!("{name:>12}{:<33}", ""));
     text += "\n";
     let mut logarithms = [(); 3].map(|()| Vec::new());
+
+    // One line per scene
     for table in tables {
         let Some((first, others)) = table.rows.split_first() else { continue };
         let others: Vec<&Row> = others.iter().filter(|row| is_of_variant(row)).collect();
         if others.is_empty() {
             continue;
         }
-        // Scenes of different folders may have one name
+        // Scenes in different folders may have the same name
         let path = Path::new(&table.scene).with_extension("");
         let last: Vec<_> = path.iter().rev().take(2).map(|part| part.to_string_lossy()).collect();
         let name = last.into_iter().rev().collect::<Vec<_>>().join("/");
         text += &format!("{:<48}{:>8.2}", format!("{name}, {}", table.integrator), first.cpu_seconds);
         for (kind, logarithms) in logarithms.iter_mut().enumerate() {
             let of = |row: &Row| efficiencies(row)[kind];
-            // Among those whose error is within its noise as well: the best of what is known may be the worst of all
+            // Includes rows whose error is within its noise: the best of the others may be the worst of all
             let product = |row: &Row| of(row).error * row.cpu_seconds;
             let best = others.iter().min_by(|a, b| product(a).total_cmp(&product(b)));
             let Some(best) = best.filter(|row| of(row).relative.is_finite()) else {
@@ -336,6 +350,8 @@ fn summary(tables: &[Table], variant: Option<&str>, is_of_variant: impl Fn(&Row)
         }
         text += "\n";
     }
+
+    // Means over all scenes
     text += &format!("{:<56}", "geometric mean");
     for logarithms in &logarithms {
         let mean = (logarithms.iter().sum::<f64>() / logarithms.len() as f64).exp();
@@ -372,6 +388,7 @@ mod tests {
 
     #[test]
     fn the_first_is_compared_with_the_best_of_the_others_for_each_error() {
+        // Rows with given efficiencies
         let efficiency = |relative: f64| {
             let error = if relative.is_nan() { 1.0 } else { 1.0 / relative };
             Efficiency { error, relative, interval: [relative / 2.0, relative * 2.0] }
@@ -395,6 +412,8 @@ mod tests {
             rows,
             left_out: Vec::new(),
         };
+
+        // Scenes with a variant, without other rows, and with an efficiency within the noise
         let first = row("auto", [1.0; 3]);
         let tables = [
             table("a/one.pbrt", vec![first.clone(), row("x", [0.25, 0.5, 4.0]), row("y", [0.5, f64::NAN, 1.0])]),
@@ -406,6 +425,8 @@ mod tests {
             let text = text.expect("there are others");
             text.trim().lines().map(|l| l.split_whitespace().collect::<Vec<_>>().join(" ")).collect()
         };
+
+        // Values of the best others, and their means
         assert_eq!(
             lines(None)[1..],
             [
@@ -432,6 +453,7 @@ mod tests {
 
     #[test]
     fn variants_are_of_all_settings_but_the_first() {
+        // Options as typed
         use clap::Parser;
         #[derive(Parser)]
         struct Words {
@@ -445,6 +467,8 @@ mod tests {
             "--variant=four=--samples 4",
             "--variant=no=--spp 9",
         ];
+
+        // Each variant is applied to all cases but the first
         let own = Words::parse_from(words).own;
         let cases = cases(&own, &Settings::default());
         let names: Vec<&str> = cases.iter().map(|c| c.name.as_str()).collect();

@@ -1,4 +1,4 @@
-//! The references of `lumiris bench efficiency`, which may be kept.
+//! The references of `lumiris bench efficiency`, which can be stored.
 
 use super::args::SceneArgs;
 use super::progress;
@@ -15,16 +15,16 @@ use lumiris_bench::efficiency::{Colors, reference_image, reference_settings};
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::path::Path;
 
-/// Two images of a scene to compare others with.
+/// Two independent reference images of a scene.
 pub(super) struct References<'a> {
     scene: &'a SceneArgs,
     spp: u32,
-    /// Where they are kept, and what tells the files of the scene from others.
+    /// Folder of the stored references, and the fingerprint of the scene's files.
     kept: Option<(&'a Path, u64)>,
 }
 
 impl<'a> References<'a> {
-    /// References of `spp` samples per pixel that `folder` keeps, if there is one.
+    /// References with `spp` samples per pixel, stored in `folder` if it is given.
     pub(super) fn new(
         spp: u32,
         folder: Option<&'a Path>,
@@ -32,7 +32,7 @@ impl<'a> References<'a> {
         files: &SceneFiles,
     ) -> anyhow::Result<Self> {
         let keep = |folder: &'a Path| {
-            // Before hours are spent on what cannot be written
+            // Fail before hours are spent if the folder cannot be created
             std::fs::create_dir_all(folder).with_context(|| format!("cannot create {}", folder.display()))?;
             let fingerprint = files.fingerprint();
             let fingerprint = fingerprint.map_err(|(path, e)| anyhow!("cannot read {}: {e}", path.display()))?;
@@ -41,7 +41,7 @@ impl<'a> References<'a> {
         Ok(References { scene, spp, kept: folder.map(keep).transpose()? })
     }
 
-    /// Both, which are rendered where they are not kept.
+    /// Both references: read from the folder if they are there, else rendered.
     pub(super) fn images(
         &self,
         job: &mut RenderJob,
@@ -49,12 +49,15 @@ impl<'a> References<'a> {
         render_settings: &RenderSettings,
     ) -> anyhow::Result<[Colors; 2]> {
         let scene = self.scene.scene.display();
+        // Use the stored reference
         let mut image = |index: u32| -> anyhow::Result<Colors> {
             let settings = reference_settings(base, self.spp, index);
             let kept = self.kept.map(|(folder, fingerprint)| folder.join(self.name(fingerprint, job, &settings)));
             if let Some(path) = kept.as_ref().filter(|path| path.exists()) {
                 return read(path, &job.world.scene.film.bounds);
             }
+
+            // Render and store it
             progress::say(&format!("{scene}: reference {}, {} samples", index + 1, self.spp));
             let colors = reference_image(job, settings, render_settings);
             let colors = colors.with_context(|| format!("cannot render {scene}"))?;
@@ -66,7 +69,7 @@ impl<'a> References<'a> {
         Ok([image(0)?, image(1)?])
     }
 
-    /// A name for each scene, with what is shown of it, and settings.
+    /// A file name unique to the scene, the load options and the settings.
     fn name(&self, fingerprint: u64, job: &RenderJob, settings: &Settings) -> String {
         let mut hasher = DefaultHasher::new();
         let shown = format!("{:?}", self.scene.load_options());
@@ -77,7 +80,7 @@ impl<'a> References<'a> {
     }
 }
 
-/// Reads a reference of these pixels.
+/// Reads a reference; fails if its size differs from `bounds`.
 fn read(path: &Path, bounds: &PixelBounds) -> anyhow::Result<Colors> {
     let (read, layer) = read_colors(path, &ReadLimits::default())?;
     let image = read.image;

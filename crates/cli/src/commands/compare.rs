@@ -60,7 +60,7 @@ pub(super) struct CompareArgs {
 enum MetricArg {
     /// Mean squared error
     Mse,
-    /// Its root
+    /// Root of the mean squared error
     Rmse,
     /// Mean of squared errors over the squared reference plus ε
     Relmse,
@@ -97,7 +97,7 @@ impl MetricArg {
     }
 }
 
-/// A metric and its limit.
+/// A metric with its threshold.
 #[derive(Clone, Copy, Debug)]
 struct Limit {
     column: &'static Column,
@@ -149,7 +149,7 @@ pub(super) fn run(args: &CompareArgs) -> anyhow::Result<ExitCode> {
             .with_context(|| format!("cannot write the page into {}", folder.display()))?;
         progress::say(&format!("The page is in {}", page.display()));
     }
-    // Files first: they are there whether the standard output is or not
+    // Written after the files, which are complete even if the standard output fails
     let is_printed = args.json.is_some() && file.is_none();
     progress::print(&if is_printed { text.trim_end().to_owned() } else { table(&set, &settings, &compared) })?;
     failures.iter().for_each(|f| progress::say(f));
@@ -164,7 +164,7 @@ fn check_files(args: &CompareArgs) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Selected metrics, and those that limits refer to.
+/// The selected metrics, and the metrics of the limits.
 fn settings(args: &CompareArgs) -> Settings {
     let limits = args.fail_above.iter().chain(&args.fail_below);
     let mut metrics: Vec<Metric> = args.metrics.iter().map(|m| m.metric()).collect();
@@ -184,16 +184,21 @@ fn settings(args: &CompareArgs) -> Settings {
 
 /// Remarks on the images, each with the name of its image.
 fn remarks(set: &ImageSet, compared: &[Compared]) -> Vec<(String, String)> {
+    // Remarks on loading
     let mut remarks = Vec::new();
     for shown in set.images.iter().chain([&set.reference]) {
         remarks.extend(shown.remarks.iter().map(|r| (shown.name.clone(), r.clone())));
     }
+
+    // Pixels that are not finite
     let odd = compared.iter().map(|c| c.scores.differences.nonfinite);
     let reference_odd = compared.first().map_or(0, |c| c.scores.differences.reference_nonfinite);
     let names = set.images.iter().chain([&set.reference]).map(|s| &s.name);
     for (name, count) in names.zip(odd.chain([reference_odd])).filter(|(_, count)| *count > 0) {
         remarks.push((name.clone(), format!("{count} pixels are not finite and take no part")));
     }
+
+    // Region
     let [region, display] = [set.region.size(), set.display];
     if region != display {
         let r = set.region;
@@ -211,7 +216,7 @@ fn remarks(set: &ImageSet, compared: &[Compared]) -> Vec<(String, String)> {
     remarks
 }
 
-/// The violated limits, in words. A limit on a metric that cannot be computed is an error.
+/// The violated limits as messages. Fails if the metric of a limit cannot be computed.
 fn failures(args: &CompareArgs, set: &ImageSet, compared: &[Compared]) -> anyhow::Result<Vec<String>> {
     let mut failures = Vec::new();
     let above = args.fail_above.iter().map(|l| (l, "above"));
@@ -220,7 +225,7 @@ fn failures(args: &CompareArgs, set: &ImageSet, compared: &[Compared]) -> anyhow
             let Some(value) = (limit.column.value)(&c.scores) else {
                 bail!("{}: `{}` cannot be computed: the file has no variances", image.name, limit.column.key);
             };
-            // Negated, so that NaN fails.
+            // The negation makes NaN fail
             let magnitude = value.abs();
             let within = if side == "above" { magnitude <= limit.value } else { magnitude >= limit.value };
             if !within {
@@ -233,6 +238,7 @@ fn failures(args: &CompareArgs, set: &ImageSet, compared: &[Compared]) -> anyhow
 
 /// One line per image, one aligned column per metric.
 fn table(set: &ImageSet, settings: &Settings, compared: &[Compared]) -> String {
+    // Cells
     let scores: Vec<&Scores> = compared.iter().map(|c| &c.scores).collect();
     let columns = shown_columns(&settings.metrics, &scores);
     let header = ["image"].into_iter().chain(columns.iter().map(|c| c.title)).map(str::to_owned);
@@ -241,6 +247,8 @@ fn table(set: &ImageSet, settings: &Settings, compared: &[Compared]) -> String {
         let cell = |c: &&Column| (c.value)(s).map_or("–".to_owned(), c.text);
         rows.push([image.name.clone()].into_iter().chain(columns.iter().map(cell)).collect());
     }
+
+    // Alignment: names to the left, numbers to the right
     let width = |column: usize| rows.iter().map(|r| r[column].chars().count()).max().unwrap_or(0);
     let widths: Vec<usize> = (0..=columns.len()).map(width).collect();
     let line = |row: &Vec<String>| {
@@ -253,7 +261,7 @@ fn table(set: &ImageSet, settings: &Settings, compared: &[Compared]) -> String {
     rows.iter().map(line).collect::<Vec<_>>().join("\n")
 }
 
-/// All numbers. Infinite and undefined ones are null.
+/// All numbers as JSON. Infinite and undefined numbers are null.
 fn report(
     args: &CompareArgs,
     set: &ImageSet,
@@ -261,6 +269,7 @@ fn report(
     compared: &[Compared],
     failures: &[String],
 ) -> Value {
+    // Entries of the images
     let image_json = |shown: &Shown| {
         json!({
             "path": shown.path.display().to_string(), "layer": shown.layer,
@@ -274,6 +283,8 @@ fn report(
         }
         entry
     });
+
+    // Report
     let r = set.region;
     json!({
         "reference": image_json(&set.reference),
@@ -290,12 +301,15 @@ fn report(
 }
 
 fn numbers(map: &mut Map<String, Value>, settings: &Settings, compared: &Compared) {
+    // Columns of the table
     let s = &compared.scores;
     for column in &COLUMNS {
         if column.metric.is_none_or(|m| settings.metrics.contains(&m)) {
             map.insert(column.key.to_owned(), json!((column.value)(s)));
         }
     }
+
+    // Numbers beside the table
     let d = &s.differences;
     map.insert("pixels".into(), json!(d.pixels));
     map.insert("reference_nonfinite".into(), json!(d.reference_nonfinite));

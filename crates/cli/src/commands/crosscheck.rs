@@ -19,14 +19,14 @@ use std::process::ExitCode;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-/// Fraction of the pixels that may differ visibly between the two images: rays at edges.
+/// Fraction of the pixels that may differ visibly between the two images, because of rays at edges.
 const MAX_DIFFERENT_PIXELS: f64 = 0.005;
 /// A pixel differs visibly if it is off by more than this, relative to the larger of it and the image's mean.
 const PIXEL_TOLERANCE: f64 = 0.01;
 /// Allowed relative difference of the images' means.
 const MEAN_TOLERANCE: f64 = 1e-3;
 
-/// Images that `--images` stores.
+/// Names of the images written by `--images`.
 const IMAGES: [&str; 3] = ["embree", "bvh", "difference"];
 
 /// `lumiris crosscheck`
@@ -103,7 +103,7 @@ pub(super) fn run(args: &CrosscheckArgs) -> anyhow::Result<ExitCode> {
 
 /// Refuses files that cannot be written.
 fn check_files(args: &CrosscheckArgs) -> anyhow::Result<()> {
-    // The folder is made if it is not there
+    // The folder is created later if it does not exist
     let folder = args.images.as_ref().filter(|folder| folder.exists());
     let images = folder.into_iter().flat_map(|folder| IMAGES.map(|name| image_in(folder, name)));
     images.chain(args.json.clone()).try_for_each(|path| check_writable(&path))?;
@@ -129,7 +129,7 @@ fn table(report: &Report) -> String {
     text.trim_end().to_owned()
 }
 
-/// The mean of each pixel, RGB interleaved.
+/// Mean of every pixel, RGB interleaved.
 fn image(args: &CrosscheckArgs, job: &RenderJob) -> anyhow::Result<Vec<f32>> {
     let settings = render_settings(&args.scene, job);
     let rendering = render(job, &settings, &AtomicBool::new(false), &|_| ())?;

@@ -1,4 +1,4 @@
-//! `lumiris denoise`: an image file gets the layer `denoised`.
+//! `lumiris denoise`: adds the layer `denoised` to an image file.
 
 use super::UsageError;
 use super::denoise_args::{DENOISED, DENOISED_KEY, Denoised, LAYER, open};
@@ -21,10 +21,10 @@ use std::process::ExitCode;
 /// `lumiris denoise`
 #[derive(Args, Clone, Debug)]
 pub(super) struct DenoiseFileArgs {
-    /// EXR file with the image, and its albedo and normal, as `render` writes it
+    /// EXR file with the image, albedo and normal, as written by `render`
     input: PathBuf,
-    /// Output image; may be given several times: EXR has all layers of the input, and the layer `denoised`; PNG, JPEG, TIFF
-    /// and TGA show the denoised image
+    /// Output image; may be given several times. EXR has all layers of the input and the layer `denoised`; PNG, JPEG,
+    /// TIFF and TGA show the denoised image
     #[arg(short, long, value_name = "FILE", required = true)]
     output: Vec<PathBuf>,
     /// Library of Open Image Denoise 2 [default: the environment variable LUMIRIS_OIDN, or the system's]
@@ -41,6 +41,7 @@ pub(super) struct DenoiseFileArgs {
 }
 
 pub(super) fn run(args: &DenoiseFileArgs) -> anyhow::Result<ExitCode> {
+    // Check the arguments
     check_outputs(&args.output)?;
     if let Some(path) = args.output.iter().find(|path| is_part(path)) {
         return Err(UsageError(format!("{}: a denoised image is no part of another", path.display())).into());
@@ -52,6 +53,7 @@ pub(super) fn run(args: &DenoiseFileArgs) -> anyhow::Result<ExitCode> {
     }
     let denoiser = open(args.oidn_library.as_deref(), args.threads)?;
 
+    // Read and denoise
     let mut parts = read_file_parts(&args.input, &ReadLimits::default())?;
     drop_earlier_result(&mut parts);
     let layer = image_of(&parts).map_err(|reason| anyhow!("{}: {reason}", args.input.display()))?;
@@ -65,6 +67,7 @@ pub(super) fn run(args: &DenoiseFileArgs) -> anyhow::Result<ExitCode> {
     let image = noisy_image(&parts, &layer, |text| progress::say(&format!("{}: {text}", args.input.display())));
     let denoised = Denoised::new(&denoiser, image)?;
 
+    // Write all outputs
     let mut misplaced = Vec::new();
     let mut written = Vec::new();
     for path in &args.output {
@@ -85,6 +88,8 @@ pub(super) fn run(args: &DenoiseFileArgs) -> anyhow::Result<ExitCode> {
             Err(error) => misplaced.push(format!("{error:#}")),
         }
     }
+
+    // Report
     if !args.quiet && !written.is_empty() {
         progress::say(&format!("{}: {}", written.join(", "), denoised.about));
     }
@@ -94,7 +99,7 @@ pub(super) fn run(args: &DenoiseFileArgs) -> anyhow::Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// Leaves out what an earlier run has added.
+/// Removes the layer and the metadata of an earlier run.
 fn drop_earlier_result(parts: &mut Vec<FilePart>) {
     for part in parts.iter_mut() {
         part.retain_channels(|name| !DENOISED.contains(&name));
@@ -103,7 +108,7 @@ fn drop_earlier_result(parts: &mut Vec<FilePart>) {
     parts.retain(|part| !part.image.channels.is_empty());
 }
 
-/// Where the image is.
+/// Finds the layer of the image.
 fn image_of(parts: &[FilePart]) -> Result<ColorLayer, String> {
     let header = |part: &FilePart| PartHeader {
         name: part.name.clone(),
@@ -123,8 +128,9 @@ fn layer(part: &FilePart, channels: [usize; 3]) -> Vec<f32> {
     part.image.data.chunks_exact(stride).flat_map(|pixel| channels.map(|c| pixel[c])).collect()
 }
 
-/// The image and its guides, where they have its size; warns of those that are missing.
+/// The image with its guides of the same size. Warns of missing guides.
 fn noisy_image(parts: &[FilePart], image: &ColorLayer, warn: impl Fn(&str)) -> NoisyImage {
+    // Find the guides
     let part = &parts[image.part];
     let is_beside = |other: &&FilePart| {
         let size = |p: &FilePart| (p.image.width, p.image.height, p.origin);
@@ -139,6 +145,8 @@ fn noisy_image(parts: &[FilePart], image: &ColorLayer, warn: impl Fn(&str)) -> N
     };
     let albedo = guide(["albedo.R", "albedo.G", "albedo.B"]);
     let normal = guide(["normal.X", "normal.Y", "normal.Z"]);
+
+    // Warn of missing guides
     match (&albedo, &normal) {
         (Some(_), Some(_)) => {}
         (Some(_), None) => warn("warning: has no layer normal: denoised by colour and albedo"),
@@ -147,6 +155,8 @@ fn noisy_image(parts: &[FilePart], image: &ColorLayer, warn: impl Fn(&str)) -> N
         }
         (None, None) => warn("warning: has neither albedo nor normal: denoised by colour, which loses detail"),
     }
+
+    // A grey image fills all three channels
     let at = image.channels.as_slice();
     let rgb = std::array::from_fn(|c| at[c.min(at.len() - 1)]);
     let normal = normal.filter(|_| albedo.is_some());
@@ -154,7 +164,7 @@ fn noisy_image(parts: &[FilePart], image: &ColorLayer, warn: impl Fn(&str)) -> N
     NoisyImage { width, height, color: layer(part, rgb), albedo, normal }
 }
 
-/// Position of a channel of this name, whatever precedes it, as other programs name theirs: `Albedo.R`,
+/// Index of the channel `name`. Accepts prefixes and other capitalisation, as other programs write: `Albedo.R`,
 /// `ViewLayer.Denoising Albedo.R`.
 fn position(part: &FilePart, name: &str) -> Option<usize> {
     let names = &part.image.channels;
@@ -165,7 +175,7 @@ fn position(part: &FilePart, name: &str) -> Option<usize> {
     part.image.channel(name).or_else(|| names.iter().position(|channel| is_named(channel)))
 }
 
-/// The file with the layer: a part of its own, where layers are parts.
+/// Adds the layer: as a part of its own if the file has several parts.
 fn with_layer(mut parts: Vec<FilePart>, image: &ColorLayer, denoised: &Denoised) -> Vec<FilePart> {
     let (main, channels) = (image.part, image.channels.as_slice());
     let storage = channels.first().and_then(|&red| parts[main].storage.get(red)).copied().unwrap_or(Storage::Float);
@@ -180,13 +190,13 @@ fn with_layer(mut parts: Vec<FilePart>, image: &ColorLayer, denoised: &Denoised)
     parts
 }
 
-/// True if pixels have noise in common.
+/// True if pixels share paths, so that their noise is correlated.
 fn shares_paths(parts: &[FilePart]) -> bool {
     let edge = texts(parts).into_iter().find(|(name, _)| name == "lumiris:path_reuse");
     edge.is_some_and(|(_, edge)| edge.parse::<u32>().is_ok_and(|edge| edge > 1))
 }
 
-/// What the file says of its settings.
+/// The metadata of the settings.
 fn texts(parts: &[FilePart]) -> Vec<(String, String)> {
     let entries = parts.iter().take(1).flat_map(|part| &part.metadata);
     let entries = entries.filter_map(|(name, value)| match value {

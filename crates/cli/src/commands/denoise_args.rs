@@ -1,4 +1,4 @@
-//! Options of denoising, and what became of it.
+//! Options of denoising, and the denoised image.
 
 use super::UsageError;
 use super::part_args::extension;
@@ -8,23 +8,23 @@ use lumiris::imaging::oidn::{DenoiseError, Denoiser, NoisyImage};
 use lumiris::render::output::{Aov, Layers};
 use std::path::{Path, PathBuf};
 
-/// Name of the layer, and of its part in files of several parts.
+/// Name of the layer, and of its part in multi-part files.
 pub(super) const LAYER: &str = "denoised";
-/// Its channels.
+/// Channels of the layer.
 pub(super) const DENOISED: [&str; 3] = ["denoised.R", "denoised.G", "denoised.B"];
-/// Metadata: what denoised the image, and by which layers.
+/// Metadata key: denoiser and guide layers.
 pub(super) const DENOISED_KEY: &str = "lumiris:denoised";
-/// Metadata of images for a display: which layer they show.
+/// Metadata key: the layer shown by a display image.
 const SHOWN_KEY: &str = "lumiris:layer";
-/// Environment variable of the library.
+/// Environment variable with the path of the library.
 const LIBRARY_VARIABLE: &str = "LUMIRIS_OIDN";
 
 /// Options of `render` and `merge`.
 #[derive(Args, Clone, Debug)]
 #[command(next_help_heading = "Denoising")]
 pub(super) struct DenoiseArgs {
-    /// Denoise the image by Open Image Denoise, albedo and normal: EXR files, of which there must be one, have the layer
-    /// `denoised` beside the image; PNG, JPEG, TIFF and TGA show the denoised image
+    /// Denoise the image with Open Image Denoise, guided by albedo and normal. EXR files, of which at least one is
+    /// required, get the layer `denoised`; PNG, JPEG, TIFF and TGA show the denoised image
     #[arg(long)]
     pub denoise: bool,
     /// Library of Open Image Denoise 2 [default: the environment variable LUMIRIS_OIDN, or the system's]
@@ -38,7 +38,7 @@ impl DenoiseArgs {
         self.denoise.then(|| open(self.oidn_library.as_deref(), threads)).transpose()
     }
 
-    /// Refuses to show a denoised image without keeping the other.
+    /// Refuses `--denoise` without an EXR output, since the noisy image would be lost.
     pub(super) fn check(&self, outputs: &[PathBuf]) -> Result<(), UsageError> {
         if self.denoise && !outputs.iter().any(|path| extension(path) == "exr") {
             let text = "--denoise needs an EXR file among the outputs, which keeps the image as it was rendered";
@@ -48,8 +48,8 @@ impl DenoiseArgs {
     }
 }
 
-/// The image without noise; or why there is none, which is no reason to lose the image. Whether the film has the features of
-/// the first surfaces is said.
+/// The denoised image, or an error message: a failure does not lose the rendered image. `has_features`: the film has
+/// the features of the first surfaces.
 pub(super) fn denoise(denoiser: &Denoiser, film: &Film, has_features: bool) -> (Option<Denoised>, Option<String>) {
     match Denoised::of_film(denoiser, film, has_features) {
         Ok(denoised) => (Some(denoised), None),
@@ -57,11 +57,11 @@ pub(super) fn denoise(denoiser: &Denoiser, film: &Film, has_features: bool) -> (
     }
 }
 
-/// Opens the library: that of the option, of the environment or of the system.
+/// Opens the library named by the option, else by the environment, else the system's.
 pub(super) fn open(library: Option<&Path>, threads: Option<u32>) -> anyhow::Result<Denoiser> {
     let of_environment = std::env::var_os(LIBRARY_VARIABLE).filter(|path| !path.is_empty()).map(PathBuf::from);
     let library = library.or(of_environment.as_deref());
-    // The dynamic loader does not look for mere names in the current folder
+    // The dynamic loader does not search the current folder for plain names
     let library = library.map(|path| match std::path::absolute(path) {
         Ok(absolute) if absolute.is_file() => absolute,
         _ => path.to_owned(),
@@ -79,7 +79,7 @@ pub(super) fn open(library: Option<&Path>, threads: Option<u32>) -> anyhow::Resu
 pub(super) struct Denoised {
     /// RGB, interleaved.
     pub pixels: Vec<f32>,
-    /// What denoised it, and by which layers.
+    /// Denoiser and guide layers.
     pub about: String,
 }
 
@@ -95,7 +95,7 @@ impl Denoised {
         Ok(Denoised { pixels: denoiser.denoise(image)?, about })
     }
 
-    /// Denoises a film, by the features of the first surfaces if it has them.
+    /// Denoises a film, guided by the features of the first surfaces if it has them.
     fn of_film(denoiser: &Denoiser, film: &Film, has_features: bool) -> Result<Self, DenoiseError> {
         let layer = |has_image: bool, aovs: &[Aov]| {
             let PixelBounds { y0, y1, .. } = film.bounds;
@@ -111,12 +111,12 @@ impl Denoised {
         Denoised::new(denoiser, image)
     }
 
-    /// Metadata of files that have the layer.
+    /// Metadata of files with the layer.
     pub(super) fn metadata(&self) -> Vec<(String, String)> {
         vec![(DENOISED_KEY.to_owned(), self.about.clone())]
     }
 
-    /// Metadata of files that show the layer instead of the image.
+    /// Metadata of files that show the layer instead of the rendered image.
     pub(super) fn metadata_shown(&self) -> Vec<(String, String)> {
         let mut metadata = self.metadata();
         metadata.push((SHOWN_KEY.to_owned(), "denoised".to_owned()));

@@ -14,7 +14,7 @@ use std::ops::Range;
 use std::path::Path;
 use strum::{EnumString, VariantNames};
 
-/// Compressions, and whether they keep every bit of a float.
+/// Compressions; true if lossless for 32-bit floats.
 const COMPRESSIONS: [(&str, bool); 10] = [
     ("none", true),
     ("rle", true),
@@ -27,7 +27,7 @@ const COMPRESSIONS: [(&str, bool); 10] = [
     ("dwaa", false),
     ("dwab", false),
 ];
-/// Layers that 16 bits suffice for; of others the numbers count, or they are too small.
+/// Channels for which 16 bits are enough. Other channels need exact numbers, or have values too small for 16 bits.
 const COLORS: [&str; 12] = [
     "R",
     "G",
@@ -42,10 +42,10 @@ const COLORS: [&str; 12] = [
     "denoised.G",
     "denoised.B",
 ];
-/// Largest number that 16 bits hold.
+/// Largest finite 16-bit float.
 const MAX_HALF: f32 = 65_504.0;
 
-/// How colours are stored.
+/// Storage of colours.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, EnumString, VariantNames)]
 #[strum(serialize_all = "kebab-case")]
 enum ExrType {
@@ -53,7 +53,7 @@ enum ExrType {
     Float,
 }
 
-/// How layers are arranged.
+/// Arrangement of layers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, EnumString, VariantNames)]
 #[strum(serialize_all = "kebab-case")]
 enum ExrParts {
@@ -65,13 +65,13 @@ enum ExrParts {
 #[derive(Args, Clone, Debug)]
 #[command(next_help_heading = "EXR")]
 pub(super) struct ExrArgs {
-    /// Floats of the image, denoised or not, albedo and normal; all other channels are always `float`
+    /// Storage of the image, denoised or not, of albedo and of normal; all other channels are always `float`
     #[arg(long, value_name = "TYPE", default_value = "float", value_parser = named::<ExrType>())]
     exr_type: ExrType,
-    /// Compression; Cryptomatte layers, which bear no loss, have `zip` where it is pxr24, b44, b44a, dwaa or dwab
+    /// Compression. Cryptomatte layers need a lossless one: they get `zip` instead of pxr24, b44, b44a, dwaa or dwab
     #[arg(long, value_name = "NAME", default_value = "zip", value_parser = PossibleValuesParser::new(COMPRESSIONS.map(|(name, _)| name)))]
     exr_compression: String,
-    /// One part with all layers, or a part for each
+    /// One part with all layers, or one part per layer
     #[arg(long, value_name = "PARTS", default_value = "single", value_parser = named::<ExrParts>())]
     exr_parts: ExrParts,
     /// Cryptomatte layers of objects and materials: ids and coverage, for compositing programs
@@ -82,16 +82,16 @@ pub(super) struct ExrArgs {
     pub cryptomatte: Vec<Cryptomatte>,
 }
 
-/// Channels that belong together, which are made row by row.
+/// Channels that belong together, computed row by row.
 pub(super) struct ExrLayer<'a> {
-    /// Name of its part, where each layer has one.
+    /// Name of its part in files with a part per layer.
     pub name: String,
     pub channels: Vec<String>,
-    /// The values of some rows, from 0 on, interleaved.
+    /// Returns the values of a range of rows, interleaved. Row 0 is the first.
     pub rows: Box<dyn Fn(Range<usize>) -> Vec<f32> + 'a>,
-    /// Entries that stand with the layer.
+    /// Metadata of the layer.
     pub metadata: Vec<(String, String)>,
-    /// Whether the values are ids, which bear no loss.
+    /// True if the values are ids, which need lossless compression.
     pub is_exact: bool,
 }
 
@@ -110,7 +110,7 @@ impl ExrArgs {
         COMPRESSIONS.iter().any(|(name, lossless)| *name == self.exr_compression && *lossless)
     }
 
-    /// Refuses what cannot be, before time is spent on rendering.
+    /// Refuses impossible combinations before time is spent on rendering.
     pub(super) fn check(&self) -> anyhow::Result<()> {
         if !self.cryptomatte.is_empty() && !self.is_lossless() && self.exr_parts == ExrParts::Single {
             let text = "--cryptomatte: the ids would not survive the compression; --exr-parts multi keeps them apart";
@@ -119,17 +119,20 @@ impl ExrArgs {
         Ok(())
     }
 
-    /// True if each layer has a part of its own.
+    /// True if each layer is a separate part.
     pub(super) fn is_multi(&self) -> bool {
         self.exr_parts == ExrParts::Multi
     }
 
-    /// Writes a file; a warning is what it returns.
+    /// Writes a file. Returns a warning if pixels are too bright for 16 bits.
     pub(super) fn write(&self, path: &Path, image: &ExrImage<'_>) -> anyhow::Result<Option<String>> {
+        // Assign layers to parts
         let parts: Vec<&[ExrLayer<'_>]> = match self.exr_parts {
             ExrParts::Single => vec![&image.layers],
             ExrParts::Multi => image.layers.chunks(1).collect(),
         };
+
+        // Write, and count pixels beyond the range of 16 bits
         let mut bright = vec![0; parts.len()];
         let counts = RefCell::new(&mut bright);
         let is_color = |name: &String| COLORS.contains(&name.as_str());
@@ -152,7 +155,7 @@ impl ExrArgs {
         }))
     }
 
-    /// The parts of a file, without their values.
+    /// The parts of a file without their values.
     fn parts(&self, image: &ExrImage<'_>, parts: &[&[ExrLayer<'_>]]) -> Vec<Part> {
         let film = image.film;
         let [width, height] = [film.bounds.width() as usize, film.bounds.height() as usize];
@@ -171,7 +174,7 @@ impl ExrArgs {
             }
         };
         let mut parts: Vec<Part> = parts.iter().map(new_part).collect();
-        // Readers of several parts look into the first for what concerns all
+        // Readers of multi-part files look for common metadata in the first part
         let of_layers = image.layers.iter().flat_map(|layer| layer.metadata.clone()).collect();
         let first = parts.remove(0).with_metadata(image.metadata.clone()).with_metadata(of_layers);
         parts.insert(0, with_standard_attributes(first, image.camera, image.seconds));
@@ -184,7 +187,7 @@ fn channels(layers: &[ExrLayer<'_>]) -> Vec<String> {
     layers.iter().flat_map(|layer| layer.channels.iter().cloned()).collect()
 }
 
-/// Some rows of all layers side by side.
+/// Some rows of all layers, interleaved by pixel.
 fn joined(layers: &[ExrLayer<'_>], rows: Range<usize>) -> Vec<f32> {
     if let [layer] = layers {
         return (layer.rows)(rows);
@@ -203,9 +206,9 @@ fn joined(layers: &[ExrLayer<'_>], rows: Range<usize>) -> Vec<f32> {
     data
 }
 
-/// Adds the attributes that other programs know.
+/// Adds standard EXR attributes, which other programs read.
 fn with_standard_attributes(part: Part, camera: &CameraMatrices, seconds: f64) -> Part {
-    // OpenEXR has row vectors: the columns of a matrix for column vectors, one after the other
+    // OpenEXR uses row vectors, so the columns of a matrix for column vectors are stored one after the other
     let part = part
         .with_value("software", MetaValue::Text(format!("Lumiris {}", env!("CARGO_PKG_VERSION"))))
         .with_value("renderTime", MetaValue::Number(seconds as f32));

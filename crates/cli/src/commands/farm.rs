@@ -47,22 +47,23 @@ enum Queue {
 struct SlurmArgs {
     #[command(flatten)]
     scene: AsTyped<SceneArgs>,
-    /// Frames of an animation, such as 1-48, as for `render`: an array job and a merge for each
+    /// Frames of an animation, such as 1-48, as for `render`: one array job and one merge per frame
     #[arg(long, value_name = "LIST", value_parser = parse_frames)]
     frames: Option<FrameList>,
     /// With --frames of a glTF scene without ####: frames per second [default: 24]
     #[arg(long, value_name = "F", value_parser = parse_fps, requires = "frames")]
     fps: Option<f32>,
-    /// With --frames: whether each frame has a seed of its own [default: on]
+    /// With --frames: whether each frame has its own seed [default: on]
     #[arg(long, value_name = "on|off", value_parser = BoolishValueParser::new(), requires = "frames")]
     seed_per_frame: Option<bool>,
-    /// Number of parts of an image, each of which is a task of an array job [default with --frames: 1]
+    /// Number of parts per image; each is a task of an array job [default with --frames: 1]
     #[arg(
         long = "parts", value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000),
         required_unless_present = "frames"
     )]
     count: Option<u32>,
-    /// What a part has: `samples`, a share of the samples of every pixel, or `tiles`, all samples of a share of the pixels
+    /// Content of a part. `samples`: a share of the samples of every pixel. `tiles`: all samples of a share of the
+    /// pixels
     #[arg(long, value_name = "WHAT", default_value = "samples", value_parser = named::<PartBy>())]
     part_by: PartBy,
     /// Output image of the merge; may be given several times
@@ -80,17 +81,17 @@ struct SlurmArgs {
     /// Time between the checkpoints of a part
     #[arg(long, value_name = "SECONDS", default_value_t = 60, value_parser = clap::value_parser!(u32).range(1..))]
     checkpoint_seconds: u32,
-    /// An option of sbatch for all jobs, such as --sbatch=--partition=render; may be given several times
+    /// Option of sbatch for all jobs, such as --sbatch=--partition=render; may be given several times
     #[arg(long, value_name = "OPTION", allow_hyphen_values = true)]
     sbatch: Vec<String>,
-    /// Folder of scripts, parts and logs, on a file system that all nodes share [default: the first output, .farm, without
-    /// ####]
+    /// Folder of scripts, parts and logs, on a file system shared by all nodes [default: the first output, .farm,
+    /// without ####]
     #[arg(long, value_name = "DIR")]
     dir: Option<PathBuf>,
-    /// The program on the nodes [default: this one, by its path]
+    /// Program on the nodes [default: this one, by its path]
     #[arg(long, value_name = "FILE")]
     program: Option<PathBuf>,
-    /// Submit the jobs, and print their ids
+    /// Submit the jobs and print their ids
     #[arg(long)]
     submit: bool,
 }
@@ -103,6 +104,7 @@ impl SlurmArgs {
 }
 
 pub(super) fn run(args: &FarmArgs) -> anyhow::Result<ExitCode> {
+    // Check the options
     let Queue::Slurm(args) = &args.queue;
     check_outputs(&outputs_of_first(args))?;
     if let Some(path) = args.output.iter().find(|path| extension(path) == PART_TYPE) {
@@ -111,12 +113,16 @@ pub(super) fn run(args: &FarmArgs) -> anyhow::Result<ExitCode> {
     check_look(&args.look.args, &args.exr.args)?;
     args.denoise.args.check(&args.output)?;
     let (first, needs_plan) = check(args)?;
+
+    // Choose the folder
     let folder = args.dir.clone().unwrap_or_else(|| default_folder(&args.output[0]));
     let folder = absolute(&folder).with_context(|| format!("cannot find {}", folder.display()))?;
     if args.frames.is_some() && has_number(&folder) {
         let text = format!("--frames: {} is one folder for all frames: give a --dir without #", folder.display());
         return Err(UsageError(text).into());
     }
+
+    // Write the scripts, and submit or print them
     let job = job(args, &folder, (&first, needs_plan))?;
     write_folder(args, &folder, &job)?;
     if args.submit {
@@ -140,12 +146,12 @@ fn first_frame(args: &SlurmArgs) -> Option<u32> {
     args.frames.as_ref().and_then(|list| list.0.first().copied())
 }
 
-/// The folder of an image, or of all images of which this one has ####.
+/// The default folder for an image, or for a sequence whose names contain ####.
 fn default_folder(output: &Path) -> PathBuf {
     let name = output.file_name().unwrap_or_default().to_string_lossy();
     let mut words: Vec<String> = name.split('#').filter(|word| !word.is_empty()).map(str::to_owned).collect();
     if let Some((_, before)) = words.split_last_mut() {
-        // What set the number apart sets nothing apart any more
+        // Without the number, its separator is meaningless
         before.iter_mut().for_each(|word| *word = word.trim_end_matches(['.', '_', '-']).to_owned());
     }
     let name = words.concat();
@@ -153,9 +159,10 @@ fn default_folder(output: &Path) -> PathBuf {
     output.with_file_name(name).with_extension("farm")
 }
 
-/// Rejects what cannot be rendered in parts, before anything is written. The options of the first image, and true if a plan
-/// must be made.
+/// Rejects options that cannot be rendered in parts, before anything is written. Returns the options of the first
+/// image, and true if a plan must be made.
 fn check(args: &SlurmArgs) -> anyhow::Result<(RenderArgs, bool)> {
+    // Parse the options as `lumiris render` will
     let mut words = part_options(args, None);
     words.extend(["--part".to_owned(), format!("1/{}", args.count())]);
     words.extend(["-o".to_owned(), (if args.frames.is_some() { "####.part" } else { "1.part" }).to_owned()]);
@@ -176,11 +183,11 @@ fn check(args: &SlurmArgs) -> anyhow::Result<(RenderArgs, bool)> {
         return Err(UsageError("the tasks of a farm read the scene each: it must be a file".to_owned()).into());
     }
     let Loaded { settings, .. } = load_scene(&render.scene, &FileCache::default(), None, None)?;
-    // Trials pay where many machines render
+    // Pilots pay off where many machines render
     let is_auto = settings.integrator.estimator == EstimatorKind::Auto;
     let needs_plan = is_auto && render.scene.plan.is_none();
     parts::check_division(&render, &settings)?;
-    // With other estimators and allocations, what a pilot finds decides how many samples there are
+    // With other estimators and allocations, the pilot decides the sample count
     let is_uniform = match settings.sampling.allocation {
         Allocation::Uniform => true,
         Allocation::Auto => !is_auto,
@@ -196,7 +203,7 @@ fn check(args: &SlurmArgs) -> anyhow::Result<(RenderArgs, bool)> {
     Ok((render, needs_plan))
 }
 
-/// Fails if the scene of a frame is missing. Only that of the first frame is loaded.
+/// Fails if the scene of a frame is missing. Only the first frame's scene is loaded.
 fn check_scenes(scene: &Path, frames: &FrameList) -> anyhow::Result<()> {
     let scenes = frames.0.iter().map(|&frame| numbered(scene, frame));
     let missing: Vec<String> = scenes.filter(|path| !path.is_file()).map(|path| path.display().to_string()).collect();
@@ -207,7 +214,7 @@ fn check_scenes(scene: &Path, frames: &FrameList) -> anyhow::Result<()> {
     }
 }
 
-/// Options of `lumiris render`, the same for all parts.
+/// Options of `lumiris render` for all parts.
 fn part_options(args: &SlurmArgs, plan: Option<String>) -> Vec<String> {
     let mut words = args.scene.words_without(&["plan"]);
     words.extend(plan.map(|path| format!("--plan={path}")));
@@ -223,6 +230,7 @@ fn part_options(args: &SlurmArgs, plan: Option<String>) -> Vec<String> {
 }
 
 fn job(args: &SlurmArgs, folder: &Path, (first, needs_plan): (&RenderArgs, bool)) -> anyhow::Result<Job> {
+    // Paths
     let from = std::env::current_dir().context("there is no current folder")?;
     let program = match &args.program {
         Some(path) => path.clone(),
@@ -230,13 +238,15 @@ fn job(args: &SlurmArgs, folder: &Path, (first, needs_plan): (&RenderArgs, bool)
     };
     let has_plan = needs_plan || args.scene.args.plan.is_some();
     let plan = if has_plan { Some(text(&folder.join("plan.json"))?) } else { None };
+
+    // Options of the merge
     let mut merge =
         [args.look.words_without(&[]), args.exr.words_without(&[]), args.denoise.words_without(&[])].concat();
     for path in &args.output {
-        // Scripts go to the folder where this runs, whose name may have # itself
+        // Scripts change to the current folder, whose name may itself contain #
         merge.push(format!("--output={}", text(path)?));
     }
-    // One plan for all frames: that of the first
+    // All frames use the plan of the first frame
     let mut planned = args.scene.words_without(&["plan", "time-in-scene"]);
     planned.extend(first.scene.time_in_scene.map(|time| format!("--time-in-scene={time}")));
     Ok(Job {
@@ -254,13 +264,14 @@ fn job(args: &SlurmArgs, folder: &Path, (first, needs_plan): (&RenderArgs, bool)
     })
 }
 
-/// A path as scripts need it.
+/// A path as text for scripts; fails if it is not UTF-8.
 fn text(path: &Path) -> anyhow::Result<String> {
     Ok(path.to_str().with_context(|| format!("{}: the name is not in UTF-8", path.display()))?.to_owned())
 }
 
-/// Writes scripts and plan. A folder that exists must be empty, or of the same rendering, which then goes on.
+/// Writes scripts and plan. An existing folder must be empty or belong to the same rendering, which is then continued.
 fn write_folder(args: &SlurmArgs, folder: &Path, job: &Job) -> anyhow::Result<()> {
+    // Create the folder, or check the existing one
     let shown = folder.display();
     let scripts = job.scripts();
     match fs::create_dir(folder) {
@@ -275,6 +286,8 @@ fn write_folder(args: &SlurmArgs, folder: &Path, job: &Job) -> anyhow::Result<()
         }
         Err(e) => return Err(e).with_context(|| format!("cannot make the folder {shown}")),
     }
+
+    // Copy the plan
     if let Some(path) = &args.scene.args.plan {
         let text = fs::read_to_string(path).with_context(|| format!("cannot read {}", path.display()))?;
         let copy = folder.join("plan.json");
@@ -283,6 +296,8 @@ fn write_folder(args: &SlurmArgs, folder: &Path, job: &Job) -> anyhow::Result<()
         }
         write_text(&copy, &text).with_context(|| format!("cannot write {}", copy.display()))?;
     }
+
+    // Write the scripts
     for (name, text) in scripts {
         let path = folder.join(name);
         write_text(&path, &text).with_context(|| format!("cannot write {}", path.display()))?;

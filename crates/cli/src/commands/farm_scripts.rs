@@ -1,6 +1,6 @@
-//! The scripts of a farm: values as assignments, and then the text of a file, which is the same for all renderings.
+//! The scripts of a farm: assignments of values, followed by a text that is the same for all renderings.
 
-/// Text of scripts.
+/// Names and texts of the scripts.
 const SCRIPTS: [(&str, &str); 4] = [
     ("plan.sh", include_str!("farm/plan.sh")),
     ("part.sh", include_str!("farm/part.sh")),
@@ -8,24 +8,24 @@ const SCRIPTS: [(&str, &str); 4] = [
     ("submit.sh", include_str!("farm/submit.sh")),
 ];
 
-/// What scripts that work at a frame have in place of `# FRAME`.
+/// Replaces `# FRAME` in scripts that work on one frame.
 const FRAME: &str = include_str!("farm/frame.sh");
 
-/// What the scripts do.
+/// Values for the scripts.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Job {
-    /// The program.
+    /// Path of the program.
     pub(super) lumiris: String,
-    /// The folder that paths are relative to.
+    /// Working folder, to which paths are relative.
     pub(super) from: String,
     /// The folder of scripts, parts and logs.
     pub(super) folder: String,
     pub(super) scene: String,
-    /// The scene that a plan is made for: that of the first frame.
+    /// Scene for the plan: the first frame's.
     pub(super) first_scene: String,
-    /// Numbers of frames; none if it is one image.
+    /// Frame numbers; empty for a single image.
     pub(super) frames: Vec<u32>,
-    /// Number of parts of an image.
+    /// Number of parts per image.
     pub(super) parts: u32,
     /// Time between checkpoints (s).
     pub(super) seconds: f64,
@@ -40,6 +40,7 @@ pub(super) struct Job {
 impl Job {
     /// Names and texts of the scripts.
     pub(super) fn scripts(&self) -> Vec<(&'static str, String)> {
+        // Assignments
         let flag = |is: bool| if is { "yes" } else { "" };
         let words = [
             ("lumiris", &self.lumiris),
@@ -58,6 +59,8 @@ impl Job {
             flag(self.needs_plan),
             flag(self.has_threads)
         );
+
+        // Scripts
         let script = |((name, body), options): (&(&'static str, &str), &Vec<String>)| {
             let options: Vec<String> = options.iter().map(|word| quoted(word)).collect();
             let options = options.join(" ");
@@ -68,7 +71,7 @@ impl Job {
     }
 }
 
-/// A word of a shell.
+/// Quotes a word for the shell.
 pub(super) fn quoted(text: &str) -> String {
     let is_plain = |c: char| c.is_ascii_alphanumeric() || "/._-=,:@%+".contains(c);
     if !text.is_empty() && text.chars().all(is_plain) {

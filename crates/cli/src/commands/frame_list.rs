@@ -1,32 +1,32 @@
-//! Numbers of frames, and file names that hold one.
+//! Frame numbers, and file names with a frame number.
 
 use super::plan_file::PlanFile;
 use lumiris_numbers::math::hash::pcg4d;
 use std::path::{Path, PathBuf};
 
-/// Maximum number of frames of one run.
+/// Maximum number of frames per run.
 const MAX_FRAMES: u32 = 1_000_000;
 
-/// Combined with a seed and the number of a frame to give the seed of the frame.
+/// Constant that is hashed with the seed and the frame number to give the frame's seed.
 const FRAME_SEED: u32 = 0x66_72_61_6d;
 
-/// What a frame has of its sequence.
+/// Sequence data of a frame.
 #[derive(Clone, Debug)]
 pub(super) struct FrameOf {
-    /// Its number, if its seed follows from that.
+    /// Frame number, if the seed depends on it.
     pub seed_by: Option<u32>,
-    /// What was chosen for the first frame, and so for all.
+    /// Choices made for the first frame; they apply to all frames.
     pub plan: Option<PlanFile>,
 }
 
 impl FrameOf {
-    /// The seed of the frame, by that of the sequence.
+    /// The frame's seed, given the seed of the sequence.
     pub(super) fn seed(&self, seed: u32) -> u32 {
         self.seed_by.map_or(seed, |number| pcg4d([seed, number, FRAME_SEED, 0])[0])
     }
 }
 
-/// Numbers of frames in the order in which they are rendered, each once.
+/// Frame numbers in rendering order, without duplicates.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct FrameList(pub Vec<u32>);
 
@@ -54,12 +54,15 @@ pub(super) fn parse_frames(text: &str) -> Result<FrameList, String> {
 
 /// First, last and step of a range.
 fn parse_range(text: &str) -> Result<(u32, u32, u32), String> {
+    // A number with its error message
     let number = |digits: &str| {
         let digits = digits.trim();
         digits
             .parse::<u32>()
             .map_err(|_| format!("`{digits}` is no frame: expected 5, 1-48, 1-48:2 or a list of these"))
     };
+
+    // Split the range
     let (range, step) = match text.split_once(':') {
         Some((range, step)) => (range, number(step)?),
         None => (text, 1),
@@ -74,12 +77,12 @@ fn parse_range(text: &str) -> Result<(u32, u32, u32), String> {
     Ok((first, last, step))
 }
 
-/// True if the name has a place for the number of a frame.
+/// True if the name contains `#`, the placeholder for the frame number.
 pub(super) fn has_number(path: &Path) -> bool {
     path.to_string_lossy().contains('#')
 }
 
-/// The name with the number in place of each run of `#`, with as many digits at least as the run is long.
+/// Replaces each run of `#` by the frame number, zero-padded to the length of the run.
 pub(super) fn numbered(path: &Path, frame: u32) -> PathBuf {
     let Some(text) = path.to_str() else { return path.to_owned() };
     let mut name = String::new();

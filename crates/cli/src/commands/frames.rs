@@ -1,7 +1,8 @@
 //! `lumiris render --frames`: the frames of an animation, one after the other.
 //!
-//! What is chosen for the first frame is the choice for all, so that they do not flicker. What frames share is read once (see [`FileCache`]). A frame that fails does not stop the others; a table at the end
-//! says what became of each.
+//! Choices made for the first frame apply to all frames, so that the animation does not flicker. Files shared by
+//! several frames are read once (see [`FileCache`]). A frame that fails does not stop the others; a table at the end
+//! lists the results.
 
 use super::UsageError;
 use super::args::RenderArgs;
@@ -19,15 +20,15 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Instant;
 
-/// What became of a frame.
+/// Result of a frame.
 enum Outcome {
-    /// It was rendered and written.
+    /// Rendered and written.
     Done(Rendered),
-    /// Its images were there.
+    /// Skipped, because its images exist.
     Skipped,
-    /// It could not be loaded, rendered or written.
+    /// Failed to load, render or write.
     Failed(String, Option<Rendered>),
-    /// Ctrl-C came before.
+    /// Not started before Ctrl-C.
     NotRendered,
 }
 
@@ -61,7 +62,7 @@ pub(super) fn run(args: &RenderArgs, list: &FrameList) -> anyhow::Result<ExitCod
         frames.push(Frame { number, outcome, files });
     }
 
-    // The table, without what went well if the program is to be quiet
+    // Print the table; with `--quiet` only the failures
     let failed = frames.iter().filter(|f| matches!(f.outcome, Outcome::Failed(..))).count();
     let shown = frames.iter().filter(|f| !args.quiet || matches!(f.outcome, Outcome::Failed(..)));
     let rows: Vec<String> = shown.map(row).collect();
@@ -78,20 +79,21 @@ pub(super) fn run(args: &RenderArgs, list: &FrameList) -> anyhow::Result<ExitCod
     Ok(if is_stopped() { ExitCode::from(INTERRUPTED) } else { ExitCode::SUCCESS })
 }
 
-/// Scene, images and checkpoints must have a place for the number: all frames would be the same, or overwrite each other.
+/// Requires #### in the names of scene, images and checkpoints. Otherwise all frames would be the same or overwrite
+/// each other.
 fn check_names(args: &RenderArgs) -> Result<(), UsageError> {
     let scene = Some(&args.scene.scene).filter(|scene| !is_animated(args, scene));
     let checkpoint = args.parts.checkpoint.as_ref().map(|(path, _)| path);
     check_numbers(args.output.iter().chain(scene).chain(checkpoint).chain(&args.parts.resume))
 }
 
-/// The options of the first frame, of which those of all frames must be right.
+/// The options of the first frame, after checking the names for all frames.
 pub(super) fn first_of(args: &RenderArgs, list: &FrameList) -> Result<RenderArgs, UsageError> {
     check_names(args)?;
     Ok(of_frame(args, list.0.first().copied().unwrap_or(0)))
 }
 
-/// Refuses names without a place for the number of a frame.
+/// Refuses names without a placeholder for the frame number.
 pub(super) fn check_numbers<'a>(mut names: impl Iterator<Item = &'a PathBuf>) -> Result<(), UsageError> {
     match names.find(|path| !has_number(path)) {
         Some(path) => Err(UsageError(format!("--frames: {} has no #### for the number of the frame", path.display()))),
@@ -99,7 +101,7 @@ pub(super) fn check_numbers<'a>(mut names: impl Iterator<Item = &'a PathBuf>) ->
     }
 }
 
-/// True if frames are times of one scene, and not scenes.
+/// True if the frames are times of one glTF scene instead of separate scene files.
 fn is_animated(args: &RenderArgs, scene: &Path) -> bool {
     is_gltf(scene) && !has_number(scene) && args.scene.time_in_scene.is_none()
 }
@@ -118,7 +120,7 @@ fn of_frame(args: &RenderArgs, frame: u32) -> RenderArgs {
     args
 }
 
-/// What was chosen for a frame, where its settings left something open.
+/// The choices made for a frame; `None` if its settings left nothing open.
 fn plan_of(outcome: &Outcome, args: &RenderArgs) -> Option<PlanFile> {
     let plan = match outcome {
         Outcome::Done(rendered) | Outcome::Failed(_, Some(rendered)) => Some(rendered.plan.clone()),
@@ -167,7 +169,7 @@ fn one_line(text: &str) -> String {
     text.split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
-/// What `--stats` stores of all frames.
+/// Statistics of all frames for `--stats`.
 fn stats(frames: &[Frame]) -> serde_json::Value {
     let of_frame = |frame: &Frame| {
         let (result, reason, rendered) = match &frame.outcome {

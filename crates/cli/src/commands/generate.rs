@@ -28,7 +28,7 @@ enum What {
     Talbot(TalbotArgs),
     /// The scenes of scenes/fan, with their statue
     Fan(FanArgs),
-    /// The scenes of scenes/keller-wald, and a version of the rooms with 10,000 lights
+    /// The scenes of scenes/keller-wald, and a variant of the rooms with 10,000 lights
     KellerWald(KellerWaldArgs),
 }
 
@@ -60,10 +60,10 @@ struct SkyArgs {
     /// Direction of the sun, from +x towards +y (degrees)
     #[arg(long, value_name = "DEGREES", default_value_t = 225.0)]
     azimuth: f32,
-    /// Haze: 0 for none, 1 for a clear day, 10 for a very hazy one
+    /// Haze: 0 for none, 1 for a clear day, 10 for a very hazy day
     #[arg(long, value_name = "AMOUNT", default_value_t = 1.5)]
     haze: f32,
-    /// Diameter of the sun relative to the real one; its power stays the same
+    /// Diameter of the sun relative to the real sun; its power stays the same
     #[arg(long, value_name = "FACTOR", default_value_t = 1.0)]
     sun_size: f32,
     /// Reflectance of the ground below the horizon
@@ -72,7 +72,7 @@ struct SkyArgs {
     /// Fraction of the sky covered by clouds (0 to 1)
     #[arg(long, value_name = "FRACTION", default_value_t = 0.0)]
     clouds: f32,
-    /// Irradiance on a horizontal surface (luminance)
+    /// Irradiance of a horizontal surface (luminance)
     #[arg(long, value_name = "E", default_value_t = std::f32::consts::PI)]
     irradiance: f32,
     /// Random seed of the clouds
@@ -127,6 +127,7 @@ struct KellerWaldArgs {
 }
 
 pub(super) fn run(args: &GenerateArgs) -> anyhow::Result<ExitCode> {
+    // Write the files, and report each file or folder with its size
     match &args.what {
         What::Statue(args) => {
             ensure!(has_extension(&args.output, "ply"), "the statue is written as .ply, not {}", args.output.display());

@@ -1,4 +1,4 @@
-//! `lumiris info`: of scenes, and of images and parts ([`super::info_file`]).
+//! `lumiris info` for scenes. Images and parts are in [`super::info_file`].
 
 use super::args::SceneArgs;
 use super::info_file::facts_of_file;
@@ -37,7 +37,7 @@ pub(super) fn run(args: &InfoArgs) -> anyhow::Result<ExitCode> {
             facts["scene"] = json!(args.scene.scene.display().to_string());
             let Choices { cameras, scenes, .. } = &job.world.scene.choices;
             let choices = [("cameras", cameras), ("scenes", scenes)];
-            // One without a name is no choice
+            // A single unnamed camera or scene is no choice
             let is_choice = |all: &[String]| all.len() > 1 || all.iter().any(|name| !name.is_empty());
             choices.into_iter().filter(|(_, all)| is_choice(all)).for_each(|(key, all)| facts[key] = json!(all));
             facts
@@ -55,6 +55,7 @@ pub(super) fn run(args: &InfoArgs) -> anyhow::Result<ExitCode> {
 
 /// Contents, memory and settings of a scene, as JSON.
 fn facts(job: &RenderJob) -> Value {
+    // Geometry
     let scene = &job.world.scene;
     let set = &scene.geometry;
     let (triangles, quadrics, patches) = set.primitive_counts();
@@ -69,6 +70,8 @@ fn facts(job: &RenderJob) -> Value {
     let instanced: usize = set.instances.iter().map(|i| per_group[i.group as usize]).sum();
     let bounds = set.world_bounds();
     let bounds = [bounds.min, bounds.max].map(|corner| (corner.as_dvec3() + scene.origin).to_array());
+
+    // Materials and lights
     let mut materials: BTreeMap<&str, usize> = BTreeMap::new();
     for entry in scene.materials.entries() {
         *materials.entry(entry.material.kind_name()).or_default() += 1;
@@ -77,6 +80,8 @@ fn facts(job: &RenderJob) -> Value {
     for light in scene.lights.lights.iter().filter(|light| !matches!(light, Light::Glow(_))) {
         *lights.entry(light.kind_name()).or_default() += 1;
     }
+
+    // Report
     let accel = job.world.accel.stats();
     let settings = job.settings();
     let changed = |(row, value): (&Setting, SettingValue)| (format!("--{}", row.flag), value.to_string());
@@ -112,7 +117,7 @@ fn facts(job: &RenderJob) -> Value {
     })
 }
 
-/// Bytes that rendering will take beyond what the scene does, and at most with it.
+/// Predicted memory for rendering (bytes): beyond the scene, and the peak including the scene.
 fn predicted(job: &RenderJob, has_layers: bool) -> Value {
     let spp = job.settings().sampling.spp;
     let render =
@@ -140,10 +145,10 @@ fn geometry_bytes(scene: &Scene) -> u64 {
     bytes.sum::<usize>() as u64
 }
 
-/// Names of objects whose names are those of a file, and are shown as they are.
+/// Objects whose keys are names from a file, and are printed unchanged.
 const VERBATIM: [&str; 2] = ["layers", "metadata"];
 
-/// Writes a JSON object as an indented list, its names as words unless they are verbatim.
+/// Writes a JSON object as an indented list. Underscores in keys become spaces, except for verbatim keys.
 fn list(value: &Value, (indent, is_verbatim): (usize, bool), out: &mut String) {
     let Value::Object(map) = value else { return };
     for (key, value) in map {

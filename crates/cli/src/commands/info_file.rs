@@ -1,4 +1,4 @@
-//! What `lumiris info` says of files that were rendered: images, and parts and checkpoints.
+//! `lumiris info` for rendered files: images, parts and checkpoints.
 
 use super::pictures::is_picture;
 use lumiris::imaging::oiio::{read_headers, read_metadata};
@@ -22,6 +22,7 @@ pub(super) fn facts_of_file(path: &Path) -> anyhow::Result<Option<Value>> {
 }
 
 fn facts_of_image(path: &Path) -> anyhow::Result<Value> {
+    // Group the channels by layer
     let headers = read_headers(path)?;
     let mut layers: Vec<(String, Vec<String>)> = Vec::new();
     for channel in headers.iter().flat_map(|part| &part.channels) {
@@ -34,6 +35,8 @@ fn facts_of_image(path: &Path) -> anyhow::Result<Value> {
     }
     let layers: Map<_, _> = layers.into_iter().map(|(layer, names)| (layer, names.join(" ").into())).collect();
     let [width, height] = headers.first().map_or([0, 0], |part| part.size);
+
+    // Separate the settings from other metadata
     let (settings, others) = divided(read_metadata(path)?);
     Ok(json!({
         "image": path.display().to_string(),
@@ -60,7 +63,7 @@ fn facts_of_part(path: &Path, header: &FilmHeader) -> Value {
     })
 }
 
-/// Settings of the renderer, with a plan as what it is, and everything else.
+/// Splits metadata into the renderer's settings and everything else. A plan is parsed as JSON.
 fn divided(entries: impl IntoIterator<Item = (String, String)>) -> (Map<String, Value>, Map<String, Value>) {
     let (mut settings, mut others) = (Map::new(), Map::new());
     for (key, text) in entries {

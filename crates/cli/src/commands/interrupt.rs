@@ -1,8 +1,8 @@
 //! Ctrl-C, SIGTERM and SIGHUP.
 //!
-//! The first of them sets [`stop`], which ends a rendering in an orderly way, with the image so far. Whatever does not ask for
-//! it, such as reading a scene, and has nothing to lose yet, is ended within half a second, together with the program, which
-//! says what it was doing. The second one ends the program at once.
+//! The first signal sets [`stop`], which ends a rendering in an orderly way: the image so far is written. Activities
+//! that do not poll `stop` and have nothing to lose, such as reading a scene, are ended within half a second together
+//! with the program, with a message that names the activity. The second signal ends the program at once.
 
 use super::progress;
 use anyhow::Context;
@@ -14,23 +14,23 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-/// Exit code of a program that was stopped by Ctrl-C, as in shells.
+/// Exit code after Ctrl-C, as in shells.
 pub(super) const INTERRUPTED: u8 = 130;
-/// How long what asks for [`stop`] may take to end in an orderly way.
+/// Time for an activity that polls [`stop`] to end in an orderly way.
 const GRACE: Duration = Duration::from_millis(500);
 
 static STOP: AtomicBool = AtomicBool::new(false);
 static ACTIVITY: Mutex<Activity> = Mutex::new(Activity::Abandoned(String::new()));
 
-/// What the program does.
+/// The current activity of the program.
 enum Activity {
-    /// It ends in an orderly way by itself.
+    /// Polls [`stop`] and ends by itself.
     Orderly,
-    /// It can be ended at any time. What it is, such as `loading a.pbrt`; empty if that goes without saying.
+    /// Can be ended at any time. The text names it in messages, such as `loading a.pbrt`; empty for no name.
     Abandoned(String),
 }
 
-/// The present activity until this is dropped; then the former one goes on.
+/// Guard of the current activity. Dropping it restores the previous one.
 pub(super) struct During(Activity);
 
 impl Drop for During {
@@ -43,22 +43,22 @@ fn activity() -> MutexGuard<'static, Activity> {
     ACTIVITY.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Begins what can be ended at any time.
+/// Begins an activity that can be ended at any time.
 pub(super) fn during(what: String) -> During {
     During(std::mem::replace(&mut *activity(), Activity::Abandoned(what)))
 }
 
-/// Begins what looks at [`stop`], or has results to write.
+/// Begins an activity that polls [`stop`] or has results to write.
 pub(super) fn orderly() -> During {
     During(std::mem::replace(&mut *activity(), Activity::Orderly))
 }
 
-/// True once the program is to end.
+/// Flag that is true once the program must end.
 pub(super) fn stop() -> &'static AtomicBool {
     &STOP
 }
 
-/// Watches for signals from here on.
+/// Starts a thread that waits for signals.
 pub(super) fn watch() -> anyhow::Result<()> {
     let mut signals = Signals::new([SIGINT, SIGTERM, SIGHUP]).context("cannot watch for Ctrl-C")?;
     std::thread::spawn(move || {
@@ -72,12 +72,12 @@ pub(super) fn watch() -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Ends the program as soon as it does what can be abandoned, and has had time to end by itself.
+/// Ends the program as soon as its activity can be abandoned and the grace time is over.
 fn abandon() {
     let start = Instant::now();
     loop {
         std::thread::sleep(Duration::from_millis(20));
-        // Locked until the end: nothing is begun any more that should not be abandoned
+        // The lock is held to the end, so that no orderly activity can begin
         let activity = activity();
         if let Activity::Abandoned(what) = &*activity
             && start.elapsed() >= GRACE
@@ -89,14 +89,14 @@ fn abandon() {
     }
 }
 
-/// Ends the program here and now, while other threads work on what their destructors must not take from them.
+/// Ends the program without running destructors, since other threads still use their data.
 fn end(_: &MutexGuard<'_, Activity>) -> ! {
     progress::clear();
     remove_temporary();
     exit(INTERRUPTED.into())
 }
 
-/// True once Ctrl-C was pressed.
+/// True once a signal was received.
 pub(super) fn is_stopped() -> bool {
     stop().load(Ordering::Relaxed)
 }

@@ -1,4 +1,4 @@
-//! Processor time of the process by phases, one after the other: all of it has a name.
+//! CPU time of the process, divided into consecutive phases without gaps.
 
 use lumiris::planning::processor_time;
 use lumiris::render::phases::Phase;
@@ -9,18 +9,19 @@ use std::time::Duration;
 #[derive(Clone, Debug, Default)]
 pub(super) struct Laps {
     phases: Vec<Phase>,
-    /// Processor time of the process when the last one ended.
+    /// CPU time of the process at the end of the last phase.
     until: Duration,
 }
 
-/// Those of the image under way. The first one begins with the process.
+/// Phases of the current image. The first phase begins with the process.
 static LAPS: Mutex<Laps> = Mutex::new(Laps { phases: Vec::new(), until: Duration::ZERO });
 
 fn laps() -> MutexGuard<'static, Laps> {
     LAPS.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Ends a phase that began where the last one ended. `parts` are phases that lie within it: its own time is what they leave.
+/// Ends the phase that began at the end of the last one. `parts` are phases within it; their time is subtracted from
+/// its own.
 pub(super) fn end(name: &'static str, parts: &[Phase]) {
     let (mut laps, now) = (laps(), processor_time::of_process());
     let of_parts: Duration = parts.iter().map(|part| part.time).sum();
@@ -30,21 +31,21 @@ pub(super) fn end(name: &'static str, parts: &[Phase]) {
     laps.until = now;
 }
 
-/// The phases of the image that is done.
+/// Returns the phases of the finished image and clears them.
 pub(super) fn take() -> Laps {
     let mut laps = laps();
     Laps { phases: std::mem::take(&mut laps.phases), until: laps.until }
 }
 
 impl Laps {
-    /// Seconds by name, and of the process altogether since its beginning.
+    /// Seconds by phase name; `all` is the CPU time of the process since its start.
     pub(super) fn json(&self) -> serde_json::Value {
         let entry = |phase: &Phase| (phase.name.to_owned(), phase.time.as_secs_f64().into());
         let all = ("all".to_owned(), self.until.as_secs_f64().into());
         serde_json::Value::Object(self.phases.iter().map(entry).chain([all]).collect())
     }
 
-    /// The largest phases with their shares: `CPU time 5.5 s: 29 % t1 propose, 20 % shade`.
+    /// The phases of at least 1 %, largest first: `CPU time 5.5 s: 29 % t1 propose, 20 % shade`.
     pub(super) fn text(&self) -> String {
         let sum: Duration = self.phases.iter().map(|phase| phase.time).sum();
         let share = |phase: &Phase| 100.0 * phase.time.as_secs_f64() / sum.as_secs_f64().max(1e-9);

@@ -1,4 +1,4 @@
-//! Loading of the libraries that write images, while an image is rendered.
+//! Loads the image-writing libraries while an image is rendered.
 
 use lumiris::imaging::oiio;
 use lumiris::planning::processor_time;
@@ -6,22 +6,22 @@ use lumiris::render::phases::Phase;
 use std::thread::JoinHandle;
 use std::time::Duration;
 
-/// A thread that loads them, which takes as long as a sample of a small image. The process must not end meanwhile: libraries
-/// would begin while others end.
+/// A loader thread. Loading takes as long as one sample per pixel of a small image. The process must not exit
+/// meanwhile: libraries would be initialised while others are shut down.
 pub(super) struct Loading(Option<JoinHandle<Duration>>);
 
 impl Loading {
-    /// Begins, if images are to be written.
+    /// Starts loading if images will be written.
     pub(super) fn begin(has_images: bool) -> Self {
         let load = || {
-            // What goes wrong is said when an image is written
+            // Errors are reported when an image is written
             let _ = oiio::load();
             processor_time::of_thread()
         };
         Loading(has_images.then(|| std::thread::spawn(load)))
     }
 
-    /// Waits for it, and tells what it has cost.
+    /// Waits for the thread and returns its CPU time.
     pub(super) fn end(mut self) -> Phase {
         Phase { name: "libraries", time: self.wait() }
     }

@@ -1,4 +1,4 @@
-//! From light to the colours of a display: exposure and view transform of PNG, JPEG, TIFF and TGA images.
+//! Display colours of PNG, JPEG, TIFF and TGA images: exposure and view transform.
 
 use super::UsageError;
 use anyhow::Context;
@@ -9,7 +9,7 @@ use lumiris::imaging::oiio::{OcioView, ocio_display};
 use lumiris::imaging::view_transform::auto_exposure;
 use strum::VariantNames;
 
-/// Names that configurations have for linear light with the primaries of Rec.709, which is what images hold.
+/// Common OpenColorIO names of the linear Rec.709 colour space, in which images are stored.
 const LINEAR_REC709: [&str; 7] = [
     "lin_rec709",
     "lin_srgb",
@@ -20,32 +20,32 @@ const LINEAR_REC709: [&str; 7] = [
     "lnf",
 ];
 
-/// Exposure of images for a display.
+/// Exposure of display images.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Exposure {
-    /// As many stops.
+    /// Number of stops.
     Stops(f32),
-    /// From the image.
+    /// Computed from the image.
     Auto,
 }
 
 /// A view transform.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum View {
-    /// One of the renderer's.
+    /// Built-in curve.
     Curve(ViewTransform),
-    /// That of an OpenColorIO configuration.
+    /// View of an OpenColorIO configuration.
     Ocio,
 }
 
-/// Options of images for a display.
+/// Options of display images.
 #[derive(Args, Clone, Debug)]
 #[command(next_help_heading = "PNG, JPEG, TIFF and TGA")]
 pub(super) struct LookArgs {
     /// Exposure in stops, or `auto`: the geometric mean of the luminance becomes middle grey
     #[arg(long, value_name = "STOPS", default_value = "0", allow_negative_numbers = true, value_parser = parse_exposure)]
     exposure: Exposure,
-    /// View transform: `ocio` is that of the OpenColorIO configuration that the environment variable OCIO names
+    /// View transform. `ocio`: the view of the OpenColorIO configuration named by the environment variable OCIO
     #[arg(long, value_name = "NAME", default_value = "srgb", value_parser = view())]
     view_transform: View,
     /// Display of the configuration [default: the configuration's]
@@ -54,16 +54,16 @@ pub(super) struct LookArgs {
     /// View of the display [default: the display's]
     #[arg(long, value_name = "NAME")]
     ocio_view: Option<String>,
-    /// Looks instead of those of the view
+    /// Looks, instead of the looks of the view
     #[arg(long, value_name = "NAMES")]
     ocio_looks: Option<String>,
-    /// The configuration's name of linear light with the primaries of Rec.709 [default: the one of the usual names that
-    /// it has]
+    /// The configuration's name for linear light with Rec.709 primaries [default: the first of the common names that it
+    /// has]
     #[arg(long, value_name = "NAME")]
     ocio_input: Option<String>,
 }
 
-/// Colours for a display, and what they depend on.
+/// Display colours with their metadata.
 pub(super) struct Displayed {
     /// RGB, interleaved, 0..1.
     pub pixels: Vec<f32>,
@@ -71,7 +71,7 @@ pub(super) struct Displayed {
     pub metadata: Vec<(String, String)>,
 }
 
-/// Exposure and a curve of the renderer's.
+/// Exposure and a built-in curve.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Grade {
     stops: f32,
@@ -79,7 +79,7 @@ pub(super) struct Grade {
 }
 
 impl Grade {
-    /// Applies both to some pixels: RGB, interleaved.
+    /// Applies exposure and curve to pixels: RGB, interleaved.
     pub(super) fn apply(&self, pixels: &mut [f32]) {
         let gain = self.stops.exp2();
         for rgb in pixels.as_chunks_mut::<3>().0 {
@@ -87,7 +87,7 @@ impl Grade {
         }
     }
 
-    /// What the colours depend on.
+    /// Exposure and view transform, as metadata.
     pub(super) fn metadata(&self) -> Vec<(String, String)> {
         metadata(self.stops, <&str>::from(self.curve).to_owned())
     }
@@ -113,7 +113,7 @@ fn view() -> impl TypedValueParser<Value = View> {
 }
 
 impl LookArgs {
-    /// Refuses what cannot be, before time is spent on rendering.
+    /// Refuses impossible combinations before time is spent on rendering.
     pub(super) fn check(&self) -> anyhow::Result<()> {
         let is_ocio = self.view_transform == View::Ocio;
         let of_ocio = [&self.ocio_display, &self.ocio_view, &self.ocio_looks, &self.ocio_input];
@@ -138,7 +138,7 @@ impl LookArgs {
         }
     }
 
-    /// What is done to each pixel, if that depends on nothing else and is done by the renderer itself.
+    /// The per-pixel operation; `None` if it depends on the whole image or is left to OpenColorIO.
     pub(super) fn grade(&self) -> Option<Grade> {
         match (self.exposure, self.view_transform) {
             (Exposure::Stops(stops), View::Curve(curve)) => Some(Grade { stops, curve }),
@@ -146,7 +146,7 @@ impl LookArgs {
         }
     }
 
-    /// The colours of an image: RGB, interleaved.
+    /// The display colours of an image: RGB, interleaved.
     pub(super) fn apply_to(&self, mut pixels: Vec<f32>) -> anyhow::Result<Displayed> {
         let stops = self.stops(&pixels);
         let metadata = match self.view_transform {
@@ -164,7 +164,7 @@ impl LookArgs {
         Ok(Displayed { pixels, metadata })
     }
 
-    /// Applies the configuration; returns its names.
+    /// Applies the OpenColorIO view. Returns the names of colour space, display, view and looks.
     fn ocio(&self, pixels: &mut [f32]) -> anyhow::Result<String> {
         let or_empty = |name: &Option<String>| name.clone().unwrap_or_default();
         let (display, view, looks) =

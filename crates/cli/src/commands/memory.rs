@@ -1,4 +1,4 @@
-//! Memory: what an image will take, and what there is.
+//! Memory: predicted need of an image, and available memory.
 
 use super::progress;
 use anyhow::bail;
@@ -8,16 +8,16 @@ use lumiris::settings::value::Kind;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// What `--memory-limit` says.
+/// Value of `--memory-limit`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum MemoryLimit {
-    /// The process may take so many bytes.
+    /// Limit of the process (bytes).
     Bytes(u64),
     /// No limit.
     Off,
 }
 
-/// Understands sizes as settings do, and `off`.
+/// Parses sizes in the same format as settings, and `off`.
 pub(super) fn parse_limit(text: &str) -> Result<MemoryLimit, String> {
     if text == "off" {
         return Ok(MemoryLimit::Off);
@@ -29,14 +29,15 @@ pub(super) fn parse_limit(text: &str) -> Result<MemoryLimit, String> {
     }
 }
 
-/// Bytes as text.
+/// Formats bytes as MiB or GiB.
 pub(super) fn size(bytes: u64) -> String {
     let (unit, shift) = if bytes < 1 << 30 { ("MiB", 20) } else { ("GiB", 30) };
     format!("{:.1} {unit}", bytes as f64 / f64::from(1 << shift))
 }
 
-/// Refuses an image that does not fit.
+/// Refuses an image that does not fit in memory.
 pub(super) fn check(limit: Option<MemoryLimit>, prediction: &Prediction) -> anyhow::Result<()> {
+    // Warn if loading exceeded the limit
     let (taken, most) = (taken(), most_taken());
     if let Some(MemoryLimit::Bytes(bytes)) = limit
         && bytes < most
@@ -47,6 +48,8 @@ pub(super) fn check(limit: Option<MemoryLimit>, prediction: &Prediction) -> anyh
             size(bytes)
         ));
     }
+
+    // Find the limit
     let (limit, origin) = match limit {
         Some(MemoryLimit::Off) => return Ok(()),
         Some(MemoryLimit::Bytes(bytes)) => (bytes, "--memory-limit allows".to_owned()),
@@ -55,6 +58,8 @@ pub(super) fn check(limit: Option<MemoryLimit>, prediction: &Prediction) -> anyh
             None => return Ok(()),
         },
     };
+
+    // Compare it with the need
     let needed = taken + prediction.bytes();
     if needed > limit {
         bail!(
@@ -71,12 +76,12 @@ pub(super) fn check(limit: Option<MemoryLimit>, prediction: &Prediction) -> anyh
     Ok(())
 }
 
-/// Bytes that this process takes; 0 where that is not known.
+/// Resident memory of this process (bytes); 0 if unknown.
 pub(super) fn taken() -> u64 {
     of_process("VmRSS:")
 }
 
-/// The most bytes that this process has taken; 0 where that is not known.
+/// Peak resident memory of this process (bytes); 0 if unknown.
 pub(super) fn most_taken() -> u64 {
     of_process("VmHWM:")
 }
@@ -85,7 +90,7 @@ fn of_process(name: &str) -> u64 {
     fs::read_to_string("/proc/self/status").ok().and_then(|text| kibibytes(&text, name)).unwrap_or(0)
 }
 
-/// Bytes that can be had, and who says so: what the machine has, or what a control group leaves.
+/// Available memory (bytes) with its source: the machine's, or less if a control group limits it.
 fn available() -> Option<(u64, String)> {
     let text = fs::read_to_string("/proc/meminfo").ok()?;
     let machine = (kibibytes(&text, "MemAvailable:")?, "MemAvailable of /proc/meminfo".to_owned());
@@ -102,7 +107,7 @@ fn kibibytes(text: &str, name: &str) -> Option<u64> {
     Some(line.split_whitespace().next()?.parse::<u64>().ok()? * 1024)
 }
 
-/// The folders of this process's control group (version 2) and of those that hold it.
+/// Folders of this process's control group (version 2) and of its ancestors.
 fn group_folders() -> Vec<PathBuf> {
     let Ok(text) = fs::read_to_string("/proc/self/cgroup") else { return Vec::new() };
     let Some(group) = text.lines().find_map(|line| line.strip_prefix("0::/")) else { return Vec::new() };
@@ -111,7 +116,7 @@ fn group_folders() -> Vec<PathBuf> {
     own.ancestors().take_while(|folder| folder.starts_with(root)).map(Path::to_path_buf).collect()
 }
 
-/// Bytes that a control group leaves, without files that are in memory as long as there is room.
+/// Bytes left in a control group. Inactive file pages do not count as used.
 fn left_in(folder: &Path) -> Option<u64> {
     let number = |name: &str| fs::read_to_string(folder.join(name)).ok()?.trim().parse::<u64>().ok();
     let (max, current) = (number("memory.max")?, number("memory.current")?);

@@ -1,4 +1,4 @@
-//! `lumiris merge`: parts of an image become the image.
+//! `lumiris merge`: merges the parts of an image.
 
 use super::UsageError;
 use super::denoise_args::{self, DenoiseArgs, Denoised};
@@ -21,19 +21,19 @@ use std::process::ExitCode;
 /// `lumiris merge`
 #[derive(Args, Clone, Debug)]
 pub(super) struct MergeArgs {
-    // First: the fields that follow take their values from the command line
+    // First, because later fields take their values from the command line
     #[command(flatten)]
     output_options: OutputOptions,
-    /// Parts that `lumiris render --part` has rendered, in any order; finished checkpoints are parts, too
+    /// Parts rendered by `lumiris render --part`, in any order; finished checkpoints are parts, too
     #[arg(required = true, value_name = "PART")]
     parts: Vec<PathBuf>,
     /// Output image; may be given several times, as for `render`
     #[arg(short, long, value_name = "FILE", required = true)]
     output: Vec<PathBuf>,
-    /// Frames of an animation, such as 1-48: `####` in PARTs and FILEs becomes the number of the frame
+    /// Frames of an animation, such as 1-48: `####` in PARTs and FILEs becomes the frame number
     #[arg(long, value_name = "LIST", value_parser = parse_frames)]
     frames: Option<FrameList>,
-    /// Merge what there is if parts are missing, and say so in the metadata
+    /// Merge the existing parts if some are missing, and note it in the metadata
     #[arg(long)]
     allow_missing: bool,
     #[command(flatten)]
@@ -75,6 +75,7 @@ pub(super) fn run(args: &MergeArgs) -> anyhow::Result<ExitCode> {
 
 /// Merges the parts of one image.
 fn merge_one(args: &MergeArgs, denoiser: Option<&Denoiser>) -> anyhow::Result<()> {
+    // Check the arguments
     check_outputs(&args.output)?;
     if let Some(path) = args.output.iter().find(|path| is_part(path)) {
         return Err(UsageError(format!("{}: parts are merged to an image, such as image.exr", path.display())).into());
@@ -83,6 +84,8 @@ fn merge_one(args: &MergeArgs, denoiser: Option<&Denoiser>) -> anyhow::Result<()
         return Err(UsageError(format!("{} is given twice", path.display())).into());
     }
     args.output_options.check(&args.output);
+
+    // Merge and denoise
     let merged = merge(&args.parts, args.allow_missing)?;
     let (denoised, not_denoised) = denoise(denoiser, &merged);
     let picture = Picture {
@@ -97,6 +100,8 @@ fn merge_one(args: &MergeArgs, denoiser: Option<&Denoiser>) -> anyhow::Result<()
         seconds: merged.seconds,
         metadata: merged.metadata(),
     };
+
+    // Write the image
     let Written { paths, mut misplaced } = write_all(&picture, &args.output);
     misplaced.extend(not_denoised);
     report(args, &merged, &paths);
@@ -106,7 +111,7 @@ fn merge_one(args: &MergeArgs, denoiser: Option<&Denoiser>) -> anyhow::Result<()
     Ok(())
 }
 
-/// The image without noise, if it is asked for; or why there is none, which is no reason to lose the image.
+/// The denoised image, if requested, or an error message: a failure does not lose the merged image.
 fn denoise(denoiser: Option<&Denoiser>, merged: &Merged) -> (Option<Denoised>, Option<String>) {
     let Some(denoiser) = denoiser else { return (None, None) };
     if !merged.has_features() {
@@ -115,7 +120,7 @@ fn denoise(denoiser: Option<&Denoiser>, merged: &Merged) -> (Option<Denoised>, O
     denoise_args::denoise(denoiser, &merged.film, merged.has_features())
 }
 
-/// Says what became of the parts.
+/// Reports missing parts, invalid samples and the noise.
 fn report(args: &MergeArgs, merged: &Merged, paths: &[PathBuf]) {
     merged.missing.iter().for_each(|what| progress::say(&format!("warning: {what}: missing")));
     let summary = merged.film.summary();
@@ -131,7 +136,7 @@ fn report(args: &MergeArgs, merged: &Merged, paths: &[PathBuf]) {
     }
 }
 
-/// Refuses what an image from parts cannot be.
+/// Refuses options that a merged image does not support.
 pub(super) fn check_look(look: &LookArgs, exr: &ExrArgs) -> anyhow::Result<()> {
     look.check()?;
     exr.check()?;

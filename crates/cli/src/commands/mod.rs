@@ -1,9 +1,12 @@
-//! The command line: one file per subcommand.
+//! The command line: one file per subcommand. `args`, `*_args` and `output_options` have the options; `settings` loads
+//! scenes; `pictures`, `exr` and `parts` write results; `progress` prints; `interrupt` handles signals.
 //!
-//! Exit codes: 0 success, 1 a check failed (`crosscheck` found a disagreement, `compare` a number beyond a limit),
-//! 2 wrong usage, 3 bad input or failed output, 130 stopped by Ctrl-C, SIGTERM or SIGHUP: a rendering has written the image
-//! so far. A reader of the standard output that has closed its pipe ends nothing: the command finishes, with the code that it
-//! has anyway.
+//! Exit codes. A closed pipe at the standard output is no error.
+//! * 0: success
+//! * 1: a check failed: `crosscheck` found a disagreement, or `compare` a number beyond a limit
+//! * 2: wrong usage
+//! * 3: bad input or failed output
+//! * 130: stopped by Ctrl-C, SIGTERM or SIGHUP; the image so far is written
 
 mod args;
 mod bench;
@@ -64,13 +67,13 @@ enum Command {
     /// Render a scene
     #[command(mut_args(args::in_short_help))]
     Render(Box<args::RenderArgs>),
-    /// Measure what the settings of a scene leave open, and store the choices for render --plan
+    /// Measure the settings that a scene leaves open, and store the choices for render --plan
     Plan(plan::PlanArgs),
-    /// Merge parts of an image, rendered with render --part, to the image
+    /// Merge the parts of an image that were rendered with render --part
     Merge(merge::MergeArgs),
     /// Render the parts of an image on the nodes of a cluster
     Farm(farm::FarmArgs),
-    /// Denoise an image with its layers by Open Image Denoise
+    /// Denoise an image with Open Image Denoise, guided by its layers
     Denoise(denoise::DenoiseFileArgs),
     /// Compare images with a reference, by metrics and on an HTML page
     Compare(compare::CompareArgs),
@@ -91,18 +94,21 @@ enum Command {
     Man(shell::ManArgs),
 }
 
-/// Options that contradict each other.
+/// Usage error, such as contradictory options.
 #[derive(Debug, thiserror::Error)]
 #[error("{0}")]
 struct UsageError(String);
 
 /// Parses the command line, runs the command, and returns the exit code.
 pub(crate) fn run() -> ExitCode {
+    // Parse
     let start = Instant::now();
     let cli = match Cli::try_parse() {
         Ok(cli) => cli,
         Err(error) => return code_of(answer(&error)),
     };
+
+    // Run the command; from here on, signals end it
     let result = interrupt::watch().and_then(|()| match &cli.command {
         Command::Render(args) => match &args.frames {
             Some(list) => frames::run(args, list),
@@ -124,10 +130,10 @@ pub(crate) fn run() -> ExitCode {
     code_of(result)
 }
 
-/// Prints help, the version, or what is wrong with the command line.
+/// Prints help, the version, or the usage error.
 fn answer(error: &clap::Error) -> anyhow::Result<ExitCode> {
     let printed = progress::printed(error.print().and_then(|()| io::stdout().flush()));
-    // Without standard error, the exit code still tells of wrong usage
+    // If standard error fails, the exit code still reports wrong usage
     printed.or_else(|failed| if error.use_stderr() { Ok(()) } else { Err(failed) })?;
     Ok(ExitCode::from(u8::try_from(error.exit_code()).unwrap_or(2)))
 }

@@ -1,4 +1,4 @@
-//! Options that files of some formats depend on, and which of those that are given no output depends on.
+//! Options that apply to some file formats only. Warns if none of the outputs uses a given option.
 
 use super::part_args::{extension, is_part};
 use super::progress::say_once;
@@ -6,7 +6,7 @@ use clap::parser::ValueSource;
 use clap::{ArgMatches, Args, Command};
 use std::path::{Path, PathBuf};
 
-/// Files that an option is for.
+/// File formats to which an option applies.
 #[derive(Clone, Copy, Debug)]
 enum Files {
     Exr,
@@ -14,7 +14,7 @@ enum Files {
     Display,
 }
 
-/// The options, by their names with underscores.
+/// The options, with underscores in their names.
 const OPTIONS: [(&str, Files); 11] = [
     ("aov", Files::ExrAndParts),
     ("cryptomatte", Files::Exr),
@@ -29,12 +29,12 @@ const OPTIONS: [(&str, Files); 11] = [
     ("ocio_input", Files::Display),
 ];
 
-/// Those that are on the command line. It has no options of its own.
+/// The format-specific options on the command line. Adds no options of its own.
 #[derive(Clone, Debug, Default)]
 pub(super) struct OutputOptions(Vec<(&'static str, Files)>);
 
 impl OutputOptions {
-    /// Says which of them no output depends on.
+    /// Warns of options that apply to none of the outputs.
     pub(super) fn check(&self, outputs: &[PathBuf]) {
         let is_exr = |path: &Path| extension(path) == "exr";
         for (name, files) in &self.0 {
@@ -72,7 +72,7 @@ impl clap::FromArgMatches for OutputOptions {
             let is_there = matches.try_contains_id(name).is_ok_and(|is_there| is_there);
             is_there && matches.value_source(name) == Some(ValueSource::CommandLine)
         };
-        // Without AOVs an image takes less time
+        // `--aov none` saves time for every format
         let saves_time = |name: &str| {
             let mut values = matches.get_raw(name).into_iter().flatten();
             name == "aov" && values.all(|value| value == "none")

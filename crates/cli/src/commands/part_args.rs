@@ -7,12 +7,12 @@ use strum::{EnumString, IntoStaticStr, VariantNames};
 
 /// File type of parts.
 pub(super) const PART_TYPE: &str = "part";
-/// Time between checkpoints, if none is given (s).
+/// Default time between checkpoints (s).
 const CHECKPOINT_SECONDS: f64 = 60.0;
-/// Longest time that is asked for (s): more is as good as never.
+/// Largest time limit (s), in effect none.
 pub(super) const LONGEST: f64 = 1e9;
 
-/// What a part has of the image.
+/// Division of an image into parts.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, EnumString, IntoStaticStr, VariantNames)]
 #[strum(serialize_all = "kebab-case")]
 pub(super) enum PartBy {
@@ -30,28 +30,28 @@ pub(super) struct PartArgs {
     /// Render the I-th of N parts of the image, for `lumiris merge`; the output is FILE.part
     #[arg(long, value_name = "I/N", value_parser = parse_part)]
     pub part: Option<[u32; 2]>,
-    /// What a part has: `samples`, a share of the samples of every pixel, or `tiles`, all samples of a share of the pixels
-    /// [default: samples]
+    /// Content of a part. `samples`: a share of the samples of every pixel. `tiles`: all samples of a share of the
+    /// pixels [default: samples]
     #[arg(long, value_name = "WHAT", requires = "part", value_parser = named::<PartBy>())]
     pub part_by: Option<PartBy>,
-    /// First sample of every pixel, by its index [default: 0]
+    /// Index of the first sample of every pixel [default: 0]
     #[arg(long, value_name = "A")]
     pub samples_from: Option<u32>,
-    /// Index after the last sample of every pixel; may be more than --spp, by which footprints and pilots go [default:
-    /// --spp]
+    /// Index after the last sample of every pixel. May exceed --spp, which still determines texture footprints and
+    /// pilots [default: --spp]
     #[arg(long, value_name = "B", value_parser = clap::value_parser!(u32).range(1..))]
     pub samples_to: Option<u32>,
-    /// Store everything that is needed to go on, every so many seconds [default: 60] and in the end
+    /// Store the state needed to resume, at this interval [default: 60 s] and at the end
     #[arg(long, value_name = "FILE[,SECONDS]", value_parser = parse_checkpoint)]
     pub checkpoint: Option<(PathBuf, f64)>,
-    /// Go on from a checkpoint or an unfinished part, with its settings; --spp may ask for more samples. If --checkpoint
-    /// names the same file and there is none yet, start
+    /// Resume from a checkpoint or an unfinished part, with its settings; --spp may ask for more samples. If
+    /// --checkpoint names the same file and it does not exist yet, start from the beginning
     #[arg(long, value_name = "FILE")]
     pub resume: Option<PathBuf>,
 }
 
 impl PartArgs {
-    /// True if it is not the whole image that is asked for.
+    /// True unless the whole image is requested.
     pub(super) fn is_partial(&self) -> bool {
         self.part.is_some() || self.samples_from.is_some() || self.samples_to.is_some()
     }
@@ -80,12 +80,12 @@ fn parse_checkpoint(text: &str) -> Result<(PathBuf, f64), String> {
     }
 }
 
-/// True if the name is that of a part.
+/// True if the name is a part's.
 pub(super) fn is_part(path: &Path) -> bool {
     extension(path) == PART_TYPE
 }
 
-/// The type of a file, as its name says.
+/// The extension of a file name, in lower case.
 pub(super) fn extension(path: &Path) -> String {
     path.extension().unwrap_or_default().to_string_lossy().to_lowercase()
 }

@@ -1,4 +1,4 @@
-//! Parts of images and checkpoints: options of the command line as the renderer has them.
+//! Parts and checkpoints: conversion of command-line options to the renderer's.
 
 use super::UsageError;
 use super::args::RenderArgs;
@@ -19,7 +19,7 @@ impl From<ExtentError> for UsageError {
     }
 }
 
-/// Which part of the image is asked for.
+/// The requested part of the image.
 fn extent(parts: &PartArgs) -> Extent {
     Extent {
         part: parts.part,
@@ -40,30 +40,30 @@ pub(super) fn check(args: &RenderArgs) -> anyhow::Result<()> {
     if parts.is_partial() && !args.exr.cryptomatte.is_empty() {
         return usage("--cryptomatte needs the whole image, not a part");
     }
-    // Of frames, the names are not known yet
+    // The names of frames are not expanded yet
     let checkpoint = parts.checkpoint.as_ref().filter(|_| args.frames.is_none());
     checkpoint.map_or(Ok(()), |(path, _)| check_destination(path).map(drop))?;
     Ok(())
 }
 
-/// Rejects settings by which an image cannot be divided.
+/// Rejects settings with which an image cannot be divided.
 pub(super) fn check_division(args: &RenderArgs, settings: &Settings) -> Result<(), UsageError> {
     Ok(extent(&args.parts).check_division(settings)?)
 }
 
-/// The same if it is to be divided.
+/// Rejects settings with which the requested part cannot be rendered.
 pub(super) fn check_settings(args: &RenderArgs, settings: &Settings) -> Result<(), UsageError> {
     Ok(extent(&args.parts).check_settings(settings)?)
 }
 
-/// What a rendering goes on from, if it does.
+/// The stored state to resume from, if any.
 pub(super) fn stored(args: &PartArgs) -> anyhow::Result<Option<Stored>> {
     let checkpoint = args.checkpoint.as_ref().map(|(path, _)| path.as_path());
     let stored = args.resume.as_ref().map(|path| Stored::read(path, checkpoint)).transpose()?;
     Ok(stored.flatten())
 }
 
-/// Completes the options by those that what is stored was rendered by.
+/// Fills in missing options from the stored state.
 pub(super) fn complete(args: &mut RenderArgs, stored: &Stored) -> anyhow::Result<()> {
     let mut asked = asked(args);
     asked.complete(stored)?;
@@ -78,7 +78,7 @@ pub(super) fn complete(args: &mut RenderArgs, stored: &Stored) -> anyhow::Result
     Ok(())
 }
 
-/// What is asked of a rendering, besides settings.
+/// The requested options, except settings.
 fn asked(args: &RenderArgs) -> Asked {
     let scene = &args.scene;
     Asked {
@@ -90,8 +90,8 @@ fn asked(args: &RenderArgs) -> Asked {
     }
 }
 
-/// Sets which samples of which pixels are rendered; `None` if nothing is stored. Fails if the rendering cannot go on from
-/// what is stored.
+/// Sets the sample and pixel range of the rendering. Returns `None` if nothing will be stored. Fails if the rendering
+/// cannot be resumed from the stored state.
 pub(super) fn film_file(
     args: &RenderArgs,
     (job, plan, files): (&RenderJob, &PlanFile, &SceneFiles),
@@ -112,7 +112,7 @@ pub(super) fn film_file(
     Ok(Some(FilmFile::new(&asked(args), (job, files), (settings, spp), storage, progress::say)?))
 }
 
-/// Numbers for `--stats`.
+/// Checkpoint statistics for `--stats`.
 pub(super) fn stats(film_file: Option<&FilmFile>) -> serde_json::Value {
     let of = |c: &Checkpoints| serde_json::json!({ "stored": c.stored, "seconds": c.waited.as_secs_f64() });
     film_file.and_then(FilmFile::checkpoints).map_or(serde_json::Value::Null, of)

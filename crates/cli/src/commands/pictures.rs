@@ -21,39 +21,39 @@ use std::borrow::Cow;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
-/// File types for display-referred images.
+/// Extensions of display images.
 const DISPLAY_TYPES: [&str; 6] = ["png", "jpg", "jpeg", "tif", "tiff", "tga"];
-/// The layer of the image itself.
+/// Name of the image's layer.
 const IMAGE: &str = "beauty";
-/// Metadata of an image that Ctrl-C has cut short.
+/// Metadata key of images that were cut short by Ctrl-C.
 const INTERRUPTED_KEY: &str = "lumiris:interrupted";
 
-/// A rendering with all that its files tell of it.
+/// A rendering with everything that its files record.
 pub(super) struct Made<'a> {
     /// The options.
     pub args: &'a RenderArgs,
-    /// What was rendered.
+    /// The rendered scene.
     pub job: &'a RenderJob,
-    /// What its settings left to measurements.
+    /// The choices that its settings left to measurements.
     pub plan: &'a PlanFile,
     /// The film.
     pub rendering: &'a Rendering,
-    /// AOVs that were asked for.
+    /// Requested AOVs; `None` for the default.
     pub asked: Option<&'a [Aov]>,
-    /// Cryptomattes that were asked for.
+    /// Requested Cryptomattes.
     pub cryptomattes: Vec<Layer>,
-    /// The image without noise, if it was asked for.
+    /// The denoised image, if requested.
     pub denoised: Option<Denoised>,
-    /// True if Ctrl-C ended it.
+    /// True if Ctrl-C ended the rendering.
     pub is_interrupted: bool,
 }
 
-/// True if the name is that of an EXR file.
+/// True for names of EXR files.
 pub(super) fn is_exr(path: &Path) -> bool {
     extension(path) == "exr"
 }
 
-/// True for the names of images that scenes cannot have.
+/// True for names of image files, which scenes cannot have.
 pub(super) fn is_picture(path: &Path) -> bool {
     const OTHERS: [&str; 5] = ["hdr", "pfm", "webp", "bmp", "gif"];
     let extension = extension(path);
@@ -72,13 +72,13 @@ pub(super) fn check_outputs(outputs: &[PathBuf]) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// True if a file of this name can be written, by its extension.
+/// True if the file type can be written.
 pub(super) fn is_output(path: &Path) -> bool {
     is_exr(path) || is_part(path) || DISPLAY_TYPES.contains(&extension(path).as_str())
 }
 
-/// True if all these images and parts are there, and none of them was cut short by Ctrl-C. (Files appear under their names
-/// when they are whole; of images, only EXR and PNG tell of Ctrl-C.)
+/// True if all images and parts exist and none was cut short by Ctrl-C. Files are renamed to their final names when
+/// they are complete. Among images, only EXR and PNG record Ctrl-C.
 pub(super) fn are_complete(outputs: &[PathBuf]) -> bool {
     outputs.iter().all(|path| match is_part(path) {
         true => FilmReader::open(path).is_ok_and(|part| part.header().is_finished),
@@ -88,17 +88,17 @@ pub(super) fn are_complete(outputs: &[PathBuf]) -> bool {
     })
 }
 
-/// Files that were written, and what went wrong with the others.
+/// Written files, and errors of the others.
 #[derive(Debug, Default)]
 pub(super) struct Written {
-    /// Files in their place.
+    /// Files written to their destinations.
     pub paths: Vec<PathBuf>,
-    /// Why files could not be written where they should be, and where they are instead.
+    /// Errors of files that could not be written to their destinations, with the paths of rescued copies.
     pub misplaced: Vec<String>,
 }
 
 impl Written {
-    /// Writes a file.
+    /// Writes a file, or a rescued copy.
     pub(super) fn write(&mut self, path: PathBuf, write: impl Fn(&Path) -> anyhow::Result<()>) {
         match write_or_rescue(&path, write) {
             Ok(()) => self.paths.push(path),
@@ -119,31 +119,32 @@ pub(super) fn write_all(picture: &Picture<'_>, outputs: &[PathBuf]) -> Written {
     written
 }
 
-/// An image, and how it is written.
+/// An image with its options for writing.
 pub(super) struct Picture<'a> {
     /// The film.
     pub film: &'a Film,
-    /// Options of images for a display.
+    /// Options of display images.
     pub look: &'a LookArgs,
     /// Options of EXR files.
     pub exr: &'a ExrArgs,
-    /// AOVs of EXR files, and the map that one of them shows.
+    /// AOVs of EXR files.
     pub aovs: Vec<Aov>,
+    /// Data of the AOV that shows a sample count map.
     pub sample_count_map: Option<&'a SampleCountMap>,
     /// Cryptomattes.
     pub cryptomattes: &'a [Layer],
-    /// The image without noise, which images for a display show.
+    /// The denoised image, which display images show.
     pub denoised: Option<&'a Denoised>,
-    /// Where the camera stood.
+    /// The camera's matrices.
     pub camera: CameraMatrices,
     /// Wall-clock time of the rendering (s).
     pub seconds: f64,
-    /// What the image depends on, and how it came about.
+    /// Settings and provenance of the image.
     pub metadata: Vec<(String, String)>,
 }
 
 impl Picture<'_> {
-    /// Writes it: all channels, or colours for a display, as the name of the file says.
+    /// Writes all channels, or display colours, depending on the type of the file.
     pub(super) fn write(&self, path: &Path) -> anyhow::Result<()> {
         if is_exr(path) {
             return self.write_exr(path);
@@ -177,8 +178,9 @@ impl Picture<'_> {
         Ok(())
     }
 
-    /// The layers of an EXR file: those of the film apart if each has a part of its own, and others after them.
+    /// The layers of an EXR file: the film's, one by one if each is a separate part, then the others.
     fn layers(&self) -> Vec<ExrLayer<'_>> {
+        // Layers of the film
         let top = self.film.bounds.y0;
         let coordinates = move |rows: Range<usize>| top + rows.start as u32..top + rows.end as u32;
         let layer = |name: &str, channels, rows| ExrLayer {
@@ -199,11 +201,15 @@ impl Picture<'_> {
                 std::iter::once(of_film(IMAGE, true, &[])).chain(aovs).collect()
             }
         };
+
+        // Denoised image
         if let Some(denoised) = self.denoised {
             let row = 3 * self.film.bounds.width() as usize;
             let rows = move |rows: Range<usize>| denoised.pixels[row * rows.start..row * rows.end].to_vec();
             layers.push(layer(denoise_args::LAYER, DENOISED.map(str::to_owned).to_vec(), Box::new(rows)));
         }
+
+        // Cryptomattes
         let of_ids = self.cryptomattes.iter().map(|ids| ExrLayer {
             metadata: ids.metadata.clone(),
             is_exact: true,
@@ -214,8 +220,8 @@ impl Picture<'_> {
     }
 }
 
-/// Writes an image for a display: its size, the place of its first pixel in the full image, and the size of that. `rows`
-/// makes the light of some rows, RGB, interleaved.
+/// Writes a display image: its size, the position of its first pixel in the full image, and the size of the full image.
+/// `rows` returns radiance of a range of rows: RGB, interleaved.
 pub(super) fn write_display(
     path: &Path,
     (size, origin, full): ([usize; 2], [usize; 2], [usize; 2]),
@@ -226,7 +232,7 @@ pub(super) fn write_display(
     let names = ["R", "G", "B"].map(str::to_owned).to_vec();
     let part = Part::display(size[0], size[1], names, Vec::new()).with_window(origin, full).with_metadata(metadata);
     let Some(grade) = look.grade() else {
-        // The look follows from all pixels, or takes long to be set up
+        // The exposure depends on all pixels, or OpenColorIO takes long to set up
         let all: Vec<Vec<f32>> =
             (0..size[1]).step_by(ROWS_AT_ONCE).map(|y| rows(y..size[1].min(y + ROWS_AT_ONCE))).collect();
         let Displayed { pixels, metadata } = look.apply_to(all.concat())?;
@@ -243,7 +249,7 @@ pub(super) fn write_display(
 }
 
 impl Made<'_> {
-    /// The image.
+    /// The image with its options for writing.
     fn picture(&self) -> anyhow::Result<Picture<'_>> {
         Ok(Picture {
             film: &self.rendering.film,
@@ -268,7 +274,7 @@ impl Made<'_> {
         output::default_aovs(&self.rendering.film, has.0, has.1)
     }
 
-    /// What the image depends on, and how it came about.
+    /// Settings and provenance of the image.
     fn metadata(&self) -> anyhow::Result<Vec<(String, String)>> {
         let Made { args, job, rendering, .. } = self;
         let mut metadata = output::metadata(&job.world.scene.film, job.settings());

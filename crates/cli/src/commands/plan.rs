@@ -1,4 +1,4 @@
-//! `lumiris plan`: what a rendering leaves to measurements, as a file.
+//! `lumiris plan`: stores the choices that settings leave to measurements.
 
 use super::args::SceneArgs;
 use super::interrupt;

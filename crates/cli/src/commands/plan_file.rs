@@ -1,4 +1,4 @@
-//! Plans as files: the choices that followed from measurements.
+//! Plan files: choices that follow from measurements.
 
 use super::progress;
 use anyhow::{Context, bail};
@@ -13,28 +13,28 @@ use std::collections::BTreeMap;
 use std::fs::read_to_string;
 use std::path::Path;
 
-/// Metadata of an image that hold its plan.
+/// Metadata key of an image's plan.
 pub(super) const PLAN_KEY: &str = "lumiris:plan";
 
-/// Columns, rows and samples per pixel.
+/// Width and height (pixels), and samples per pixel for pilots.
 fn image_of(job: &RenderJob) -> [u32; 3] {
     let bounds = job.world.scene.film.bounds;
     [bounds.width(), bounds.height(), job.settings().sampling.pilot_spp()]
 }
 
-/// A plan as it is stored.
+/// The stored form of a plan.
 #[derive(Clone, Debug, Deserialize, Serialize)]
 pub(super) struct PlanFile {
-    /// The program that made it.
+    /// Version of the program that made it.
     version: String,
-    /// The scene that it was made for.
+    /// The scene for which it was made.
     scene: String,
-    /// Columns, rows and samples per pixel of the image that it was made for.
+    /// Width and height (pixels) and samples per pixel of the image for which it was made.
     #[serde(default)]
     image: Option<[u32; 3]>,
-    /// The settings that were chosen, by their names in metadata.
+    /// The chosen settings, by their metadata names.
     pub(super) settings: BTreeMap<String, String>,
-    /// What trials found; `null` without them.
+    /// Results of the trials; `null` without trials.
     #[serde(default)]
     pub(super) tuning: Value,
 }
@@ -45,12 +45,12 @@ impl PlanFile {
         serde_json::from_str(&text).with_context(|| format!("{} is no plan", path.display()))
     }
 
-    /// The plan of an image, as its metadata have it.
+    /// The plan in an image's metadata.
     pub(super) fn of_image(path: &Path) -> Option<Self> {
         serde_json::from_str(read_metadata(path).ok()?.get(PLAN_KEY)?).ok()
     }
 
-    /// Applies its choices. Messages call it `name`.
+    /// Applies the choices. `name` names the plan in messages.
     pub(super) fn apply(&self, name: &str, settings: &mut Settings) -> anyhow::Result<()> {
         for (key, value) in &self.settings {
             if let Some(removed) = Removed::of_key(key) {
@@ -76,7 +76,8 @@ impl PlanFile {
         })
     }
 
-    /// What it was made for, if that is another image than this one: other frames of an animation are the same to it.
+    /// Describes the image for which the plan was made, if it differs from this one. Frames of one animation do not
+    /// differ.
     pub(super) fn other_image(&self, scene: &Path, job: &RenderJob) -> Option<String> {
         let name = |path: &Path| {
             let name = path.file_name().unwrap_or_default().to_string_lossy();
@@ -89,7 +90,7 @@ impl PlanFile {
         other.map(|[width, height, spp]| format!("{width}x{height} pixels with {spp} samples"))
     }
 
-    /// On one line.
+    /// The plan as one line of JSON.
     pub(super) fn text(&self) -> anyhow::Result<String> {
         Ok(serde_json::to_string(self)?)
     }

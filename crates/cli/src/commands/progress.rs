@@ -1,4 +1,4 @@
-//! Terminal output while the program runs; the only place that writes to the terminal.
+//! Terminal output. No other module writes to the terminal.
 #![allow(clippy::print_stdout, clippy::print_stderr)]
 
 use anyhow::Context;
@@ -10,7 +10,7 @@ use std::io::{self, Write};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-/// Prints a line to standard error; that nobody reads it is no reason to lose a rendering.
+/// Prints a line to standard error. Errors are ignored: a closed terminal is no reason to lose a rendering.
 pub(super) fn say(text: &str) {
     let print = || drop(writeln!(std::io::stderr().lock(), "{text}"));
     match &*line() {
@@ -19,7 +19,7 @@ pub(super) fn say(text: &str) {
     }
 }
 
-/// Prints a line to standard error, unless it has been printed before, as for another frame.
+/// Prints a line to standard error, unless it has been printed before, for example for another frame.
 pub(super) fn say_once(text: &str) {
     static SAID: Mutex<BTreeSet<String>> = Mutex::new(BTreeSet::new());
     if SAID.lock().unwrap_or_else(PoisonError::into_inner).insert(text.to_owned()) {
@@ -27,13 +27,13 @@ pub(super) fn say_once(text: &str) {
     }
 }
 
-/// Prints a line to standard output. A closed pipe is not an error: its reader, such as `head`, has all that it wants.
+/// Prints a line to standard output. A closed pipe is not an error: its reader, such as `head`, has read enough.
 pub(super) fn print(text: &str) -> anyhow::Result<()> {
     let mut out = std::io::stdout().lock();
     printed(writeln!(out, "{text}").and_then(|()| out.flush()))
 }
 
-/// What became of printing.
+/// The result of printing, in which a closed pipe is no error.
 pub(super) fn printed(result: io::Result<()>) -> anyhow::Result<()> {
     match result {
         Err(error) if error.kind() == io::ErrorKind::BrokenPipe => Ok(()),
@@ -41,7 +41,7 @@ pub(super) fn printed(result: io::Result<()>) -> anyhow::Result<()> {
     }
 }
 
-/// A relative standard error as text; it is unknown where no pixel has two samples.
+/// A relative standard error as text; "unknown" if no pixel has two samples.
 pub(super) fn percent(noise: f64) -> String {
     if noise.is_finite() { format!("{:.2} %", noise * 100.0) } else { "unknown".to_owned() }
 }
@@ -57,39 +57,39 @@ pub(super) fn noise(noise: &Noise) -> String {
     format!("noise {}{share}", percent(median))
 }
 
-/// The line of what is under way; there is one at most.
+/// The current progress line. There is at most one.
 static LINE: Mutex<Option<Line>> = Mutex::new(None);
 
 fn line() -> MutexGuard<'static, Option<Line>> {
     LINE.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// A line that tells what is under way, how much of it is done, and how long the rest takes.
+/// A progress line: the stage, its completed share and the remaining time.
 struct Line {
     bar: ProgressBar,
-    /// What is under way, and since when.
+    /// Name and start of the stage.
     stage: (String, Instant),
     clock: Clock,
 }
 
-/// When the work began, and what time it may take.
+/// Start and time limit of the work.
 #[derive(Clone, Copy)]
 pub(super) struct Clock {
-    /// The beginning.
+    /// Start.
     pub start: Instant,
-    /// The time, if there is a limit.
+    /// Time limit, if any.
     pub limit: Option<Duration>,
 }
 
 impl Clock {
-    /// What is left of the time.
+    /// Time until the limit.
     pub(super) fn left(&self) -> Option<Duration> {
         Some(self.limit?.saturating_sub(self.start.elapsed()))
     }
 }
 
 impl Line {
-    /// Begins a stage unless it is under way.
+    /// Begins a stage, unless it is the current one.
     fn begin(&mut self, name: &str) {
         if self.stage.0 != name {
             self.stage = (name.to_owned(), Instant::now());
@@ -105,7 +105,7 @@ impl Line {
         self.bar.set_style(ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar()));
     }
 
-    /// Shows how much of the stage is done.
+    /// Shows the completed share of the stage.
     fn show(&mut self, done: f64, text: &str) {
         let elapsed = self.stage.1.elapsed();
         if self.bar.message().is_empty() {
@@ -119,14 +119,14 @@ impl Line {
     }
 }
 
-/// Positions of a bar.
+/// Number of positions of a bar.
 const BAR_LENGTH: u64 = 1000;
-/// Time between two images of a line of which nothing else is known than that it goes on.
+/// Update interval of the spinner, for stages without a completed share.
 const TICK: Duration = Duration::from_millis(125);
-/// Part of some work, and the time for it, from which on the time for the rest is known.
+/// The remaining time is estimated from this completed share on, or from this elapsed time on.
 const KNOWN: (f64, Duration) = (0.02, Duration::from_secs(2));
 
-/// Time for the rest of some work at the mean speed so far, if that is known.
+/// Remaining time at the mean speed so far; `None` if it is too early for an estimate.
 fn left(elapsed: Duration, done: f64) -> Option<Duration> {
     let is_known = done > 0.0 && (done >= KNOWN.0 || elapsed >= KNOWN.1);
     let rest = || Duration::try_from_secs_f64(elapsed.as_secs_f64() * (1.0 / done - 1.0).max(0.0)).ok();
@@ -144,7 +144,7 @@ fn span(time: Duration) -> String {
     }
 }
 
-/// Begins a stage of the work, or tells how much of it is done. Nothing is seen of it unless there is a [`Bar`].
+/// Begins a stage or shows its completed share. Does nothing unless there is a [`Bar`].
 pub(super) fn stage(name: &str, done: Option<f64>) {
     if let Some(line) = &mut *line() {
         line.begin(name);
@@ -154,18 +154,18 @@ pub(super) fn stage(name: &str, done: Option<f64>) {
     }
 }
 
-/// Takes the line away, as before the program ends.
+/// Removes the line, for example before the program ends.
 pub(super) fn clear() {
     if let Some(line) = &*line() {
         line.bar.finish_and_clear();
     }
 }
 
-/// The line is there while this is.
+/// Guard of the progress line.
 pub(super) struct Bar(());
 
 impl Bar {
-    /// Shows the line, unless `quiet` or where nobody sees it.
+    /// Shows the line, unless `quiet` is true or standard error is no terminal.
     pub(super) fn new(quiet: bool, clock: Clock) -> Self {
         let target = if quiet { ProgressDrawTarget::hidden() } else { ProgressDrawTarget::stderr_with_hz(8) };
         let bar = ProgressBar::with_draw_target(None, target);
@@ -174,12 +174,12 @@ impl Bar {
         Bar(())
     }
 
-    /// True if somebody may see the line.
+    /// True if the line is drawn.
     pub(super) fn is_visible(&self) -> bool {
         line().as_ref().is_some_and(|line| !line.bar.is_hidden())
     }
 
-    /// Shows the progress of a rendering: what is done of its samples, or of its time if that is more.
+    /// Shows the progress of a rendering: the completed share of its samples or of its time, whichever is larger.
     pub(super) fn update(&self, progress: &Progress) {
         let Some(line) = &mut *line() else { return };
         line.begin("rendering");

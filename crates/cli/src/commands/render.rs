@@ -40,33 +40,33 @@ use std::process::ExitCode;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-/// What the renderings of one run of the program have in common.
+/// State shared by all renderings of one run of the program.
 pub(super) struct Session {
-    /// Meshes and images that scenes share.
+    /// Meshes and images shared by scenes.
     pub files: FileCache,
-    /// What denoises images, if they are to be.
+    /// The denoiser, if images are denoised.
     denoiser: Option<Denoiser>,
-    /// Those who watch.
+    /// Connections to viewers.
     watch: Watch,
 }
 
-/// A picture that was rendered.
+/// Result of rendering an image.
 pub(super) struct Rendered {
     /// Statistics.
     pub stats: serde_json::Value,
-    /// Wall-clock time of it all (s).
+    /// Wall-clock time of loading, rendering and writing (s).
     pub seconds: f64,
     /// Mean relative standard error of the pixels.
     pub noise: f64,
-    /// What was chosen for it by measurements.
+    /// The choices made by measurements.
     pub plan: PlanFile,
-    /// True if every pixel has all its samples.
+    /// True if every pixel has all of its samples.
     pub complete: bool,
-    /// Why files could not be written where they should be, and where they are instead.
+    /// Errors of files that could not be written to their destinations, with the paths of rescued copies.
     pub misplaced: Vec<String>,
 }
 
-/// `start` is when the program began.
+/// Renders one image. `start` is the start of the program.
 pub(super) fn run(args: &RenderArgs, start: Instant) -> anyhow::Result<ExitCode> {
     let _orderly = interrupt::orderly();
     let session = Session::start(args, FileCache::default())?;
@@ -92,7 +92,7 @@ pub(super) fn is_stop(error: &anyhow::Error) -> bool {
 }
 
 impl Session {
-    /// From here on renderings can be watched.
+    /// Checks the options, opens the denoiser, and starts the viewers' connections.
     pub(super) fn start(args: &RenderArgs, files: FileCache) -> anyhow::Result<Self> {
         let _starting = interrupt::during(String::new());
         if !args.output.is_empty() {
@@ -108,7 +108,8 @@ impl Session {
     }
 }
 
-/// Renders a picture and writes it; its time began with `start`. What could not be written is no error here, but part of the result.
+/// Renders an image and writes it. `start` is the start of its time. Files that could not be written are not an error,
+/// but listed in the result.
 pub(super) fn render_one(args: &RenderArgs, session: &Session, start: Instant) -> anyhow::Result<Rendered> {
     let preparing = interrupt::during(format!("preparing {}", args.scene.name()));
     check_outputs(&args.output)?;
@@ -124,7 +125,7 @@ pub(super) fn render_one(args: &RenderArgs, session: &Session, start: Instant) -
     parts::check_settings(args, job.settings())?;
     check_memory(args, &job, asked.as_deref())?;
     if args.denoise.denoise && job.settings().integrator.path_reuse.is_none() {
-        // A denoiser takes noise that is correlated between pixels for detail
+        // A denoiser would keep noise that is correlated between pixels
         job.change(|s| s.integrator.path_reuse = Some(1));
     }
     let settings = settings_of(args, &job, asked.as_deref());
@@ -133,7 +134,7 @@ pub(super) fn render_one(args: &RenderArgs, session: &Session, start: Instant) -
         watch::preview(canvas, (&job, &settings), interrupt::stop())?;
     }
     let begin = Instant::now();
-    // What goes on has the pilots of what is stored
+    // A continued rendering uses the stored pilots
     let limit = clock.limit.filter(|_| stored.is_none());
     let deadline = limit.and_then(|limit| pilot_deadline(start, limit));
     let ratio_map = asked.as_ref().is_some_and(|list| list.contains(&Aov::Ratio));
@@ -144,7 +145,7 @@ pub(super) fn render_one(args: &RenderArgs, session: &Session, start: Instant) -
         Preparation { ratio_map, tunes, deadline, expect: &expect, stop: interrupt::stop(), ..Preparation::default() };
     let mut plan = plan(&args.scene, (&mut job, &given), &how, args.quiet)?;
     if plan.settings.is_empty() {
-        // What goes on from a checkpoint has the choices of its beginning
+        // A rendering continued from a checkpoint keeps the choices of its beginning
         let text = stored.as_ref().and_then(|stored| stored.header.note(PLAN_NOTE));
         plan = text.and_then(|text| serde_json::from_str(text).ok()).unwrap_or(plan);
     }
@@ -191,7 +192,7 @@ pub(super) fn render_one(args: &RenderArgs, session: &Session, start: Instant) -
     })
 }
 
-/// Says, once, that no output holds the layers of light groups.
+/// Prints a note, once, if no output stores the layers of light groups.
 fn note_layers(args: &RenderArgs, job: &RenderJob, (outputs, asked): (&[PathBuf], Option<&[Aov]>)) {
     let is_wanted = asked.is_none_or(|list| list.contains(&Aov::LightGroups));
     let is_kept = outputs.iter().any(|path| is_exr(path) || is_part(path)) || args.parts.checkpoint.is_some();
@@ -200,7 +201,7 @@ fn note_layers(args: &RenderArgs, job: &RenderJob, (outputs, asked): (&[PathBuf]
     }
 }
 
-/// How to render for the AOVs that are asked for.
+/// The render settings for the requested AOVs.
 fn settings_of(args: &RenderArgs, job: &RenderJob, asked: Option<&[Aov]>) -> RenderSettings {
     let needs = |is_shown: fn(&Aov) -> bool| asked.is_none_or(|list| list.iter().any(is_shown));
     RenderSettings {
@@ -211,7 +212,7 @@ fn settings_of(args: &RenderArgs, job: &RenderJob, asked: Option<&[Aov]>) -> Ren
     }
 }
 
-/// Refuses an image that takes more memory than there is.
+/// Refuses an image that does not fit in memory.
 fn check_memory(args: &RenderArgs, job: &RenderJob, asked: Option<&[Aov]>) -> anyhow::Result<()> {
     let mut render = settings_of(args, job, asked);
     if let Some([i, n]) = args.parts.part.filter(|_| args.parts.is_by_tiles()) {
@@ -222,14 +223,14 @@ fn check_memory(args: &RenderArgs, job: &RenderJob, asked: Option<&[Aov]>) -> an
     memory::check(args.memory_limit, &predict(job, &wanted))
 }
 
-/// Denoises a rendering and writes its images and parts. Returns the time that denoising took as well.
+/// Denoises a rendering and writes its images and parts. Also returns the time spent on denoising.
 fn write_results(
     args: &RenderArgs,
     (job, plan, rendering): (&RenderJob, &PlanFile, &Rendering),
     (session, settings): (&Session, &RenderSettings),
     (film_file, outputs): (Option<&mut FilmFile>, Vec<PathBuf>),
 ) -> anyhow::Result<(Written, Duration)> {
-    // Only EXR files hold them
+    // Only EXR files store Cryptomattes
     let has_exr = outputs.iter().any(|path| is_exr(path));
     let kinds = if has_exr { &args.exr.cryptomatte[..] } else { &[] };
     let cryptomattes = cryptomattes(job, settings, &rendering.film, kinds)?;
@@ -256,7 +257,7 @@ fn write_results(
     Ok((written, denoising))
 }
 
-/// Refuses to denoise what is no whole image, and to show a denoised image without keeping the other.
+/// Refuses to denoise parts, and `--denoise` without an EXR output, since the noisy image would be lost.
 fn check_denoise(args: &RenderArgs, outputs: &[PathBuf]) -> Result<(), UsageError> {
     if args.denoise.denoise && args.parts.part.is_some() {
         let text = "--denoise needs the whole image: merge the parts with `lumiris merge --denoise`";
@@ -265,13 +266,15 @@ fn check_denoise(args: &RenderArgs, outputs: &[PathBuf]) -> Result<(), UsageErro
     args.denoise.check(outputs)
 }
 
-/// Renders, for those who watch as well. From the first sample on there is something to lose.
+/// Renders, and sends the image to viewers if there are any. Ctrl-C is orderly from the first sample on, since there is
+/// then an image to lose.
 fn render_shown(
     (job, settings): (&RenderJob, &RenderSettings),
     (canvas, bar): (Option<&Arc<Canvas>>, &Bar),
     continuation: Continuation<'_>,
     preparing: During,
 ) -> anyhow::Result<Rendering> {
+    // Progress; the first call ends the activity that can be abandoned
     progress::stage(before_samples(&job.settings().integrator), None);
     let preparing = Mutex::new(Some(preparing));
     let observe = |progress: &Progress| {
@@ -280,7 +283,10 @@ fn render_shown(
         watch::observe(canvas, progress);
     };
     let continuation = Continuation { tells_noise: bar.is_visible(), ..continuation };
+    // Without viewers
     let Some(shown) = canvas else { return Ok(go_on(job, settings, interrupt::stop(), &observe, continuation)?) };
+
+    // With viewers: send the tiles, and the final film
     let set_tile = |tile: &Film| shown.set_tile(tile);
     let watched = Continuation { watch: Some(&set_tile), ..continuation };
     let rendering = go_on(job, settings, interrupt::stop(), &observe, watched)?;
@@ -288,7 +294,7 @@ fn render_shown(
     Ok(rendering)
 }
 
-/// What a rendering does before its first sample.
+/// Name of the stage before the first sample.
 fn before_samples(settings: &IntegratorSettings) -> &'static str {
     match settings.kind {
         IntegratorKind::PhotonMap => "tracing photons",
@@ -298,7 +304,7 @@ fn before_samples(settings: &IntegratorSettings) -> &'static str {
     }
 }
 
-/// What an image is called by those who watch: the name of its scene, without folders.
+/// Name of the image for viewers: the file name of its scene.
 fn name_of(args: &RenderArgs) -> String {
     args.scene.scene.file_name().unwrap_or_default().to_string_lossy().into_owned()
 }
@@ -310,9 +316,12 @@ pub(super) fn write_stats(path: &Path, stats: &serde_json::Value) -> anyhow::Res
 }
 
 fn outputs(args: &RenderArgs, job: &RenderJob) -> Vec<PathBuf> {
+    // The given outputs
     if !args.output.is_empty() {
         return args.output.clone();
     }
+
+    // The name in the scene file; a type that cannot be written becomes EXR
     let from_file = job.world.scene.film.file_name.as_ref().map(PathBuf::from);
     let from_file = from_file.map(|path| {
         if is_output(&path) {
@@ -324,6 +333,8 @@ fn outputs(args: &RenderArgs, job: &RenderJob) -> Vec<PathBuf> {
         }
         exr
     });
+
+    // The name of the scene
     vec![from_file.unwrap_or_else(|| {
         let scene = &args.scene.scene;
         let scene = if is_standard_input(scene) { Path::new("stdin") } else { scene };
@@ -333,7 +344,7 @@ fn outputs(args: &RenderArgs, job: &RenderJob) -> Vec<PathBuf> {
     })]
 }
 
-/// Refuses options that cannot be, and returns the AOVs that are asked for.
+/// Refuses impossible options. Returns the requested AOVs.
 pub(super) fn check(args: &RenderArgs) -> anyhow::Result<Option<Vec<Aov>>> {
     args.look.check()?;
     args.exr.check()?;
@@ -341,7 +352,7 @@ pub(super) fn check(args: &RenderArgs) -> anyhow::Result<Option<Vec<Aov>>> {
     asked_aovs(args)
 }
 
-/// The AOVs that are asked for; `None` is the default.
+/// The requested AOVs; `None` for the default.
 fn asked_aovs(args: &RenderArgs) -> anyhow::Result<Option<Vec<Aov>>> {
     let Some(list) = &args.aov else { return Ok(None) };
     let aovs: Vec<Aov> = list.iter().copied().flatten().collect();
@@ -357,6 +368,7 @@ fn stats(
     rendering: &Rendering,
     (setup, laps): (SetupTimes, &Laps),
 ) -> serde_json::Value {
+    // Times and settings
     let s = &rendering.stats;
     let d = &s.direct;
     let textures = &job.world.scene.textures;
@@ -367,6 +379,8 @@ fn stats(
     let accel = job.world.accel.stats();
     let metadata: serde_json::Map<_, _> =
         output::metadata(&job.world.scene.film, job.settings()).into_iter().map(|(k, v)| (k, v.into())).collect();
+
+    // Report
     json!({
         "scene": args.scene.scene.display().to_string(),
         "settings": metadata,

@@ -1,4 +1,4 @@
-//! What is said of a finished rendering.
+//! The report on a finished rendering.
 
 use super::args::RenderArgs;
 use super::interrupt::is_stopped;
@@ -13,18 +13,18 @@ use lumiris::settings::Settings;
 use std::path::PathBuf;
 use std::time::Duration;
 
-/// Times that a picture took.
+/// Times of an image.
 pub(super) struct Times {
-    /// Those before the first sample.
+    /// Times before the first sample.
     pub setup: SetupTimes,
-    /// For denoising.
+    /// Time of denoising.
     pub denoising: Duration,
-    /// For all of it.
+    /// Total time.
     pub all: Duration,
 }
 
 impl Times {
-    /// The times before the first sample, if they are long.
+    /// The times before the first sample; only times of at least 0.05 s are shown.
     fn before(&self) -> String {
         let SetupTimes { load, build, prepare } = self.setup;
         let parts = [(load + build, "loading"), (prepare, "pilots")];
@@ -36,7 +36,7 @@ impl Times {
         if parts.is_empty() { String::new() } else { format!(" ({})", parts.join(", ")) }
     }
 
-    /// Why a time limit (s) did not hold, if it did not by much.
+    /// Explains a missed time limit (s); `None` if it was met within 3 %, or 0.5 s if that is more.
     fn late(&self, limit: f64) -> Option<String> {
         let is_late = |time: Duration| time.as_secs_f64() > limit + (0.03 * limit).max(0.5);
         let SetupTimes { load, build, .. } = self.setup;
@@ -51,25 +51,28 @@ impl Times {
     }
 }
 
-/// What ended a rendering.
+/// Reason for the end of a rendering.
 #[derive(Clone, Copy, PartialEq)]
 enum Ended {
-    /// It has all its samples.
+    /// All samples were taken.
     Complete,
-    /// Ctrl-C.
+    /// Ctrl-C or a signal.
     Stopped,
-    /// Its time.
+    /// The time limit.
     Time,
 }
 
-/// How many blocks have the noise that was asked for, and what keeps others from it.
+/// The share of blocks that reached the noise target, and the limits that kept the others above it.
 fn reached_text(target: f32, spp: u32, reached: &Reached, ended: Ended) -> String {
+    // All blocks
     let percent = |share: f64| format!("{} %", (share * 1000.0).round() / 10.0);
     let target = f64::from(target) * 100.0;
     let target = format!("{} %", (target * 1000.0).round() / 1000.0);
     if reached.reached >= 1.0 {
         return format!("target {target} reached in all blocks");
     }
+
+    // Reasons for the other blocks
     let others = match ended {
         Ended::Complete => "are above it without having hit a limit: the pilot found less noise there",
         Ended::Stopped => "were stopped",
@@ -87,7 +90,7 @@ fn reached_text(target: f32, spp: u32, reached: &Reached, ended: Ended) -> Strin
     format!("target {target} reached in {} of blocks; {}", percent(reached.reached), above.join("; "))
 }
 
-/// Says what became of a rendering, unless it is to be quiet.
+/// Reports on a rendering, unless `--quiet` is given.
 pub(super) fn report(
     args: &RenderArgs,
     (job, rendering): (&RenderJob, &Rendering),
@@ -96,6 +99,7 @@ pub(super) fn report(
     if args.quiet {
         return;
     }
+    // Files, time, samples and noise
     let names: Vec<String> = outputs.iter().map(|p| p.display().to_string()).collect();
     let names = if names.is_empty() { "rendered".to_owned() } else { names.join(", ") };
     let summary = rendering.film.summary();
@@ -110,6 +114,8 @@ pub(super) fn report(
         progress::noise(&summary.noise)
     ));
     progress::say(&laps.text());
+
+    // Noise target and time limit
     let Settings { sampling, .. } = job.settings();
     let reached = sampling.noise.and_then(|target| {
         let reached = Reached::of(&summary.blocks, target.into(), sampling.spp)?;
@@ -128,6 +134,8 @@ pub(super) fn report(
         format!("warning: --time was too short for a sample of {:.1} % of the pixels", 100.0 * (1.0 - sampled / all));
     let holes = Some(holes).filter(|_| args.time.is_some() && sampled < all && !is_stopped());
     reached.into_iter().chain(late).chain(holes).for_each(|text| progress::say(&text));
+
+    // Caches
     if let Some(c) = &rendering.cache {
         progress::say(&format!(
             "irradiance cache: {} records in {:.1} s, {:.2} % cache misses in {} lookups",
@@ -148,6 +156,8 @@ pub(super) fn report(
             if p.maps > 1 { format!(", {} maps", p.maps) } else { String::new() }
         ));
     }
+
+    // Invalid samples
     let invalid = summary.invalid;
     if invalid > 0 {
         progress::say(&format!("warning: {invalid} samples were not finite, or too bright, and were counted as black"));

@@ -10,12 +10,12 @@ use std::process::ExitCode;
 /// `lumiris reproduce`
 #[derive(Args, Clone, Debug)]
 pub(super) struct ReproduceArgs {
-    /// Which paper
+    /// Paper
     paper: Paper,
     /// Output folder for the page (index.html), its images, and all numbers
     #[arg(short, long, value_name = "DIR")]
     out: PathBuf,
-    /// At most 2 minutes on two cores instead of 20
+    /// Take at most 2 minutes on two cores instead of 20
     #[arg(long)]
     quick: bool,
     /// Threads [default: all cores]
@@ -25,12 +25,12 @@ pub(super) struct ReproduceArgs {
     /// keller-wald)]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(16..=4096))]
     size: Option<u32>,
-    /// Folder with scenes of the same names to use instead of the generated ones: statue-env.pbrt, statue-lights.pbrt
-    /// and statue-env-lights.pbrt (talbot); checkers.pbrt, statue.pbrt, room.pbrt and box.pbrt (fan); rooms.pbrt,
-    /// rooms-10000.pbrt, ring.pbrt, ring-indirect.pbrt and slit.pbrt (keller-wald)
+    /// Folder with scenes to use instead of the generated ones, with the same names: statue-env.pbrt,
+    /// statue-lights.pbrt and statue-env-lights.pbrt (talbot); checkers.pbrt, statue.pbrt, room.pbrt and box.pbrt
+    /// (fan); rooms.pbrt, rooms-10000.pbrt, ring.pbrt, ring-indirect.pbrt and slit.pbrt (keller-wald)
     #[arg(long, value_name = "DIR")]
     scenes: Option<PathBuf>,
-    /// No progress, only errors
+    /// Print no progress, only errors
     #[arg(short, long)]
     quiet: bool,
 }
@@ -47,6 +47,7 @@ enum Paper {
 }
 
 pub(super) fn run(args: &ReproduceArgs) -> anyhow::Result<ExitCode> {
+    // Options
     check_page(&args.out)?;
     let options = Options {
         out: args.out.clone(),
@@ -61,12 +62,16 @@ pub(super) fn run(args: &ReproduceArgs) -> anyhow::Result<ExitCode> {
             progress::say(text);
         }
     };
+
+    // Render and measure
     let observer = Observer { say: &say, stop: interrupt::stop() };
     let page = match args.paper {
         Paper::Talbot => talbot::run(&options, observer),
         Paper::Fan => fan::run(&options, observer),
         Paper::KellerWald => keller_wald::run(&options, observer),
     };
+
+    // Report the page
     match page {
         Ok(page) => {
             progress::print(&page.display().to_string())?;

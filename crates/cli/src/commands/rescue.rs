@@ -1,10 +1,10 @@
-//! Results that cannot be written where they should be: a rendering of hours is not lost to a full disk.
+//! Rescue of results that cannot be written to their destination: a full disk must not lose hours of rendering.
 
 use anyhow::anyhow;
 use std::path::{Path, PathBuf};
 
-/// Writes a file; if that fails, into a new folder below the one for temporary files. Then the error says why, and where
-/// the file is.
+/// Writes a file. If that fails, writes it into a new folder in the temporary folder; the error then gives the reason
+/// and the path of the copy.
 pub(super) fn write_or_rescue(path: &Path, write: impl Fn(&Path) -> anyhow::Result<()>) -> anyhow::Result<()> {
     let Err(error) = write(path) else { return Ok(()) };
     Err(match rescue(path, write) {
@@ -13,7 +13,7 @@ pub(super) fn write_or_rescue(path: &Path, write: impl Fn(&Path) -> anyhow::Resu
     })
 }
 
-/// Writes a file of the same name into a new folder, and says where it is. The folder goes if that fails.
+/// Writes a file of the same name into a new folder, and returns its path. The folder is removed if that fails.
 fn rescue(path: &Path, write: impl Fn(&Path) -> anyhow::Result<()>) -> anyhow::Result<PathBuf> {
     let folder = tempfile::Builder::new().prefix("lumiris-").tempdir()?;
     let name = path.file_name().ok_or_else(|| anyhow!("{} names no file", path.display()))?;
@@ -26,7 +26,7 @@ mod tests {
     use super::*;
     use anyhow::bail;
 
-    /// Writes, unless the path lies below `forbidden`.
+    /// Writes, unless the path is below `forbidden`.
     fn write_outside(forbidden: &Path) -> impl Fn(&Path) -> anyhow::Result<()> {
         move |path| {
             if path.starts_with(forbidden) {

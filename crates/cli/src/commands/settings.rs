@@ -1,4 +1,4 @@
-//! From command-line options to a render job.
+//! Conversion of command-line options to a render job.
 
 use super::UsageError;
 use super::args::{SceneArgs, is_standard_input};
@@ -34,12 +34,12 @@ pub(super) struct SetupTimes {
     pub load: f64,
     /// Building ray tracers.
     pub build: f64,
-    /// Pilots, and what else follows from settings that are open.
+    /// Pilots, and other choices for open settings.
     pub prepare: f64,
 }
 
-/// Loads the scene, but what `files` has of its files, and applies the options, after the settings of what is stored; prints
-/// warnings. `time` is that which the image may take.
+/// Loads the scene and applies the options; prints warnings. Files in `files` are not read again. Options take
+/// precedence over the settings of the stored state. `time` is the time limit of the image.
 pub(super) fn load_scene(
     args: &SceneArgs,
     files: &FileCache,
@@ -70,7 +70,7 @@ pub(super) fn load_scene(
     if !warnings.is_empty() {
         progress::say(warnings.trim_end());
     }
-    // What is given now comes later, so that differences from what is stored are found
+    // Applied after the stored settings, so that differences from them are detected
     if let Some(stored) = stored {
         stored.apply(&mut loaded.settings)?;
     }
@@ -84,11 +84,11 @@ pub(super) fn load_scene(
         complete_for_time(&mut loaded.settings, has_spp, time, loaded.scene.film.bounds.area());
     }
     complete_for_noise(&mut loaded.settings, has_spp).map_err(|needs| UsageError(format!("--noise {needs}")))?;
-    // More samples belong to what the first ones were prepared for
+    // Additional samples use the same preparation as the first ones
     if let Some(stored) = stored {
         loaded.settings.sampling.spp = stored.spp()?;
     }
-    // What is stored is of a frame already
+    // The stored settings already contain the frame's
     if let Some(frame) = &args.frame {
         if stored.is_none() {
             frame.plan.iter().try_for_each(|plan| plan.apply("the plan of the first frame", &mut loaded.settings))?;
@@ -106,7 +106,7 @@ pub(super) fn load_scene(
     Ok(loaded)
 }
 
-/// All of the standard input, which commands may load more than once.
+/// Returns the whole standard input. Commands may load it more than once.
 fn standard_input() -> io::Result<&'static str> {
     static TEXT: OnceLock<String> = OnceLock::new();
     if let Some(text) = TEXT.get() {
@@ -121,7 +121,7 @@ fn standard_input() -> io::Result<&'static str> {
     Ok(TEXT.get_or_init(|| text))
 }
 
-/// Rejects what is no scene, and options of another kind of scenes.
+/// Rejects files that are no scenes, and options for the other kind of scene.
 fn check_scene(args: &SceneArgs) -> anyhow::Result<()> {
     let path = args.scene.display();
     if is_picture(&args.scene) {
@@ -141,7 +141,7 @@ fn check_scene(args: &SceneArgs) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// What to do with a mesh, if the file is one by its name.
+/// Advice on using a mesh file; `None` if the extension is no mesh format's.
 fn mesh_kind(path: &Path) -> Option<&'static str> {
     let extension = path.extension()?.to_str()?.to_ascii_lowercase();
     match extension.as_str() {
@@ -151,13 +151,13 @@ fn mesh_kind(path: &Path) -> Option<&'static str> {
     }
 }
 
-/// What is known of a scene that was loaded, beside its job.
+/// Data of a loaded scene beside its job.
 pub(super) struct Setup {
-    /// Times.
+    /// Setup times.
     pub times: SetupTimes,
     /// The files of the scene.
     pub files: SceneFiles,
-    /// The settings that were given.
+    /// The settings given by options or by the scene.
     pub given: Given,
 }
 
@@ -166,19 +166,23 @@ pub(super) fn load_job(args: &SceneArgs) -> anyhow::Result<(RenderJob, Setup)> {
     load_job_of(args, &FileCache::default(), None, None)
 }
 
-/// The same with the settings of what is stored, for the time that the image may take, and without reading what `files` has.
+/// Loads the scene and builds its ray tracers, with the settings of the stored state and the time limit of the image.
+/// Files in `files` are not read again.
 pub(super) fn load_job_of(
     args: &SceneArgs,
     files: &FileCache,
     stored: Option<&Stored>,
     time: Option<Duration>,
 ) -> anyhow::Result<(RenderJob, Setup)> {
+    // Load
     laps::end("start", &[]);
     let start = Instant::now();
     let mut loaded = load_scene(args, files, stored, time)?;
     let (files, given) = (std::mem::take(&mut loaded.files), std::mem::take(&mut loaded.given));
     let load = start.elapsed().as_secs_f64();
     laps::end("load", &[]);
+
+    // Build the ray tracers
     let start = Instant::now();
     let _building = interrupt::during(format!("building the ray tracers of {}", args.name()));
     progress::stage("building the ray tracers", None);
@@ -190,18 +194,21 @@ pub(super) fn load_job_of(
     Ok((job, Setup { times, files, given }))
 }
 
-/// Chooses what the settings leave open, and prints it unless `quiet`; on the threads of the options. Of the settings that were
-/// given, says which have no effect.
+/// Makes the choices that the settings leave open, with `--threads` threads. Prints them unless `quiet`. Warns of given
+/// settings that have no effect.
 pub(super) fn plan(
     args: &SceneArgs,
     (job, given): (&mut RenderJob, &Given),
     how: &Preparation<'_>,
     quiet: bool,
 ) -> anyhow::Result<PlanFile> {
+    // Choose
     let _preparing = interrupt::during(format!("measuring what the settings of {} leave open", args.name()));
     let asked = *job.settings();
     let how = Preparation { threads: args.threads.map(|t| t as usize), observe: &progress::stage, ..*how };
     let plan = prepare(job, &how).map_err(RenderError::from)?;
+
+    // Print the choices and warnings
     if !quiet {
         plan.tuning.iter().for_each(|tuning| progress::say(&outcome(tuning)));
         progress::say_once(&job.settings().summary());
@@ -219,6 +226,7 @@ pub(super) fn plan(
         ));
     }
     let made = PlanFile::new(&args.scene, job, &plan)?;
+    // A frame without choices of its own keeps the first frame's plan
     let of_sequence = args.frame.as_ref().and_then(|frame| frame.plan.clone());
     Ok(of_sequence.filter(|_| made.settings.is_empty()).unwrap_or(made))
 }

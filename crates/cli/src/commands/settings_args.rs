@@ -1,4 +1,4 @@
-//! The options that are settings: one for each row of [`lumiris::settings::table`].
+//! The options for settings: one per row of [`lumiris::settings::table`].
 
 use clap::builder::{PossibleValuesParser, TypedValueParser, ValueParser};
 use clap::{Arg, ArgMatches, Args, Command, FromArgMatches};
@@ -6,39 +6,39 @@ use lumiris::settings::table::{GROUPS, Group, RESEARCH, Setting, rows};
 use lumiris::settings::value::{Integers, Kind, Value};
 use lumiris::settings::{Given, Settings};
 
-/// The settings given as options, in the order of the table.
+/// The settings given as options, in table order.
 #[derive(Clone, Debug, Default)]
 pub(super) struct SettingsArgs {
     typed: Vec<(&'static Setting, Value)>,
 }
 
 impl SettingsArgs {
-    /// True if the option of this name is given.
+    /// True if the option is given.
     pub(super) fn has(&self, flag: &str) -> bool {
         self.typed.iter().any(|(row, _)| row.flag == flag)
     }
 
-    /// The whole number that an option of this name gives.
+    /// The integer value of an option.
     pub(super) fn count(&self, flag: &str) -> Option<u32> {
         let (_, value) = self.typed.iter().find(|(row, _)| row.flag == flag)?;
         value.integer().and_then(|n| u32::try_from(n).ok())
     }
 
-    /// The settings that are given.
+    /// The given settings, with their text for messages.
     pub(super) fn given(&self) -> Given {
         let mut given = Given::default();
         self.typed.iter().for_each(|(row, value)| given.add(row, *value, format!("--{} {value}", row.flag)));
         given
     }
 
-    /// Parses options outside the command line of the program.
+    /// Parses options that are not on the program's command line.
     pub(super) fn parse<'a>(words: impl Iterator<Item = &'a str>) -> Result<Self, String> {
         let command = Self::augment_args(Command::new("settings").no_binary_name(true).disable_help_flag(true));
         let matches = command.try_get_matches_from(words.map(str::to_owned)).map_err(|e| e.to_string())?;
         Self::from_arg_matches(&matches).map_err(|e| e.to_string())
     }
 
-    /// Applies them.
+    /// Applies the options to `settings`.
     pub(super) fn apply(&self, settings: &mut Settings) {
         for (row, value) in &self.typed {
             (row.set)(settings, *value).expect("the parser of a setting accepts only values of its kind");
@@ -74,17 +74,17 @@ impl FromArgMatches for SettingsArgs {
     }
 }
 
-/// The heading of the first group, which says what holds for all of them.
+/// Heading of the first group, with a remark on the defaults of all groups.
 const FIRST_HEADING: &str =
     "Light transport (the default of this and of all settings below is the file's, or the one that is stated)";
 
-/// The heading of a group.
+/// Heading of a group.
 fn heading(group: &Group) -> &'static str {
     let is_first = GROUPS.first().is_some_and(|first| first.title == group.title);
     if is_first { FIRST_HEADING } else { group.title }
 }
 
-/// The option of a setting. That of research says whom it serves.
+/// The option of a setting. Options for research name the settings to which they apply.
 fn option(row: &'static Setting, is_research: bool) -> Arg {
     let option = Arg::new(row.flag).long(row.flag).aliases(row.aliases).value_name(row.value_name);
     let option = option.help(help(row, is_research)).value_parser(parser(row.kind));
@@ -94,13 +94,13 @@ fn option(row: &'static Setting, is_research: bool) -> Arg {
     }
 }
 
-/// The help of an option, with its range and its default.
+/// Help text of an option, with range and default.
 fn help(row: &Setting, is_research: bool) -> String {
     let range = match row.kind {
         Kind::Integer { range: Integers::ALL, .. } => String::new(),
         Kind::Integer { range, .. } => format!("{range}; "),
         Kind::Real { range, .. } => format!("{range}; "),
-        // These are listed, or part of the sentence
+        // Their values are listed, or part of the help text
         Kind::Choice { .. } | Kind::Percentage { .. } | Kind::Pair { .. } | Kind::Graded { .. } | Kind::Bytes => {
             String::new()
         }

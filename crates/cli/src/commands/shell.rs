@@ -1,4 +1,4 @@
-//! `lumiris completions` and `lumiris man`: what a shell and `man` want to know of the program.
+//! `lumiris completions` and `lumiris man`: shell completions and manual pages.
 
 use super::progress;
 use anyhow::Context;
@@ -18,7 +18,7 @@ pub(super) struct CompletionsArgs {
 /// `lumiris man`
 #[derive(Args, Clone, Debug)]
 pub(super) struct ManArgs {
-    /// Folder that gets a page for the program and one for each subcommand; it is made if it is not there
+    /// Folder for a page of the program and one page per subcommand; it is created if it does not exist
     #[arg(short, long, value_name = "FOLDER")]
     output: PathBuf,
 }

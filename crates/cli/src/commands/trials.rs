@@ -1,10 +1,10 @@
-//! What trials of settings say.
+//! Messages about trials of settings.
 
 use super::progress;
 use lumiris::planning::tune::{Trial, Tuning};
 use std::time::Duration;
 
-/// Says how long trials will take.
+/// Announces the expected time of the trials.
 pub(super) fn expect_trials(processor_time: Duration, is_quiet: bool) {
     if !is_quiet {
         let threads = std::thread::available_parallelism().map_or(1, usize::from) as f64;
@@ -12,7 +12,7 @@ pub(super) fn expect_trials(processor_time: Duration, is_quiet: bool) {
     }
 }
 
-/// What trials found, in one line.
+/// Result of the trials in one line.
 pub(super) fn outcome(tuning: &Tuning) -> String {
     let Tuning { gain, error, is_taken, seconds, .. } = tuning;
     let kept = if *is_taken { "taken" } else { "less than a tenth: the rule's settings are kept" };
@@ -22,7 +22,7 @@ pub(super) fn outcome(tuning: &Tuning) -> String {
     )
 }
 
-/// All trials.
+/// Table of all trials.
 pub(super) fn table(tuning: &Tuning) -> String {
     let width = tuning.trials.iter().map(|trial| trial.name.chars().count()).max().unwrap_or(0);
     let mut text = format!("{:<width$}{:>10}{:>12}{:>8}\n", "settings", "ns", "efficiency", "±");

@@ -1,4 +1,4 @@
-//! Options also as they were typed, for command lines that are written into scripts.
+//! Options in their typed form, for command lines in scripts.
 
 use clap::parser::ValueSource;
 use clap::{Arg, ArgMatches, Args, Command, FromArgMatches};
@@ -6,18 +6,18 @@ use clap::{Arg, ArgMatches, Args, Command, FromArgMatches};
 /// A group of options.
 #[derive(Clone, Debug)]
 pub(super) struct AsTyped<A> {
-    /// As parsed.
+    /// Parsed options.
     pub(super) args: A,
-    /// As typed: names without dashes, and values if they have any.
+    /// Typed options: names without dashes, and values if they have any.
     typed: Typed,
 }
 
 impl<A> AsTyped<A> {
-    /// The options as words of a command line, but for those named.
+    /// The options as words of a command line, without the omitted names.
     pub(super) fn words_without(&self, omitted: &[&str]) -> Vec<String> {
         let kept = self.typed.iter().filter(|(name, _)| !omitted.contains(&name.as_str()));
         kept.map(|(name, value)| match value {
-            // One word, so that values may start with a dash
+            // A single word, because values may start with a dash
             Some(value) => format!("--{name}={value}"),
             None => format!("--{name}"),
         })
@@ -28,7 +28,7 @@ impl<A> AsTyped<A> {
 /// Names and values of options.
 type Typed = Vec<(String, Option<String>)>;
 
-/// An option as it was typed; `None` if it was not.
+/// The typed form of an option; `None` if it was not given.
 fn typed(arg: &Arg, matches: &ArgMatches) -> Option<Result<Typed, clap::Error>> {
     let (id, name) = (arg.get_id().as_str(), arg.get_long()?);
     if matches.value_source(id) != Some(ValueSource::CommandLine) {

@@ -1,27 +1,27 @@
-//! Options of those who watch an image while it is rendered.
+//! Options for watching an image while it is rendered.
 
 use super::UsageError;
 use crate::watch::Places;
 use clap::Args;
 use std::net::{Ipv4Addr, SocketAddr};
 
-/// The port that tev listens to.
+/// Default port of tev.
 const TEV_PORT: u16 = 14158;
-/// The port of the page.
+/// Default port of the page.
 const VIEW_PORT: u16 = 7575;
 
-/// Options of those who watch.
+/// Options for watching.
 #[derive(Args, Clone, Debug)]
 #[command(next_help_heading = "Watching")]
 pub(super) struct WatchArgs {
-    /// Show the image in tev while it converges [without an address: 127.0.0.1:14158]
+    /// Show the image in tev while it converges [default address: 127.0.0.1:14158]
     #[arg(long, value_name = "HOST[:PORT]", num_args = 0..=1, require_equals = true, default_missing_value = "127.0.0.1")]
     tev: Option<String>,
-    /// Show the image on a page for the browser while it converges; an address, or a port of this machine [without one:
+    /// Show the image on a web page while it converges, at an address or a port of this machine [default:
     /// 127.0.0.1:7575]
     #[arg(long, value_name = "ADDRESS", num_args = 0..=1, require_equals = true, default_missing_value = "7575", value_parser = address)]
     view: Option<SocketAddr>,
-    /// Let other machines see the page, without a password or encryption
+    /// Allow other machines to open the page, without password or encryption
     #[arg(long, requires = "view")]
     view_insecure: bool,
 }
@@ -35,7 +35,7 @@ fn address(text: &str) -> Result<SocketAddr, String> {
 }
 
 impl WatchArgs {
-    /// Where the image may be watched. Other machines see it only if the user insists.
+    /// The addresses for watching. An address that other machines can reach needs `--view-insecure`.
     pub(super) fn places(&self) -> Result<Places, UsageError> {
         if let Some(address) = self.view.filter(|address| !address.ip().is_loopback() && !self.view_insecure) {
             return Err(UsageError(format!(

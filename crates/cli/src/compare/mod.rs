@@ -1,5 +1,5 @@
-//! The page of a comparison of images ([`lumiris::imaging::compare`]); its parts are in `viewer/`: `index.html`,
-//! `style.css`, `images.js` for values and images, `viewer.js` for controls.
+//! The HTML page of an image comparison ([`lumiris::imaging::compare`]). Its sources are in `viewer/`: `index.html`,
+//! `style.css`, `images.js` (values and images) and `viewer.js` (controls).
 
 mod page;
 

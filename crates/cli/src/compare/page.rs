@@ -1,9 +1,9 @@
 //! The HTML page: a single self-contained file.
 //!
-//! The browser receives pixel values, so that exposures, differences and displayed values are exact: f32 with the low 8
-//! bits rounded away (16 significant bits, the whole range, NaN and infinity), the bytes of all values sorted by
-//! significance, compressed by zlib, in base64. Maps that are expensive to compute (ꟻLIP, tvi) are embedded in the same
-//! form.
+//! The page contains pixel values, so that exposures, differences and displayed values are exact. Values are f32
+//! rounded to 16 significant bits (the low 8 bits are dropped; range, NaN and infinity are kept). Their bytes are
+//! sorted by significance, compressed by zlib, and encoded in base64. Maps that are expensive to compute (ꟻLIP, tvi)
+//! are embedded in the same form.
 
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
@@ -24,17 +24,17 @@ const STYLE: &str = include_str!("viewer/style.css");
 const IMAGES: &str = include_str!("viewer/images.js");
 const VIEWER: &str = include_str!("viewer/viewer.js");
 
-/// The page in a folder.
+/// Path of the page in a folder.
 fn page_in(folder: &Path) -> PathBuf {
     folder.join("index.html")
 }
 
-/// Fails if the page of a folder cannot be written; the folder is made later if it is not there.
+/// Fails if the page of a folder cannot be written. A missing folder is created later.
 pub(crate) fn check_page(folder: &Path) -> io::Result<()> {
     if folder.exists() { check_writable(&page_in(folder)) } else { Ok(()) }
 }
 
-/// Writes `index.html` into a folder, which is made if it is not there. Says where the page is.
+/// Writes `index.html` into a folder, which is created if it is missing. Returns the path of the page.
 pub(crate) fn write_page(
     folder: &Path,
     set: &ImageSet,
@@ -51,7 +51,7 @@ pub(crate) fn write_page(
     Ok(path)
 }
 
-/// Writes the page as text.
+/// Writes the page.
 fn write(out: impl Write, set: &ImageSet, settings: &Settings, compared: &[Compared]) -> io::Result<()> {
     let mut data = String::new();
     let mut images = Vec::new();
@@ -60,7 +60,7 @@ fn write(out: impl Write, set: &ImageSet, settings: &Settings, compared: &[Compa
     }
     images.push(image(set.images.len(), &set.reference, None, &mut data)?);
     let manifest = manifest(set, settings, compared, images);
-    // `<` could end the element that holds it.
+    // `<` could close the script element
     let manifest = manifest.to_string().replace('<', "\\u003c");
 
     let [style, images, viewer] = [STYLE, IMAGES, VIEWER].map(|text| Safe::from_safe_string(text.to_owned()));
@@ -72,7 +72,7 @@ fn write(out: impl Write, set: &ImageSet, settings: &Settings, compared: &[Compa
     Ok(())
 }
 
-/// Everything but the pixels.
+/// Everything except pixel values.
 fn manifest(set: &ImageSet, settings: &Settings, compared: &[Compared], images: Vec<Value>) -> Value {
     let scores: Vec<&Scores> = compared.iter().map(|c| &c.scores).collect();
     let columns = shown_columns(&settings.metrics, &scores);
@@ -85,7 +85,7 @@ fn manifest(set: &ImageSet, settings: &Settings, compared: &[Compared], images: 
         .map(|s| {
             let cells = columns.iter().map(|c| {
                 let value = (c.value)(s);
-                // JSON has no infinity; for sorting the largest number will do.
+                // JSON has no infinity; the largest number sorts the same
                 let sortable = value.map(|v| if v.is_nan() { f64::MAX } else { v.clamp(f64::MIN, f64::MAX) });
                 json!({ "value": sortable, "text": value.map_or("–".to_owned(), c.text) })
             });
@@ -108,6 +108,7 @@ fn colors(stops: Stops) -> Value {
 
 /// Appends the pixels and maps of an image and describes them.
 fn image(index: usize, shown: &Shown, compared: Option<&Compared>, data: &mut String) -> io::Result<Value> {
+    // Colours and variances
     let mut layers = Vec::new();
     let mut add = |key: &str, values: &[f32]| -> io::Result<()> {
         layers.push(key.to_owned());
@@ -118,6 +119,8 @@ fn image(index: usize, shown: &Shown, compared: Option<&Compared>, data: &mut St
         let mean = |v: &Pixel| (v[0] + v[1] + v[2]) / 3.0;
         add("variance", &variance.iter().map(mean).collect::<Vec<_>>())?;
     }
+
+    // Maps
     if let Some(maps) = compared.map(|c| &c.maps) {
         for (key, map) in [("flip", &maps.flip), ("hdrflip", &maps.hdr_flip), ("tvi", &maps.tvi), ("z", &maps.z)] {
             if let Some(map) = map {
@@ -129,7 +132,7 @@ fn image(index: usize, shown: &Shown, compared: Option<&Compared>, data: &mut St
     Ok(json!({ "name": shown.name, "path": path, "layer": shown.layer, "data": layers }))
 }
 
-/// Appends an element that holds values.
+/// Appends a script element with encoded values.
 fn append(data: &mut String, id: &str, values: &[f32]) -> io::Result<()> {
     data.push_str(&format!("<script type=\"application/octet-stream\" id=\"{id}\">"));
     let mut encoder = ZlibEncoder::new(Vec::new(), Compression::new(6));
@@ -139,14 +142,14 @@ fn append(data: &mut String, id: &str, values: &[f32]) -> io::Result<()> {
     Ok(())
 }
 
-/// The upper three bytes of all values: all first bytes, all second ones, all third ones.
+/// The upper three bytes of all values as three planes, most significant first.
 fn planes(values: &[f32]) -> Vec<u8> {
     let n = values.len();
     let mut bytes = vec![0; 3 * n];
     for (i, &v) in values.iter().enumerate() {
         let bits = v.to_bits();
         let rounded = bits.wrapping_add(0x80);
-        // The largest numbers would become infinite; NaN and infinity have nothing to round.
+        // Rounding would make the largest numbers infinite; NaN and infinity are not rounded
         let kept = if v.is_finite() && f32::from_bits(rounded).is_finite() { rounded } else { bits };
         let kept = if v.is_nan() { f32::NAN.to_bits() } else { kept };
         for (plane, byte) in kept.to_be_bytes()[..3].iter().enumerate() {
@@ -175,6 +178,7 @@ mod tests {
 
     #[test]
     fn the_page_is_one_file_without_anything_from_elsewhere() {
+        // Images, one with a name that closes a script element
         let shown = |name: &str, v: f32| Shown {
             path: name.into(),
             name: name.into(),
@@ -187,14 +191,20 @@ mod tests {
         let region = Region { x: 0, y: 0, width: 2, height: 2 };
         let evil = "</script><script>alert(1)</script>.exr";
         let set = ImageSet { images: vec![shown(evil, 0.5)], reference: shown("r.exr", 0.25), region, display: [2, 2] };
+
+        // The name is escaped
         let settings = Settings::default();
         let folder = tempfile::tempdir().unwrap();
         let path = write_page(&folder.path().join("new"), &set, &settings, &compare(&set, &settings)).unwrap();
         let html = std::fs::read_to_string(path).unwrap();
         assert!(!html.contains("alert(1)</script>") && html.contains("\\u003c/script>"));
+
+        // Nothing is loaded from elsewhere
         assert!(
             !html.contains("http:") && !html.contains("https:") && !html.contains("src=") && !html.contains("url(")
         );
+
+        // Each map is there once
         for id in ["data-0-color", "data-0-variance", "data-0-flip", "data-0-hdrflip", "data-0-z", "data-1-color"] {
             assert_eq!(html.matches(&format!("id=\"{id}\"")).count(), 1, "{id}");
         }

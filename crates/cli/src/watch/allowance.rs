@@ -1,22 +1,22 @@
-//! Processor time of threads that serve those who watch: whatever is asked of them, rendering has the rest of the machine.
+//! CPU time of threads that serve viewers: bounded, so that rendering keeps the rest of the machine.
 
 use lumiris::planning::processor_time;
 use std::time::{Duration, Instant};
 
-/// Share of the machine's processor time.
+/// Share of the machine's CPU time.
 const SHARE: f64 = 0.03;
-/// Processor time that may be saved up (s).
+/// CPU time that can be saved up (s).
 const SAVED: f64 = 0.25;
 
-/// The processor time that a thread may take. It belongs to the thread that has made it.
+/// CPU-time budget of the thread that created it.
 #[derive(Debug)]
 pub(super) struct Allowance {
-    /// Processor time per second.
+    /// CPU time per second.
     share: f64,
-    /// Processor time that is left; below 0 if the thread has taken too much (s).
+    /// Remaining CPU time (s); negative if overdrawn.
     left: f64,
     at: Instant,
-    /// Processor time of the thread by then.
+    /// CPU time of the thread at `at`.
     taken: Duration,
 }
 
@@ -27,7 +27,7 @@ impl Allowance {
         Allowance { share: SHARE * processors as f64, left: SAVED, at: Instant::now(), taken }
     }
 
-    /// How long the thread has to rest now.
+    /// Time for which the thread must sleep now.
     pub(super) fn rest(&mut self) -> Duration {
         let (now, taken) = (Instant::now(), processor_time::of_thread());
         let earned = (now - self.at).as_secs_f64() * self.share;
@@ -51,7 +51,7 @@ mod tests {
             std::thread::sleep(allowance.rest());
         }
         let (elapsed, taken) = (start.elapsed().as_secs_f64(), (processor_time::of_thread() - before).as_secs_f64());
-        // The last 2 ms, and what the clock does not resolve
+        // The last 2 ms, and the resolution of the clock
         assert!(taken <= 0.05 + 0.5 * elapsed + 0.004, "{taken} s in {elapsed} s");
     }
 }

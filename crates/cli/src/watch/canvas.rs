@@ -1,7 +1,7 @@
-//! The pixels of an image as they are by now.
+//! The current pixels of an image.
 //!
-//! Threads that render leave the packed sums of their tiles, which they share and do not copy. Pixels are made of them when
-//! somebody asks, by the thread that asks: of what has changed since, and of a few tiles at once.
+//! Render threads store the packed sums of their tiles, which are shared, not copied. A thread that requests pixels
+//! computes them itself: only of changed tiles, and of a few tiles at once.
 
 use lumiris::film::{Film, FilmTile, PixelBounds};
 use lumiris::imaging::{Layer, layers};
@@ -11,22 +11,23 @@ use std::collections::{BTreeMap, HashMap};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 
-/// Pixels that are handed out at once, at most: less than a megabyte, whatever the size of tiles. A row of a tile is the least.
+/// Maximum number of pixels returned at once: less than a megabyte, for tiles of any size. At least one row of a tile
+/// is returned.
 const AT_ONCE: usize = 1 << 14;
 
-/// The pixels of a tile, or of some of its rows.
+/// Pixels of a tile or of some of its rows.
 #[derive(Clone, Debug)]
 pub(crate) struct Tile {
-    /// Left, top, width and height inside the crop window (pixels).
+    /// Left, top, width and height in the crop window (pixels).
     pub place: [u32; 4],
     /// All channels, interleaved.
     pub data: Vec<f32>,
 }
 
-/// What there is of some rows of a tile.
+/// Content of some rows of a tile.
 #[derive(Clone, Debug)]
 enum Content {
-    /// The tile.
+    /// Sums of the tile.
     Sums(FilmTile),
     /// All channels of the rows, interleaved.
     Pixels(Arc<[f32]>),
@@ -36,14 +37,14 @@ enum Content {
 struct State {
     /// Number of changes so far.
     version: u64,
-    /// Rows of tiles, by the change that made them like this.
+    /// Bands (rows of tiles), keyed by the version of their last change.
     bands: BTreeMap<u64, (PixelBounds, Content)>,
-    /// The keys of these, by left and top.
+    /// Keys of `bands`, by left and top of the band.
     versions: HashMap<[u32; 2], u64>,
     progress: Option<Progress>,
 }
 
-/// See the module.
+/// The current pixels of an image; see the module.
 #[derive(Debug)]
 pub(crate) struct Canvas {
     /// Name of the image.
@@ -58,7 +59,7 @@ pub(crate) struct Canvas {
     aovs: Vec<Aov>,
     state: Mutex<State>,
     is_finished: AtomicBool,
-    /// How the image is rendered, in plain words, once that is known.
+    /// Description of the render settings, once they are chosen.
     pub summary: OnceLock<String>,
 }
 
@@ -85,7 +86,7 @@ impl Canvas {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Takes the film of a tile, whose sums it shares.
+    /// Stores the tiles of a film. Their sums are shared.
     pub(crate) fn set_tile(&self, film: &Film) {
         film.tiles().iter().for_each(|tile| self.set(tile));
     }
@@ -104,7 +105,7 @@ impl Canvas {
         self.state().progress
     }
 
-    /// Takes the whole film, which the end of a rendering may have corrected: no tile will change any more.
+    /// Stores the final film, which may have been corrected at the end. No tile changes afterwards.
     pub(crate) fn finish(&self, film: &Film) {
         if film.is_corrected() {
             self.set_pixels(film);
@@ -118,7 +119,7 @@ impl Canvas {
         self.is_finished.store(true, Ordering::Release);
     }
 
-    /// Takes the pixels of a film, which are not those of its sums.
+    /// Stores the pixels of a corrected film, which differ from its sums.
     fn set_pixels(&self, film: &Film) {
         let layers = Layers::new(film, true, &self.aovs, None);
         let row = film.bounds.width() as usize * self.channels.len();
@@ -138,19 +139,19 @@ impl Canvas {
         self.is_finished.load(Ordering::Acquire)
     }
 
-    /// Number of changes so far, which is the state that the canvas is in.
+    /// Number of changes so far. It identifies the state of the canvas.
     pub(super) fn version(&self) -> u64 {
         self.state().version
     }
 
-    /// Tiles that have changed since a state, those first that have changed first, and the state that they lead to. There may be
-    /// more, unless there are none.
+    /// Tiles that have changed since the state `version`, in the order of their changes, and the state that they lead
+    /// to. There may be more changes unless the list is empty.
     pub(super) fn changed_since(&self, version: u64) -> (u64, Vec<Tile>) {
         let (reached, changed) = self.state().changed_since(version);
         (reached, changed.into_iter().map(|(bounds, content)| self.tile(bounds, content)).collect())
     }
 
-    /// The pixels of some rows of a tile.
+    /// The pixels of a band.
     fn tile(&self, b: PixelBounds, content: Content) -> Tile {
         let data = match content {
             Content::Pixels(pixels) => pixels.to_vec(),
@@ -173,12 +174,12 @@ impl State {
         self.bands.insert(self.version, (bounds, content));
     }
 
-    /// What there is from a left upper corner on.
+    /// The content of the band with this top left corner.
     fn content(&self, corner: [u32; 2]) -> Option<&Content> {
         self.bands.get(self.versions.get(&corner)?).map(|(_, content)| content)
     }
 
-    /// See [`Canvas::changed_since`].
+    /// Bands that have changed; see [`Canvas::changed_since`].
     fn changed_since(&self, version: u64) -> (u64, Vec<(PixelBounds, Content)>) {
         let (mut reached, mut changed, mut pixels) = (self.version, Vec::new(), 0);
         for (&version, (bounds, content)) in self.bands.range(version.saturating_add(1)..) {
@@ -193,7 +194,7 @@ impl State {
     }
 }
 
-/// The rows of a tile, so many together as are handed out at once.
+/// Splits a tile into bands of at most [`AT_ONCE`] pixels, or of one row.
 fn bands(tile: &PixelBounds) -> impl Iterator<Item = PixelBounds> {
     let (tile, height) = (*tile, (AT_ONCE as u32 / tile.width().max(1)).max(1));
     let tops = (tile.y0..tile.y1).step_by(height as usize);
@@ -214,7 +215,7 @@ mod tests {
         assert_eq!(Canvas::new("a", bounds, false).layers.len(), 2);
 
         let tiles = bounds.tiles(16);
-        // Numbers of samples of some pixels; 0 of all others
+        // Sample counts of some pixels; 0 elsewhere
         let film = |tile: PixelBounds, counts: &[(usize, u32)]| {
             let mut pixels = vec![PixelAccumulator::default(); tile.area()];
             counts.iter().for_each(|&(i, count)| pixels[i].radiance.count = count);
@@ -233,7 +234,7 @@ mod tests {
         let (now, changed) = canvas.changed_since(state);
         assert_eq!(places(changed), [[16, 0, 4, 10]]);
 
-        // The end changes the first tile only
+        // The end of the rendering changes only the first tile
         let whole = [film(tiles[0], &[(0, 1)]), second].map(|film| film.tiles()[0].clone());
         let mut whole = Film::new([100, 100], bounds, whole.to_vec(), Vec::new());
         canvas.finish(&whole);
@@ -241,7 +242,7 @@ mod tests {
         let (state, changed) = canvas.changed_since(now);
         assert_eq!(places(changed), [[0, 0, 16, 10]]);
 
-        // Pixels that are corrected are not those of the sums
+        // Corrected pixels differ from the sums
         whole.correct(vec![[-2.0, 0.0, 0.0]; bounds.area()], Vec::new());
         canvas.finish(&whole);
         let (_, changed) = canvas.changed_since(state);
@@ -251,16 +252,21 @@ mod tests {
 
     #[test]
     fn however_large_tiles_are_few_pixels_are_handed_out_at_once() {
+        // Sample counts identify the pixels
         let (width, height) = (1000_u32, 70_u32);
         let bounds = PixelBounds { x0: 3, x1: 3 + width, y0: 5, y1: 5 + height };
         let canvas = Canvas::new("a", bounds, false);
         let mut pixels = vec![PixelAccumulator::default(); bounds.area()];
         pixels.iter_mut().zip(0..).for_each(|(pixel, i)| pixel.radiance.count = i);
         let mut film = Film::of_pixels([2000, 100], bounds, &pixels);
+
+        // One canvas of sums, and one of corrected pixels
         canvas.set_tile(&film);
         film.correct(vec![[0.0; 3]; bounds.area()], Vec::new());
         let corrected = Canvas::new("a", bounds, false);
         corrected.finish(&film);
+
+        // Fetch everything in steps
         for canvas in [canvas, corrected] {
             let (mut counts, mut state) = (vec![f32::NAN; bounds.area()], 0);
             while state < canvas.version() {

@@ -1,8 +1,8 @@
-//! Watching an image while it converges: in tev ([`tev`]), and on a page in the browser ([`server`]).
+//! Watching an image while it converges: in tev ([`tev`]), and on a web page ([`server`]).
 //!
-//! Threads that render leave their tiles in a [`Canvas`](canvas::Canvas), which shares their sums, and wait for nobody. Those
-//! that send them on, one for each way to watch, make pixels of them, only of what has changed, within an
-//! [`Allowance`](allowance::Allowance) of processor time.
+//! Render threads store their tiles in a [`Canvas`](canvas::Canvas), which shares their sums, and never wait. One
+//! thread per viewer computes pixels of the changed tiles and sends them, within an [`Allowance`](allowance::Allowance)
+//! of CPU time.
 
 mod allowance;
 mod canvas;
@@ -23,24 +23,24 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 use tev::Tev;
 
-/// How long the program may take to show the last state when it ends.
+/// Time for showing the last state when the program ends.
 const FAREWELL: Duration = Duration::from_secs(5);
 
-/// Where images may be watched.
+/// Addresses for watching.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Places {
-    /// Address of a tev.
+    /// Address of tev.
     pub tev: Option<String>,
-    /// Address that the page is served on.
+    /// Address at which the page is served.
     pub view: Option<SocketAddr>,
-    /// Whether others than this machine may see the page.
+    /// True if other machines may open the page.
     pub insecure: bool,
 }
 
-/// What all threads know.
+/// State shared by all threads.
 #[derive(Debug, Default)]
 struct Shared {
-    /// The image that is being rendered, if one has begun.
+    /// The current image, once it has begun.
     canvas: Mutex<Option<Arc<Canvas>>>,
     is_closing: AtomicBool,
 }
@@ -55,19 +55,19 @@ impl Shared {
     }
 }
 
-/// Those who watch; they see the last state of the last image before this is dropped.
+/// Connections to viewers. Dropping it waits until they have the last state of the last image.
 #[derive(Debug, Default)]
 pub(crate) struct Watch {
     shared: Arc<Shared>,
     threads: Vec<JoinHandle<()>>,
-    /// The connection with tev.
+    /// The connection to tev.
     tev: Option<TcpStream>,
     /// Address of the page.
     pub page: Option<SocketAddr>,
 }
 
 impl Watch {
-    /// Connects with tev and opens the page, if there are to be. `warn` is told when tev goes away later.
+    /// Connects to tev and opens the page, if requested. `warn` is called if tev disconnects later.
     pub(crate) fn start(places: &Places, warn: fn(&str)) -> anyhow::Result<Self> {
         let mut watch = Watch::default();
         if let Some(address) = &places.tev {
@@ -86,7 +86,7 @@ impl Watch {
         Ok(watch)
     }
 
-    /// Begins an image; `None` if nobody watches.
+    /// Begins an image; `None` without viewers.
     pub(crate) fn begin(&self, name: &str, film: &FilmSettings, has_features: bool) -> Option<Arc<Canvas>> {
         if self.threads.is_empty() {
             return None;
@@ -105,17 +105,17 @@ impl Drop for Watch {
             std::thread::sleep(Duration::from_millis(5));
         }
         if let Some(tev) = &self.tev {
-            // A tev that reads a byte now and then would never end the thread that writes
+            // Ends a write that a very slow tev would never finish
             let _ = tev.shutdown(Shutdown::Both);
         }
         for thread in self.threads.drain(..) {
-            // A thread that failed has shown nothing more: the image is not its concern
+            // A panic in a viewer thread must not affect the image
             let _ = thread.join();
         }
     }
 }
 
-/// Progress of an image that somebody may watch.
+/// Passes the progress to viewers, if there are any.
 pub(crate) fn observe(canvas: Option<&Arc<Canvas>>, progress: &Progress) {
     if let Some(canvas) = canvas {
         canvas.set_progress(progress);

@@ -1,4 +1,4 @@
-//! A first image before pilots take their time.
+//! A preview before the pilots run.
 
 use super::Canvas;
 use lumiris::film::Film;
@@ -9,17 +9,18 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-/// Time of the preview, at most; and as the inverse of a part of that of the image.
+/// Maximum time of the preview.
 const LONGEST: Duration = Duration::from_millis(500);
+/// Inverse of the preview's maximum share of the image's time limit.
 const PART: u32 = 20;
 
-/// Shows tiles with a sample per pixel, as many as there is time for. They are not part of the image.
+/// Shows tiles with one sample per pixel, until the time is over. They are not part of the image.
 pub(crate) fn preview(
     canvas: &Arc<Canvas>,
     (job, settings): (&RenderJob, &RenderSettings),
     stop: &AtomicBool,
 ) -> Result<(), RenderError> {
-    // Others have preparations that take longer
+    // Other integrators need longer preparations
     if !matches!(job.settings().integrator.kind, IntegratorKind::Direct | IntegratorKind::Path) {
         return Ok(());
     }

@@ -1,16 +1,16 @@
-//! The page: a small HTTP server that knows three addresses and no file.
+//! The page: a small HTTP server with three addresses and no access to files.
 //!
 //! * `/`: the page;
 //! * `/state`: progress and layers, as JSON;
-//! * `/tiles?image=I&layer=L&since=V`: tiles of a layer that have changed since the state V: the state that they lead to
-//!   (u64), then for each tile left, top, width, height (u32) and its values (f32), little-endian. The page goes on from there
-//!   until it has reached the `version` of `/state`.
+//! * `/tiles?image=I&layer=L&since=V`: tiles of a layer that have changed since the state V. The answer is the new
+//!   state (u64), then for each tile left, top, width, height (u32) and its values (f32), all little-endian. The page
+//!   repeats this until it reaches the `version` of `/state`.
 //!
-//! A page of another site could ask for these under a name of its own that leads to this machine; so requests must
-//! name it by its address or as `localhost`.
+//! DNS rebinding: a page of another site could reach this server by a host name that resolves to this machine. Requests
+//! must therefore name the host by its address or as `localhost`.
 //!
-//! Whoever reaches the address may send anything. One thread answers, with an [`Allowance`] of processor time, and connections
-//! are bounded in number, length and time: 64 of them have 16 kB for the head of a request, and 260 kB for an answer each.
+//! Clients are not trusted. One thread answers, with an [`Allowance`] of CPU time. Connections are bounded in number,
+//! length and time: 64 connections, each with 16 kB for the head of a request and 260 kB for an answer.
 
 use super::Shared;
 use super::allowance::Allowance;
@@ -39,27 +39,27 @@ const PAGE: &str = include_str!("viewer/index.html");
 const STYLE: &str = include_str!("viewer/style.css");
 const SCRIPT: &str = include_str!("viewer/view.js");
 
-/// Time between two looks at whether the program ends, and at how much processor time was taken.
+/// Interval for checking whether the program ends, and the CPU time used.
 const INTERVAL: Duration = Duration::from_millis(10);
-/// How long a page that is open may take to fetch the last state.
+/// Time for an open page to fetch the last state.
 const FAREWELL: Duration = Duration::from_secs(2);
-/// Connections; one more ends the oldest of them.
+/// Maximum number of connections. One more ends the oldest.
 const CONNECTIONS: usize = 64;
-/// Length of the head of a request (bytes).
+/// Maximum length of a request's head (bytes).
 const HEAD: usize = 16 << 10;
-/// How long a client may take to send it.
+/// Maximum time for receiving the head.
 const HEAD_TIME: Duration = Duration::from_secs(10);
-/// How long a connection may take altogether.
+/// Maximum total time of a connection.
 const CONNECTION_TIME: Duration = Duration::from_secs(30);
 
-/// The server, before it answers.
+/// The server before it starts answering.
 pub(super) struct Server {
     runtime: Runtime,
     listener: TcpListener,
     page: Page,
 }
 
-/// What requests ask for.
+/// State for answering requests.
 struct Page {
     shared: Arc<Shared>,
     address: SocketAddr,
@@ -71,11 +71,11 @@ struct Page {
 
 #[derive(Default)]
 struct State {
-    /// The image that is shown, with a number of its own.
+    /// The current image and its number.
     shown: Option<(u64, Arc<Canvas>)>,
-    /// When a page asked last.
+    /// Time of the last request for state or tiles.
     asked: Option<Instant>,
-    /// True once the last state was handed out.
+    /// True once the last state was sent.
     is_told: bool,
 }
 
@@ -85,7 +85,7 @@ impl Server {
     pub(super) fn open(address: SocketAddr, insecure: bool, shared: Arc<Shared>) -> io::Result<Self> {
         let runtime = tokio::runtime::Builder::new_current_thread().enable_io().enable_time().build()?;
         let listener = runtime.block_on(TcpListener::bind(address))?;
-        // With port 0 the system chooses
+        // Port 0 lets the system choose
         let address = listener.local_addr()?;
         let html = PAGE.replace("/*style*/", STYLE).replace("/*script*/", SCRIPT).into();
         Ok(Server { runtime, listener, page: Page { shared, address, insecure, html, state: Mutex::default() } })
@@ -95,7 +95,7 @@ impl Server {
         self.page.address
     }
 
-    /// Answers until the program ends, and a page that is open has seen the end.
+    /// Answers requests until the program ends and an open page has the last state.
     pub(super) fn run(self) {
         let (page, listener) = (Arc::new(self.page), self.listener);
         self.runtime.block_on(async move {
@@ -103,7 +103,7 @@ impl Server {
             tokio::spawn(accept(listener, Arc::clone(&page)));
             while !page.shared.is_closing() {
                 sleep(INTERVAL).await;
-                // This thread itself, so that no connection goes on meanwhile
+                // Blocks the whole thread, so that no connection continues meanwhile
                 std::thread::sleep(allowance.rest());
             }
             let closing = Instant::now();
@@ -114,12 +114,12 @@ impl Server {
     }
 }
 
-/// Takes connections, each into a task of its own.
+/// Accepts connections, each as a separate task.
 async fn accept(listener: TcpListener, page: Arc<Page>) {
     let mut open: VecDeque<AbortHandle> = VecDeque::new();
     loop {
         let Ok((stream, _)) = listener.accept().await else {
-            // Too many files are open, perhaps
+            // Possibly too many open files
             sleep(Duration::from_millis(100)).await;
             continue;
         };
@@ -133,7 +133,7 @@ async fn accept(listener: TcpListener, page: Arc<Page>) {
     }
 }
 
-/// Answers the one request of a connection.
+/// Answers the single request of a connection.
 async fn connection(stream: TcpStream, page: Arc<Page>) {
     let is_last = AtomicBool::new(false);
     let service = service_fn(|request: Request<_>| {
@@ -153,14 +153,15 @@ impl Page {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// True if a page is open that has not seen the end.
+    /// True if an open page does not have the last state yet.
     fn is_awaited(&self) -> bool {
         let state = self.state();
         !state.is_told && state.asked.is_some_and(|asked| asked.elapsed() < FAREWELL)
     }
 
-    /// The answer to a request; `is_last` becomes true if nothing will come after it.
+    /// The answer to a request. Sets `is_last` if no further tiles will follow.
     fn answer(&self, request: &Request<impl Body>, is_last: &AtomicBool) -> Answer {
+        // Refuse
         if !self.is_for_us(request) {
             return plain(StatusCode::FORBIDDEN, "This page is for this machine only.");
         }
@@ -170,6 +171,8 @@ impl Page {
         if !request.body().is_end_stream() {
             return plain(StatusCode::PAYLOAD_TOO_LARGE, "GET without a body only");
         }
+
+        // Answer
         let mut state = self.state();
         state.show(self.shared.canvas());
         match request.uri().path() {
@@ -186,7 +189,7 @@ impl Page {
         }
     }
 
-    /// True if a request names this machine as who is to answer.
+    /// True if the Host header names this machine.
     fn is_for_us(&self, request: &Request<impl Body>) -> bool {
         let (address, port) = (self.address, self.address.port());
         let names = [address.to_string(), format!("localhost:{port}")];
@@ -196,7 +199,7 @@ impl Page {
 }
 
 impl State {
-    /// Shows an image, if it is another one than before.
+    /// Switches to `canvas` if it is another image.
     fn show(&mut self, canvas: Option<Arc<Canvas>>) {
         let Some(canvas) = canvas else { return };
         if self.shown.as_ref().is_none_or(|(_, shown)| !Arc::ptr_eq(shown, &canvas)) {
@@ -220,7 +223,7 @@ impl State {
     }
 }
 
-/// See the module.
+/// The answer to `/tiles`; see the module.
 fn tiles(state: MutexGuard<'_, State>, query: &str, is_last: &AtomicBool) -> Answer {
     let value = |name: &str| {
         let mut pairs = query.split('&').filter_map(|pair| pair.split_once('='));
@@ -234,7 +237,7 @@ fn tiles(state: MutexGuard<'_, State>, query: &str, is_last: &AtomicBool) -> Ans
     let (Some(layer), true) = (layer, image == *number) else {
         return plain(StatusCode::NOT_FOUND, "There is no such layer.");
     };
-    // In this order: what is finished before its tiles are read has no others
+    // The order matters: a canvas that is finished before its tiles are read gets no more of them
     let is_finished = canvas.is_finished();
     let (version, tiles) = canvas.changed_since(since);
     is_last.store(is_finished && tiles.is_empty(), Ordering::Relaxed);

@@ -1,4 +1,4 @@
-//! Sending tiles to tev.
+//! Sends tiles to tev.
 
 use super::Shared;
 use super::allowance::Allowance;
@@ -9,16 +9,16 @@ use std::sync::Arc;
 use std::time::Duration;
 use tev_client::{PacketCreateImage, PacketUpdateImage, TevClient};
 
-/// Time between two looks at the canvas.
+/// Interval for checking the canvas.
 const INTERVAL: Duration = Duration::from_millis(200);
-/// How long tev may take to answer, or to accept what is sent.
+/// Timeout of connecting and of writing.
 const PATIENCE: Duration = Duration::from_secs(5);
 
-/// A connection with tev.
+/// A connection to tev.
 pub(super) struct Tev(TevClient);
 
 impl Tev {
-    /// Connects with the first address that answers. The stream that is returned as well can end the connection.
+    /// Connects to the first address that answers. Also returns the stream, which can end the connection.
     pub(super) fn connect(address: &str) -> io::Result<(Self, TcpStream)> {
         let mut error = io::Error::other("no such host");
         for address in address.to_socket_addrs()? {
@@ -34,7 +34,7 @@ impl Tev {
         Err(error)
     }
 
-    /// Sends what changes until the end. Without tev the image is rendered all the same.
+    /// Sends changes until the program ends. Without tev, rendering continues.
     pub(super) fn run(mut self, shared: &Shared, warn: fn(&str)) {
         let mut shown: Option<(Arc<Canvas>, u64)> = None;
         let mut allowance = Allowance::new();
@@ -50,13 +50,14 @@ impl Tev {
         }
     }
 
-    /// Sends what is new of the image that was shown last, and of the present one.
+    /// Sends the changes of the previous image and of the current one.
     fn show(
         &mut self,
         shared: &Shared,
         shown: &mut Option<(Arc<Canvas>, u64)>,
         allowance: &mut Allowance,
     ) -> io::Result<()> {
+        // A new image: finish the previous one, and create it in tev
         if let Some(present) = shared.canvas()
             && shown.as_ref().is_none_or(|(canvas, _)| !Arc::ptr_eq(canvas, &present))
         {
@@ -72,6 +73,8 @@ impl Tev {
             })?;
             *shown = Some((present, 0));
         }
+
+        // Changes of the current image
         let Some((canvas, version)) = shown else { return Ok(()) };
         let rest = || {
             if !shared.is_closing() {
@@ -82,11 +85,13 @@ impl Tev {
         Ok(())
     }
 
-    /// Sends what has changed since a state, and returns that which tev has then. Rests on the way.
+    /// Sends the changes since a state, and returns the new state of tev. Calls `rest` in between.
     fn update(&mut self, canvas: &Canvas, since: u64, mut rest: impl FnMut()) -> io::Result<u64> {
+        // All channels are interleaved in one buffer
         let offsets: Vec<u64> = (0..canvas.channels.len() as u64).collect();
         let strides = vec![canvas.channels.len() as u64; canvas.channels.len()];
         let (mut sent, present) = (since, canvas.version());
+        // Tiles
         while sent < present {
             let (version, tiles) = canvas.changed_since(sent);
             for Tile { place: [x, y, width, height], data } in tiles {

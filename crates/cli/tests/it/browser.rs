@@ -1,7 +1,7 @@
 //! Headless Chromium, driven over the DevTools protocol: real mouse and key events, scripts, pixels.
 //!
-//! The protocol uses two pipes; messages end with a zero byte. The browser is the `chromium` in the path, or the value
-//! of the variable CHROMIUM.
+//! The protocol uses two pipes; messages end with a zero byte. The browser is `chromium` in the path, unless the
+//! variable CHROMIUM names another.
 
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
@@ -13,7 +13,7 @@ use std::process::{Child, ChildStdin, Command, Stdio};
 use std::sync::mpsc::{Receiver, channel};
 use std::time::{Duration, Instant};
 
-/// How long an answer may take: machines that test are slow and busy.
+/// Timeout of an answer. Test machines can be slow and busy.
 const PATIENCE: Duration = Duration::from_secs(180);
 
 /// A browser with one open page.
@@ -23,17 +23,17 @@ pub(crate) struct Browser {
     messages: Receiver<Value>,
     next: Cell<u64>,
     session: String,
-    /// What the console said of errors and warnings, and exceptions that nothing caught.
+    /// Errors and warnings of the console, and uncaught exceptions.
     pub complaints: RefCell<Vec<String>>,
     _profile: tempfile::TempDir,
 }
 
 impl Browser {
-    /// Starts a browser whose window has this size (CSS pixels).
+    /// Starts a browser with a window of this size (CSS pixels).
     pub(crate) fn start(size: [u32; 2]) -> Browser {
         let program = std::env::var("CHROMIUM").unwrap_or_else(|_| "chromium".to_owned());
         let profile = tempfile::tempdir().unwrap();
-        // The protocol is spoken over the descriptors 3 (commands) and 4 (answers): the shell puts them there.
+        // The protocol uses the descriptors 3 (commands) and 4 (answers), which the shell opens
         let script = "exec \"$@\" 3<&0 4>&1 0</dev/null 1>/dev/null 2>/dev/null";
         let mut process = Command::new("sh")
             .args(["-c", script, "sh", &program])
@@ -80,6 +80,7 @@ impl Browser {
 
     /// Sends a command and waits for its answer.
     pub(crate) fn call(&self, method: &str, params: Value) -> Value {
+        // Send
         let id = self.next.replace(self.next.get() + 1);
         let mut message = json!({ "id": id, "method": method, "params": params });
         if !self.session.is_empty() {
@@ -89,6 +90,8 @@ impl Browser {
         bytes.push(0);
         let hint = "is Chromium installed? CHROMIUM may name it";
         (&self.input).write_all(&bytes).expect(hint);
+
+        // Wait; other messages are events
         let end = Instant::now() + PATIENCE;
         loop {
             let left = end.saturating_duration_since(Instant::now());
@@ -101,7 +104,7 @@ impl Browser {
         }
     }
 
-    /// Keeps what a page complains of.
+    /// Stores errors and warnings of the page.
     fn listen(&self, message: &Value) {
         let params = &message["params"];
         let complaint = match message["method"].as_str() {
@@ -117,12 +120,12 @@ impl Browser {
         self.complaints.borrow_mut().extend(complaint);
     }
 
-    /// Opens a file and waits until `ready` (a script) is true.
+    /// Opens a file and waits until the script `ready` is true.
     pub(crate) fn open(&self, path: &Path, ready: &str) {
         self.open_url(&format!("file://{}", path.display()), ready);
     }
 
-    /// Opens a page and waits until `ready` (a script) is true.
+    /// Opens a page and waits until the script `ready` is true.
     pub(crate) fn open_url(&self, url: &str, ready: &str) {
         let answer = self.call("Page.navigate", json!({ "url": url }));
         assert!(answer["errorText"].is_null(), "{answer}");
@@ -146,7 +149,7 @@ impl Browser {
         answer["result"]["value"].clone()
     }
 
-    /// Presses, moves and releases the left button along points of the window.
+    /// Drags with the left button along points of the window.
     pub(crate) fn drag(&self, points: &[[f64; 2]]) {
         let event = |kind: &str, [x, y]: [f64; 2], buttons: u32| {
             let params = json!({ "type": kind, "x": x, "y": y, "button": "left", "buttons": buttons, "clickCount": 1 });
@@ -162,7 +165,7 @@ impl Browser {
         self.call("Input.dispatchMouseEvent", json!({ "type": "mouseMoved", "x": x, "y": y }));
     }
 
-    /// Turns the wheel; negative is away from the hand.
+    /// Rotates the wheel; negative is away from the user.
     pub(crate) fn wheel(&self, [x, y]: [f64; 2], delta: f64) {
         let params = json!({ "type": "mouseWheel", "x": x, "y": y, "deltaX": 0, "deltaY": delta });
         self.call("Input.dispatchMouseEvent", params);
@@ -176,7 +179,7 @@ impl Browser {
         }
     }
 
-    /// Waits until the page has drawn twice.
+    /// Waits until the page has been drawn twice.
     pub(crate) fn settle(&self) {
         self.run("new Promise((f) => requestAnimationFrame(() => requestAnimationFrame(() => f(true))))");
     }
@@ -190,7 +193,8 @@ impl Browser {
 
 impl Drop for Browser {
     fn drop(&mut self) {
-        // Asked to close it takes its children along; one that does not listen is ended. Failing is no matter here.
+        // `Browser.close` also ends child processes. A browser that does not react is killed. Failures do not matter
+        // here
         let close = b"{\"id\":0,\"method\":\"Browser.close\"}\0";
         let _ = (&self.input).write_all(close);
         for _ in 0..200 {

@@ -1,4 +1,4 @@
-//! Checkpoints: a rendering that is killed goes on, and ends with the bits of one that was not.
+//! Checkpoints: a rendering that is killed and resumed has the bits of an uninterrupted one.
 
 use super::parts::{METHODS, assert_same, command, image, lumiris, run};
 use super::program::stderr;
@@ -12,7 +12,7 @@ fn start(args: &str, folder: &Path) -> Child {
     command(args, folder).stderr(Stdio::piped()).spawn().unwrap()
 }
 
-/// Waits until something is so, which must be before the program ends.
+/// Waits until the condition holds, which must be before the program ends.
 fn wait_until(is_so: impl Fn() -> bool, child: &mut Child) {
     while !is_so() {
         assert!(child.try_wait().unwrap().is_none(), "it ended too early for this test");
@@ -26,7 +26,7 @@ fn begin(args: &str, folder: &Path) {
     begin_until(1, args, folder);
 }
 
-/// As [`begin`], with a checkpoint of so many bytes at least.
+/// As [`begin`], but waits for a checkpoint of at least `bytes` bytes.
 fn begin_until(bytes: u64, args: &str, folder: &Path) {
     let mut child = start(&format!("{args} --checkpoint c.film,0.0001"), folder);
     let is_written = || std::fs::metadata(folder.join("c.film")).is_ok_and(|file| file.len() >= bytes);
@@ -36,7 +36,7 @@ fn begin_until(bytes: u64, args: &str, folder: &Path) {
     assert_eq!(child.wait().unwrap().code(), Some(130), "as if stopped by Ctrl-C");
 }
 
-/// Camera samples of a checkpoint, which must be whole; 0 if there is none.
+/// Camera samples in a checkpoint, which must be complete; 0 if there is none.
 fn stored_samples(path: &Path) -> u64 {
     if !path.exists() {
         return 0;
@@ -52,7 +52,7 @@ fn names_in(folder: &Path) -> Vec<String> {
     names
 }
 
-/// Numbers that look random.
+/// Pseudorandom numbers.
 pub(crate) struct Random(pub(crate) u64);
 
 impl Random {
@@ -62,9 +62,9 @@ impl Random {
     }
 }
 
-/// Renders with a method, is killed again and again, and compares. Returns how often it was killed, and how often it
-/// went on from samples that an earlier process had stored. The first time it is killed `early`, perhaps before it
-/// has stored anything, or else some time after that, however busy the machine is.
+/// Renders with a method, kills and resumes the program repeatedly, and compares the images. Returns the numbers of
+/// kills, and of resumptions from stored samples. The first kill is either `early`, possibly before anything is stored,
+/// or some time after the first checkpoint, however busy the machine is.
 fn killed(method: &str, spp: u32, early: bool, random: &mut Random) -> (u32, u32) {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
@@ -83,7 +83,7 @@ fn killed(method: &str, spp: u32, early: bool, random: &mut Random) -> (u32, u32
         while !(checkpoint.exists() || early && kills == 0) && child.try_wait().unwrap().is_none() {
             std::thread::sleep(Duration::from_millis(1));
         }
-        // Some end during the preparation; over time they live longer, so that there is an end
+        // Some runs are killed during the preparation. The time before a kill grows, so that the rendering ends
         let life = random.below(40 + whole.as_millis() as u64 * u64::from(2 + kills) / 8);
         let end = Instant::now() + Duration::from_millis(life);
         let status = loop {
@@ -105,21 +105,21 @@ fn killed(method: &str, spp: u32, early: bool, random: &mut Random) -> (u32, u32
     }
     assert_same("whole.exr", "resumed.exr", folder, method);
     assert_eq!(stored_samples(&checkpoint), 80 * 60 * u64::from(spp));
-    // An image whose writing was interrupted has no name yet
+    // An image that was interrupted while it was written has no name yet
     let names: Vec<String> = names_in(folder).into_iter().filter(|name| !name.starts_with(".partial-")).collect();
     assert_eq!(names, ["c.film", "resumed.exr", "whole.exr"], "half of a file is left");
     (kills, resumed)
 }
 
-/// Kills renderings until it was done so often, by all methods in turn.
+/// Kills renderings by all methods in turn, `times` times in total.
 fn kill(times: u32) {
     let mut random = Random(2026);
     let (mut kills, mut resumed) = (0, 0);
-    // Numbers of samples that take long enough with each method, and are no power of two
+    // Sample counts that take long enough with each method, and are no powers of two
     let (mut turn, methods) = (0, METHODS.iter().map(|(method, _)| method.split(" --spp").next().unwrap()));
     let methods: Vec<&str> = methods.collect();
     while kills < times {
-        // From the middle on, so that few rounds have methods of all kinds
+        // Steps of 4, so that a few rounds include methods of all kinds
         let method = methods[(turn * 4 + turn / methods.len()) % methods.len()];
         let spp = if method.contains("photon") || method.contains("cache") { 9 } else { 43 };
         let (k, r) = killed(method, spp, turn % 4 == 0, &mut random);
@@ -162,7 +162,7 @@ fn a_finished_checkpoint_goes_on_to_more_samples_and_is_a_part() {
     run("render GALLERY --resume c.film --spp 12 -q -o resumed.exr", folder);
     run(&format!("{begun} --samples-to 12 -o twelve.exr"), folder);
     assert_same("twelve.exr", "resumed.exr", folder, "5 and 7 more samples");
-    // An image of --spp 12 has narrower footprints, but no texture is seen here
+    // An image of --spp 12 has narrower texture footprints, but no texture is visible here
     assert_eq!(image("resumed.exr", folder).metadata["lumiris:samples_done"], "12 per pixel");
     let output = lumiris("render GALLERY --resume c.film --spp 3 -q -o less.exr", folder);
     assert_eq!(output.status.code(), Some(2), "{}", stderr(&output));
@@ -202,7 +202,7 @@ fn a_checkpoint_of_another_scene_or_of_other_settings_is_refused_with_what_diffe
     assert_same("a.exr", "b.exr", folder, "the same scene again");
 }
 
-/// A rendering that takes a few seconds.
+/// A rendering of a few seconds.
 const LONG: &str = "render GALLERY --resolution 64x48 --integrator path --estimator mis --spp 150 --threads 1 -q";
 
 #[test]
@@ -212,7 +212,7 @@ fn a_checkpoint_that_can_no_longer_be_written_is_a_warning_and_the_last_one_stay
     let mut child = start(&format!("{LONG} --checkpoint c.film,0.01 -o a.exr"), folder);
     let checkpoint = folder.join("c.film");
     wait_until(|| checkpoint.exists(), &mut child);
-    // A folder in the place of the file that is to be written: not even the root user can write it
+    // A folder blocks the name of the temporary file, even for the root user
     wait_until(|| std::fs::create_dir(folder.join("c.film.tmp")).is_ok(), &mut child);
     let output = child.wait_with_output().unwrap();
     assert!(output.status.success(), "{}", stderr(&output));
@@ -226,7 +226,7 @@ fn a_checkpoint_that_can_no_longer_be_written_is_a_warning_and_the_last_one_stay
     assert_same("a.exr", "b.exr", folder, "from the last good checkpoint");
 }
 
-/// Runs the program by a shell that prepares something first.
+/// Runs the program in a shell after a preparation.
 #[cfg(unix)]
 fn by_shell(preparation: &str, args: &str, folder: &Path) -> std::process::Output {
     let gallery = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes/demo/gallery.pbrt");
@@ -243,7 +243,8 @@ fn a_full_disk_ends_no_rendering_and_leaves_no_half_of_a_file() {
     run(&format!("{LONG} -o whole.exr"), folder);
     begin_until(400 * 512, &format!("{LONG} -o begun.png"), folder);
     let good = std::fs::read(folder.join("c.film")).unwrap();
-    // Files of at most 300 blocks of 512 bytes: enough for the image and the shim of OpenImageIO, not for a checkpoint
+    // Files of at most 300 blocks of 512 bytes: enough for the image and the shim of OpenImageIO, but not for a
+    // checkpoint
     let full = "trap '' XFSZ; ulimit -f 300";
     let args = "render GALLERY --resume c.film --checkpoint c.film,0.05 --threads 1 -q -o a.png";
     let output = by_shell(full, args, folder);
@@ -254,7 +255,7 @@ fn a_full_disk_ends_no_rendering_and_leaves_no_half_of_a_file() {
     assert_eq!(names_in(folder), ["a.png", "begun.png", "c.film", "whole.exr"]);
     run("render GALLERY --resume c.film -q -o b.exr", folder);
     assert_same("whole.exr", "b.exr", folder, "after the disk was full");
-    // A part is a result: there it is an error
+    // A part is a result, so a failure to write it is an error
     let part = format!("{LONG} --part 1/50 -o a.part");
     let output = by_shell(full, &part, folder);
     assert_eq!(output.status.code(), Some(3), "{}", stderr(&output));
@@ -271,7 +272,7 @@ fn a_folder_that_cannot_be_written_ends_no_rendering() {
     let locked = folder.join("locked");
     std::fs::create_dir(&locked).unwrap();
     std::fs::set_permissions(&locked, std::fs::Permissions::from_mode(0o555)).unwrap();
-    // Permissions do not bind the root user; to it, the files of the kernel are such a folder
+    // The root user can write anywhere except to files of the kernel
     let path = if std::fs::write(locked.join("a"), "").is_ok() { "/proc/c.film" } else { "locked/c.film" };
     let image = "render GALLERY --resolution 16x16 --integrator direct --estimator mis --spp 2 -q";
     let output = lumiris(&format!("{image} --checkpoint {path},0.001 -o a.exr"), folder);
@@ -296,7 +297,7 @@ fn a_part_that_is_interrupted_is_no_part_until_it_is_finished() {
     assert_eq!(image_complete("some.exr", folder), "false");
     run("render GALLERY --resume 1.part -q -o 1.part", folder);
     run("merge 1.part 2.part -q -o merged.exr", folder);
-    // The command by which it began goes on, too: the samples of a part follow from those of the image
+    // The original command can also resume: the sample range of a part follows from the image's sample count
     let part = format!("{image} --part 1/2");
     run(&format!("{part} --resume c.film -o again.part"), folder);
     run("merge again.part 2.part -q -o again.exr", folder);

@@ -17,18 +17,18 @@ fn stderr(output: &Output) -> String {
     String::from_utf8_lossy(&output.stderr).into_owned()
 }
 
-/// The program with a text as its standard input.
+/// Runs the program with a text as its standard input.
 fn lumiris_reading(text: &str, args: &[&str], folder: &Path) -> Output {
     let mut command = Command::new(env!("CARGO_BIN_EXE_lumiris"));
     command.args(args).current_dir(folder).stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
     let mut child = command.spawn().unwrap();
-    // A program that ends early closes its end
+    // A program that ends early closes its end of the pipe
     let _ = child.stdin.take().unwrap().write_all(text.as_bytes());
     child.wait_with_output().unwrap()
 }
 
-/// All processor time of the process has a name. The rest of what rendering takes, which is that of `passes`, is no large part of it
-/// even for an image of few samples.
+/// All CPU time of the process is attributed to phases. `passes`, the remainder of rendering, is a small part even for
+/// an image with few samples.
 fn assert_phases(seconds: &serde_json::Value) {
     let names = "start load build prepare camera_samples camera_rays bounce_rays shade t1_propose select_resolve t2_trace paths film \
                  noise passes libraries output";
@@ -89,7 +89,7 @@ fn render_writes_every_image_and_the_statistics() {
 
     let stats: serde_json::Value =
         serde_json::from_str(&std::fs::read_to_string(folder.path().join("a.json")).unwrap()).unwrap();
-    // All pixels of so small an image are estimated twice, for the variances
+    // All pixels of a small image are rendered twice, for the variances
     let replicas = stats["counts"]["replica_pixels"].as_u64().unwrap();
     assert_eq!(replicas, 64 * 36);
     assert_eq!(stats["counts"]["camera_rays"], (64 * 36 + replicas) * 2);
@@ -99,6 +99,7 @@ fn render_writes_every_image_and_the_statistics() {
 
 #[test]
 fn images_without_aovs_have_the_same_pixels_and_no_other_channels() {
+    // AOVs do not change the pixels
     let folder = tempfile::tempdir().unwrap();
     for integrator in ["path", "irradiance-cache", "photon-map"] {
         let image = |aovs: &[&str]| {
@@ -119,6 +120,8 @@ fn images_without_aovs_have_the_same_pixels_and_no_other_channels() {
         assert_eq!(depth.channels, ["R", "G", "B", "depth.Z"]);
         assert!(depth.data.chunks_exact(4).all(|p| p[3] > 0.0));
     }
+
+    // `none` excludes other AOVs
     let path = scene("demo/gallery.pbrt");
     let output = lumiris(&["render", &path, "--aov", "none,depth", "-o", "b.exr"], folder.path());
     assert!(output.status.code() == Some(2) && stderr(&output).contains("--aov none"), "{}", stderr(&output));
@@ -126,6 +129,7 @@ fn images_without_aovs_have_the_same_pixels_and_no_other_channels() {
 
 #[test]
 fn an_irradiance_cache_is_part_of_image_and_statistics() {
+    // Layers and metadata of the image
     let folder = tempfile::tempdir().unwrap();
     let path = scene("demo/gallery.pbrt");
     let options = "--integrator irradiance-cache --cached all --cache-samples 32 --cache-error 0.3 --cache-radius 2,16 --spp 2 \
@@ -140,12 +144,15 @@ fn an_irradiance_cache_is_part_of_image_and_statistics() {
     for (key, value) in [("integrator", "irradiance-cache"), ("cached", "all"), ("cache_radius", "2,16")] {
         assert_eq!(exr.metadata.get(&format!("lumiris:{key}")).map(String::as_str), Some(value));
     }
+
+    // Statistics
     let stats: serde_json::Value =
         serde_json::from_str(&std::fs::read_to_string(folder.path().join("a.json")).unwrap()).unwrap();
     let cache = &stats["irradiance_cache"];
     assert!(cache["records"].as_u64().unwrap() > 50 && cache["build_seconds"].as_f64().unwrap() > 0.0, "{cache}");
     assert!(cache["lookups"].as_u64().unwrap() >= cache["misses"].as_u64().unwrap(), "{cache}");
 
+    // Values out of range
     for (option, value) in [("--cache-error", "1.5"), ("--cache-radius", "5,2"), ("--cached", "none")] {
         let output = lumiris(&["render", &path, option, value], folder.path());
         assert_eq!(output.status.code(), Some(2), "{option}: {}", stderr(&output));
@@ -154,6 +161,7 @@ fn an_irradiance_cache_is_part_of_image_and_statistics() {
 
 #[test]
 fn numbers_of_proposals_are_the_same_in_every_run() {
+    // Chosen by a measurement
     let folder = tempfile::tempdir().unwrap();
     let path = scene("demo/gallery.pbrt");
     let render = |name: &str, options: &[&str]| {
@@ -169,6 +177,7 @@ fn numbers_of_proposals_are_the_same_in_every_run() {
     let again = render("again.exr", &["--proposals", "optimal", "--threads", "1"]);
     assert_eq!(bits(&chosen.image), bits(&again.image));
 
+    // Chosen by the rule
     let auto = render("auto.exr", &[]);
     assert_eq!(auto.metadata["lumiris:proposals"], "12", "three for each of four samples");
     assert_eq!(bits(&auto.image), bits(&render("given.exr", &["--proposals", "12"]).image));
@@ -183,10 +192,10 @@ fn info_counts_what_the_scene_holds() {
     assert_eq!(facts["geometry"]["instances"], 8);
     let memory = |name: &str| facts["memory"][name].as_u64().unwrap();
     let predicted = |name: &str| facts["memory"]["predicted_with_all_layers"][name].as_u64().unwrap();
-    // Libraries are to be loaded yet, so the peak is still to come
+    // Libraries are not loaded yet, so the peak is still to come
     assert!(predicted("fixed_bytes") > 100 << 20 && memory("most_taken_bytes") >= memory("taken_bytes"));
     assert!(predicted("peak_bytes") > memory("most_taken_bytes") && predicted("peak_bytes") > predicted("bytes"));
-    // A knot of 576 triangles, four times subdivided, four walls and a lamp of two triangles each.
+    // A knot of 576 triangles, subdivided four times, and four walls and a lamp of two triangles each
     assert_eq!(facts["geometry"]["triangles"], 576 * 256 + 5 * 2);
 }
 
@@ -284,7 +293,7 @@ fn a_time_alone_is_filled_with_samples_and_with_spp_both_are_limits() {
     };
     let (complete, settings, said) = samples(&["--time", "1"]);
     assert!(!complete && said.contains("stopped early"), "{said}");
-    // They follow from what is asked for, not from measured times
+    // They follow from the options, not from measured times
     assert_eq!(
         (&settings["lumiris:spp"], &settings["lumiris:pilot_spp"]),
         (&"1048576".into(), &"64".into()),
@@ -300,7 +309,7 @@ fn what_a_time_cut_short_goes_on_to_the_same_image() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
     let gallery = scene("demo/gallery.pbrt");
-    // A tile with a pass takes long enough for the time to end within one
+    // Passes over a tile take long enough for the time limit to interrupt one
     let common = ["render", &gallery, "--resolution", "192x108", "--spp", "64", "--estimator", "mis", "-q"];
     let run = |more: &[&str]| {
         let output = lumiris(&[&common[..], more].concat(), folder);
@@ -329,7 +338,7 @@ fn a_noise_is_a_number_or_a_percentage_and_said_to_be_reached_or_not() {
     let limited = said(&["--noise", "0.1%", "--spp", "8"]);
     assert!(limited.contains("hit the limit of --spp (8 samples per pixel)"), "{limited}");
     let late = said_at("160x90", &["--noise", "0.5%", "--time", "2"]);
-    // Unless a busy machine gives up the pilot, and with it the target
+    // Empty if a busy machine abandons the pilot, and with it the target
     assert!(late.contains("hit the limit of --time") || late.is_empty(), "{late}");
 }
 
@@ -357,7 +366,7 @@ fn bench_reports_every_case_with_the_hits_of_both_loops() {
         serde_json::from_str(&std::fs::read_to_string(folder.path().join("b.json")).unwrap()).unwrap()
     };
 
-    // Everything, as by default
+    // All measurements, as by default
     let all = report(&[]);
     assert_eq!(all["camera_rays"], 2048);
     let names = |cases: &serde_json::Value| -> Vec<String> {
@@ -373,7 +382,7 @@ fn bench_reports_every_case_with_the_hits_of_both_loops() {
     assert!(all["t1"]["light_proposals"].as_u64().unwrap() > 0, "{all}");
     assert_eq!(all["stages"].as_array().unwrap().last().unwrap()["name"], "all");
 
-    // One thing
+    // Single measurements
     let t1 = report(&["t1"]);
     assert_eq!((names(&t1["intersect"]).len(), names(&t1["t2"]).len()), (0, 0));
     assert!(t1["t1"]["bsdf_nanoseconds"].is_number(), "{t1}");
@@ -418,8 +427,7 @@ fn efficiency_is_measured_against_references_that_are_kept() {
     assert_eq!(names, ["auto", "mis", "mis, four"]);
     assert!(rows.iter().all(|row| row["relmse"]["error"].as_f64().unwrap() > 0.0), "{report}");
 
-    // A first look at all but the first leaves out what is hundreds of times less efficient: `mis` of one sample, which may be
-    // of the BSDF
+    // The screening pass skips `mis` with one sample, possibly of the BSDF: it is hundreds of times less efficient
     let (said, screened) = run(&["--screen-spp", "16", "--case", "mc=--estimator mc"]);
     let names = |key: &str| -> Vec<&str> {
         screened[0][key].as_array().unwrap().iter().map(|row| row["name"].as_str().unwrap()).collect()
@@ -431,7 +439,7 @@ fn efficiency_is_measured_against_references_that_are_kept() {
     let looks = ["auto", "mis", "mc", "mis, four", "mc, four"].map(|name| has_seed(name, 2));
     assert_eq!((looks, has_seed("mis", 0)), ([false, true, true, true, true], false), "{said}");
 
-    // The same images by the same references, which are read; by black ones the error is all of the image
+    // Stored references give the same errors. With black ones, the error is the whole image
     let files = kept();
     let (said, again) = run(&[]);
     let error = |report: &serde_json::Value| report[0]["rows"][1]["mse"]["error"].as_f64().unwrap();
@@ -441,7 +449,7 @@ fn efficiency_is_measured_against_references_that_are_kept() {
     files.iter().for_each(|path| write_image(path, &[black(32)]).unwrap());
     assert!(error(&run(&[]).1) > 2.0 * error(&report));
 
-    // Others, and one of another size
+    // Other settings need other references; a reference of another size is an error
     for (i, other) in [&["--seed", "7"][..], &["--max-depth", "3"], &["--crop", "0,0.5,0,1"]].iter().enumerate() {
         assert_eq!((is_rendered(&run(other).0), kept().len()), ([true; 2], 4 + 2 * i), "{other:?}");
     }
@@ -451,7 +459,7 @@ fn efficiency_is_measured_against_references_that_are_kept() {
     assert!(stderr(&output).contains("8 × 8 pixels, but the image has 32 × 32"), "{}", stderr(&output));
 }
 
-/// As `make install` installs it.
+/// As installed by `make install`.
 #[test]
 fn a_copy_of_the_executable_alone_reads_and_writes_images() {
     let folder = tempfile::tempdir().unwrap();
@@ -470,7 +478,7 @@ fn ctrl_c_writes_what_there_is() {
     let folder = tempfile::tempdir().unwrap();
     let args = ["render", &scene("analytic/rectangle.pbrt"), "--spp", "1000000000", "-q", "-o", "a.exr"];
     let mut child = Command::new(env!("CARGO_BIN_EXE_lumiris")).args(args).current_dir(folder.path()).spawn().unwrap();
-    // Long enough for the scene to be read and the first pass to be done, even on a busy machine.
+    // Long enough to read the scene and finish the first pass, even on a busy machine
     std::thread::sleep(std::time::Duration::from_secs(4));
     assert!(Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap().success());
     assert_eq!(child.wait().unwrap().code(), Some(130));
@@ -485,7 +493,7 @@ fn ctrl_c_writes_what_there_is() {
 fn ctrl_c_before_the_first_sample_leaves_what_there_is() {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("a.exr"), "an image of yesterday").unwrap();
-    // So little noise has a pilot that takes longer than this test
+    // The pilot for such low noise takes longer than this test
     let args = ["render", &scene("demo/gallery.pbrt"), "--spp", "1000000", "--noise", "0.01%", "-q", "-o", "a.exr"];
     let mut command = Command::new(env!("CARGO_BIN_EXE_lumiris"));
     let child = command.args(args).current_dir(folder.path()).stderr(Stdio::piped()).spawn().unwrap();
@@ -493,7 +501,7 @@ fn ctrl_c_before_the_first_sample_leaves_what_there_is() {
     assert!(Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap().success());
     let output = child.wait_with_output().unwrap();
     assert_eq!(output.status.code(), Some(130));
-    // By itself, or since that took too long
+    // By itself, or because the grace time was over
     let ends = ["stopped before the first sample: nothing is written", "stopped while "];
     assert!(ends.iter().any(|end| stderr(&output).contains(end)), "{}", stderr(&output));
     assert_eq!(std::fs::read(folder.path().join("a.exr")).unwrap(), b"an image of yesterday");
@@ -513,7 +521,7 @@ fn generated_scenes_render_and_say_what_is_missing_before_they_are_generated() {
         let green = image.channel("G").unwrap();
         let sum: f32 = (0..24 * 32).map(|i| image.get(i % 24, i / 24, green)).sum();
         assert!(sum > 10.0, "{name} is dark: {sum}");
-        // The folder holds what the project holds.
+        // The generated scenes are the repository's
         let original = std::fs::read(self::scene(&format!("talbot/{name}.pbrt"))).unwrap();
         assert!(original == std::fs::read(folder.path().join(&scene)).unwrap());
     }

@@ -25,8 +25,8 @@ fn names(names: &[&str]) -> Vec<String> {
     names.iter().map(|&n| n.to_owned()).collect()
 }
 
-/// One colour with two blocks that a display clips (2 and 4 at columns 4..8 and 12..16 of the rows 4..8) and a yellow
-/// one (columns 20..24, rows 20..24) that all images have.
+/// One colour, with two blocks that a display clips (2 and 4 at columns 4..8 and 12..16 of the rows 4..8), and with a
+/// yellow block (columns 20..24, rows 20..24) that all images share.
 fn image([r, g, b]: [f32; 3]) -> Vec<[f32; 3]> {
     let pixel = |i: usize| match (i % SIZE[0], i / SIZE[0]) {
         (4..8, 4..8) => [2.0; 3],
@@ -72,7 +72,7 @@ fn a_table_and_json_say_the_same() {
 
     let out: Value = serde_json::from_str(&std::fs::read_to_string(path("out.json")).unwrap()).unwrap();
     let [a, b, same] = [0, 1, 2].map(|i| &out["images"][i]);
-    // All but 48 of 1200 pixels differ: by 0.02 in two of three channels, by 0.1 in all.
+    // All but 48 of 1200 pixels differ: image a by 0.02 in two of three channels, image b by 0.1 in all
     let share = 1152.0 / 1200.0;
     let near = |value: &Value, expected: f64| (value.as_f64().unwrap() / expected - 1.0).abs() < 1e-4;
     assert!(near(&a["mse"], 0.02 * 0.02 * 2.0 / 3.0 * share) && near(&b["mse"], 0.01 * share), "{out:#}");
@@ -98,6 +98,7 @@ fn a_table_and_json_say_the_same() {
 
 #[test]
 fn limits_decide_the_exit_code() {
+    // Limits on metrics
     let folder = tempfile::tempdir().unwrap();
     let path = |name: &str| folder.path().join(name);
     write_plain(&path("r.exr"), &image([0.5; 3]));
@@ -110,6 +111,8 @@ fn limits_decide_the_exit_code() {
     assert_eq!(code(&["--fail-above", "mse=0.01", "--fail-below", "psnr=20"]).0, 0);
     let (exit, said) = code(&["--fail-above", "bias=0.09", "--fail-below", "psnr=30"]);
     assert!(exit == 1 && said.contains("a.exr: bias = -0.09") && said.contains("psnr = 20.1"), "{said}");
+
+    // Metrics that cannot be computed or do not exist
     let (exit, said) = code(&["--fail-above", "z=0.1"]);
     assert!(exit == 3 && said.contains("no variances"), "{said}");
     let (exit, said) = code(&["--fail-above", "ssim=0.1"]);
@@ -149,7 +152,7 @@ fn images_of_every_format_are_linear_when_they_are_compared() {
     write_plain(&path("a.hdr"), &pixels);
     let encoded = pixels.as_flattened().iter().map(|&v| linear_to_srgb(v)).collect();
     write_image(&path("a.png"), &[Part::display(SIZE[0], SIZE[1], names(&["R", "G", "B"]), encoded)]).unwrap();
-    // Rows of a PFM go from the bottom up.
+    // Rows of a PFM start at the bottom
     let mut pfm = b"PF\n40 30\n-1.0\n".to_vec();
     pfm.extend(pixels.chunks(40).rev().flatten().flatten().flat_map(|v| v.to_le_bytes()));
     std::fs::write(path("a.pfm"), pfm).unwrap();
@@ -161,7 +164,7 @@ fn images_of_every_format_are_linear_when_they_are_compared() {
         ["compare", "a.hdr", "a.png", "a.pfm", "cycles.exr", "-r", "r.exr", "--metrics", "rmse,bias", "--json", "-"];
     let output = lumiris(&args, folder.path());
     let out = report(&output);
-    // RGBE keeps 8 bits of the largest channel, PNG 8 bits of the encoded value, the others everything.
+    // RGBE keeps 8 bits of the largest channel, PNG 8 bits of the encoded value, the others all bits
     for (i, max) in [(0, 2e-3), (1, 3e-3), (2, 0.0), (3, 0.0)] {
         let rmse = out["images"][i]["rmse"].as_f64().unwrap();
         assert!(rmse <= max, "{} {rmse}", out["images"][i]["path"]);
@@ -190,11 +193,11 @@ fn crops_layers_and_odd_pixels_are_told_of() {
     assert_eq!(out["region"], json!({ "x": 0, "y": 0, "width": 8, "height": 6 }));
     let a = &out["images"][0];
     assert_eq!((&a["pixels"], &a["nonfinite"]), (&json!(47), &json!(1.0)));
-    // The block of 2 has 4 × 2 pixels in the crop.
+    // The block of value 2 has 4 × 2 pixels in the crop
     assert!((a["mse"].as_f64().unwrap() - 1.75 * 1.75 * 8.0 / 47.0).abs() < 1e-9);
 }
 
-/// The page of two images and a reference, open in a browser.
+/// The page of several images and a reference, open in a browser.
 struct Open {
     browser: Browser,
     folder: tempfile::TempDir,
@@ -218,7 +221,7 @@ fn open(images: &[(&str, Vec<[f32; 3]>)], options: &[&str]) -> Open {
     Open { browser, folder, output }
 }
 
-/// A script whose value is the context of a copy of the page's canvas, which may be read as often as one likes.
+/// A script that returns the context of a copy of the page's canvas, which can be read repeatedly.
 const COPY: &str = "(() => { const from = document.getElementById('canvas'); const to = document.createElement('canvas'); \
     [to.width, to.height] = [from.width, from.height]; const context = to.getContext('2d', { willReadFrequently: true }); \
     context.drawImage(from, 0, 0); return context; })()";
@@ -239,14 +242,14 @@ impl Open {
         [left + x * width, top + y * height]
     }
 
-    /// Where the middle of a pixel of the image is shown, in wipe and single layout before zooming.
+    /// Position of the centre of an image pixel, in wipe and single layout before zooming.
     fn pixel_at(&self, [x, y]: [f64; 2]) -> [f64; 2] {
         let [left, top, width, height] = self.place("canvas");
         let zoom = ((width - 24.0) / SIZE[0] as f64).min((height - 24.0) / SIZE[1] as f64);
         [left + width / 2.0 + (x + 0.5 - 20.0) * zoom, top + height / 2.0 + (y + 0.5 - 15.0) * zoom]
     }
 
-    /// Red, green and blue that the canvas shows at a point of the window.
+    /// Colour of the canvas at a point of the window.
     fn color(&self, [x, y]: [f64; 2]) -> [i64; 3] {
         self.browser.settle();
         let [left, top, ..] = self.place("canvas");
@@ -259,7 +262,7 @@ impl Open {
         self.browser.run(&format!("document.getElementById('{id}').textContent")).as_str().unwrap().to_owned()
     }
 
-    /// Chooses an entry of a select, or moves a slider, as a person does.
+    /// Chooses an entry of a select, or moves a slider, with the same events as a user.
     fn set(&self, id: &str, value: &str) {
         let event = if id == "exposure" { "input" } else { "change" };
         self.browser.run(&format!(
@@ -322,14 +325,14 @@ fn the_page_wipes_between_images_and_exposes_true_radiance() {
     assert_eq!(page.color(left), shown(RED, 0.0));
     assert_eq!((page.color(right), page.color(between)), (shown(BLUE, 0.0), shown(BLUE, 0.0)));
 
-    // The slider by mouse and by keys
+    // Divider by mouse and by keys
     page.browser.drag(&[page.at([0.5, 0.5]), page.at([0.55, 0.5]), page.at([0.65, 0.5])]);
     assert_eq!((page.color(between), page.color(right)), (shown(RED, 0.0), shown(BLUE, 0.0)));
     page.browser.run("document.getElementById('divider').focus()");
     (0..5).for_each(|_| page.browser.key("ArrowLeft", "ArrowLeft", false));
     assert_eq!(page.color(between), shown(BLUE, 0.0));
 
-    // What is left and right, by keys and by selects
+    // Left and right image by keys and by selects
     page.browser.key("2", "Digit2", false);
     assert_eq!(page.color(left), shown(GREEN, 0.0));
     page.set("image-b", "0");
@@ -337,7 +340,7 @@ fn the_page_wipes_between_images_and_exposes_true_radiance() {
     page.browser.key("x", "KeyX", false);
     assert_eq!((page.color(left), page.color(right)), (shown(RED, 0.0), shown(GREEN, 0.0)));
 
-    // Blocks that are both white at first differ two stops down: their values are there.
+    // Both blocks are white at first but differ three stops down, since their values are kept
     let blocks = [page.pixel_at([5.0, 5.0]), page.pixel_at([13.0, 5.0])];
     assert_eq!(blocks.map(|b| page.color(b)), [[255; 3]; 2]);
     page.set("exposure", "-3");
@@ -351,7 +354,7 @@ fn the_page_wipes_between_images_and_exposes_true_radiance() {
     let said = page.text("readout");
     assert!(said.contains("x 13  y 5") && said.contains("a.exr 4 4 4") && said.contains("b.exr 4 4 4"), "{said}");
 
-    // The window shows what the canvas holds.
+    // The window shows the contents of the canvas
     let png = page.folder.path().join("window.png");
     page.browser.screenshot(&png);
     let window = read_image(&png, &ReadLimits::default()).unwrap().image;
@@ -362,6 +365,7 @@ fn the_page_wipes_between_images_and_exposes_true_radiance() {
 
 #[test]
 fn the_page_zooms_and_pans_all_images_together() {
+    // Zoom at the pointer
     let page = three();
     let before = page.text("zoom");
     let point = page.pixel_at([22.0, 22.0]);
@@ -372,6 +376,7 @@ fn the_page_zooms_and_pans_all_images_together() {
     assert!(page.text("readout").contains("x 22  y 22"), "the point under the pointer stays: {}", page.text("readout"));
     assert_eq!(page.color(page.at([0.4, 0.02])), shown(RED, 0.0), "what was beside the image is filled by it");
 
+    // Three images side by side zoom and pan together
     page.browser.key("f", "KeyF", false);
     page.browser.key("g", "KeyG", false);
     let fit = page.yellow_of_thirds();
@@ -385,6 +390,8 @@ fn the_page_zooms_and_pans_all_images_together() {
     let shift = |i: usize| panned[0][i].as_f64().unwrap() - zoomed[0][i].as_f64().unwrap();
     assert!(panned.iter().all(|b| *b == panned[0]), "{panned:?}");
     assert!((shift(0) + 30.0).abs() <= 1.0 && (shift(1) + 50.0).abs() <= 1.0, "{zoomed:?} {panned:?}");
+
+    // Fit again
     page.browser.call("Input.dispatchKeyEvent", json!({ "type": "keyDown", "key": "f", "code": "KeyF" }));
     assert_eq!(page.yellow_of_thirds(), fit);
     page.has_no_complaint();
@@ -402,7 +409,7 @@ fn the_page_shows_maps_with_their_scales_and_a_table_that_sorts() {
         assert!(page.shows("legend-a"), "{view}");
         assert_eq!(page.browser.run("document.querySelectorAll('#legend-a .ticks span').length"), json!(5), "{view}");
         let [here, there] = [left, block].map(|p| page.color(p));
-        // The block is the same in both images; the variance alone is the same everywhere.
+        // The block is the same in both images; only the variance is the same everywhere
         assert_eq!(here == there, view == "variance", "{view} {here:?} {there:?}");
         seen.push((here, page.text("legend-a")));
     }
@@ -413,7 +420,7 @@ fn the_page_shows_maps_with_their_scales_and_a_table_that_sorts() {
     page.browser.settle();
     assert!(page.text("readout").contains("z (standard deviations): "), "{}", page.text("readout"));
 
-    // The reference has no ꟻLIP; it says so, and its own legend is on its side.
+    // The reference has no ꟻLIP; its side has its own legend
     page.set("view-b", "flip");
     assert!(page.shows("legend-b") && page.text("legend-b").contains("FLIP"));
 
@@ -438,16 +445,21 @@ fn the_page_shows_maps_with_their_scales_and_a_table_that_sorts() {
 
 #[test]
 fn a_page_of_one_image_works_and_marks_what_is_not_finite() {
+    // Colours, and the marker of values that are not finite
     let mut pixels = image(RED);
     pixels[16 * 40 + 10] = [f32::NAN, 0.5, 0.5];
     let page = open(&[("a.exr", pixels), ("r.exr", image(BLUE))], &["--metrics", "mse", "--exposure", "-1"]);
     assert!(near(page.color(page.at([0.3, 0.3])), shown(RED, -1.0)));
     assert_eq!(page.color(page.pixel_at([10.0, 16.0])), [255, 0, 255]);
+
+    // Single layout
     page.browser.key("s", "KeyS", false);
     assert!(!page.shows("divider") && !page.shows("side-b"));
     page.browser.key("0", "Digit0", false);
     assert!(near(page.color(page.at([0.3, 0.3])), shown(BLUE, -1.0)));
     page.browser.key("1", "Digit1", false);
+
+    // Numbers and choices
     page.browser.point(page.pixel_at([10.0, 16.0]));
     page.browser.settle();
     assert!(page.text("readout").contains("a.exr NaN 0.5 0.5"), "{}", page.text("readout"));

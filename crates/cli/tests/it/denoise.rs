@@ -1,6 +1,6 @@
-//! Denoising: the layer beside the image, and what is said where it cannot be made.
+//! Denoising: the added layer, and messages if it cannot be computed.
 //!
-//! Tests that need the library are run by `make test-denoise`, which names it in LUMIRIS_OIDN.
+//! `make test-denoise` runs the tests that need the library, whose path is in LUMIRIS_OIDN.
 
 use super::program::{command, folder_with, read, stderr};
 use lumiris::imaging::oiio::{Part, ReadImage, ReadLimits, read_headers, read_metadata, read_part, write_image};
@@ -16,7 +16,7 @@ fn folder() -> tempfile::TempDir {
     folder_with(SCENE)
 }
 
-/// Exit code and messages, with the library that LUMIRIS_OIDN names.
+/// Exit code and messages. The library is named by LUMIRIS_OIDN.
 fn run(folder: &Path, args: &str) -> (Option<i32>, String) {
     said(&command(folder, args).output().unwrap())
 }
@@ -47,7 +47,7 @@ fn without_the_library_nothing_is_rendered_and_the_message_says_how_to_get_it() 
     write_image(&path.join("in.exr"), &[Part::linear(1, 1, RGB.map(str::to_owned).to_vec(), vec![1.0; 3])]).unwrap();
     std::fs::write(path.join("text.so"), "no library").unwrap();
     for library in ["none.so", "text.so", "libm.so.6"] {
-        // The scene does not exist: it is not even read
+        // The scene does not exist; it is not even read
         for args in ["render none.pbrt --denoise -o a.exr", "denoise in.exr -o a.exr"] {
             let by_option = run(path, &format!("{args} --oidn-library {library}"));
             let by_variable = said(&command(path, args).env("LUMIRIS_OIDN", library).output().unwrap());
@@ -75,7 +75,7 @@ fn options_that_would_lose_the_image_itself_are_refused() {
         ("denoise in.exr -o a.part", "no part"),
         ("denoise in.png -o a.exr", "only EXR"),
     ] {
-        // Whether there is a library or not does not matter for options that cannot be
+        // Impossible options are refused whether or not there is a library
         let (code, text) = run(path, args);
         assert!(code == Some(2) && text.contains(reason), "{args}: {code:?} {text}");
     }
@@ -101,7 +101,7 @@ fn the_denoised_layer_stands_beside_the_image_and_png_shows_it() {
     assert_eq!((shown("raw.png"), shown("a.png")), (None, Some("denoised".to_owned())));
     assert!(read(path, "raw.png").image != read(path, "a.png").image);
 
-    // The same from the file, with other threads
+    // The same from the file, with another number of threads
     succeed(path, "denoise raw.exr -q --threads 2 -o b.exr -o b.png");
     let b = read(path, "b.exr");
     assert!(bits(&a, DENOISED) == bits(&b, DENOISED), "the file has other layers than the film");
@@ -111,7 +111,7 @@ fn the_denoised_layer_stands_beside_the_image_and_png_shows_it() {
     for (key, value) in &raw.metadata {
         assert_eq!(b.metadata.get(key), Some(value), "{key}");
     }
-    // The same of parts
+    // The same from parts
     for i in 1..3 {
         succeed(path, &format!("render scene.pbrt -q --part {i}/2 -o {i}.part"));
     }
@@ -124,7 +124,7 @@ fn the_denoised_layer_stands_beside_the_image_and_png_shows_it() {
     assert!(said.contains("neither albedo nor normal"), "{said}");
     assert!(about("bare.exr").unwrap().ends_with("by colour"));
 
-    // Once more: the layer is replaced
+    // Denoising again replaces the layer
     succeed(path, "denoise b.exr -q -o b.exr");
     assert!(b.image == read(path, "b.exr").image);
 }
@@ -151,6 +151,7 @@ fn in_files_of_several_parts_the_layer_is_a_part() {
 #[test]
 #[ignore = "needs Open Image Denoise: make test-denoise"]
 fn missing_layers_are_a_warning_and_values_that_are_not_finite_do_no_harm() {
+    // Without guides, and with values that are not finite
     let folder = folder();
     let path = folder.path();
     let mut data: Vec<f32> = (0..32 * 32 * 3).map(|i| (i * 7919 % 101) as f32 / 101.0).collect();
@@ -163,6 +164,7 @@ fn missing_layers_are_a_warning_and_values_that_are_not_finite_do_no_harm() {
     assert!(bits(&out, DENOISED).into_iter().all(|b| f32::from_bits(b).is_finite()));
     assert!(bits(&out, RGB) == bits(&read(path, "in.exr"), RGB));
 
+    // Missing layers
     succeed(path, "render scene.pbrt -q --aov albedo -o albedo.exr");
     let text = succeed(path, "denoise albedo.exr -q -o out.exr");
     assert!(text.contains("warning: has no layer normal"), "{text}");

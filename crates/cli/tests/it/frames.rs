@@ -14,7 +14,7 @@ fn lumiris(folder: &Path, args: &str) -> Output {
     command(folder, args).output().unwrap()
 }
 
-/// A frame: a quadrilateral under a sky, both from files, that moves from frame to frame.
+/// Scene of a frame: a quadrilateral under a sky, both from files. It moves from frame to frame.
 fn frame(number: u32, mesh: &str) -> String {
     format!(
         "LookAt 0 0 {} 0 0 0 0 1 0\nCamera \"perspective\"\nSampler \"independent\" \"integer pixelsamples\" [ 2 ]\n\
@@ -28,7 +28,7 @@ fn frame(number: u32, mesh: &str) -> String {
     )
 }
 
-/// Frames 1 to 4 with the meshes `floor.ply` and, from the third on, `new.ply`.
+/// Frames 1 to 4 with the meshes `floor.ply` and `old.ply`, or `new.ply` from the third frame on.
 fn animation() -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     let path = |name: &str| folder.path().join(name);
@@ -51,7 +51,7 @@ fn image(path: &Path) -> Image {
     read_image(path, &ReadLimits::default()).unwrap().image
 }
 
-/// A setting that metadata have.
+/// A setting in the metadata.
 fn setting(path: &Path, name: &str) -> String {
     read_metadata(path).unwrap()[&format!("lumiris:{name}")].clone()
 }
@@ -72,7 +72,7 @@ fn frames_read_each_file_once_and_have_the_pixels_of_single_renderings() {
     let output = lumiris(folder.path(), "render shot.####.pbrt --frames 1-4 -o f.##.exr -o f.##.png --stats s.json");
     assert!(output.status.success(), "{}", stderr(&output));
 
-    // Sky, texture, floor (twice) and a mesh; only the last is another one in the third frame
+    // Sky, texture, floor (twice) and a mesh; only the mesh differs in the third frame
     let expected = [(4, 0), (0, 4), (1, 3), (0, 4)];
     for (frame, (read, shared)) in stats(&path("s.json")).iter().zip(expected) {
         let counts = (frame["files"]["read"].as_u64().unwrap(), frame["files"]["shared"].as_u64().unwrap());
@@ -163,7 +163,7 @@ fn frames_have_other_noise_each_unless_it_is_to_be_the_same() {
     assert_eq!(pixels("same.1.exr"), pixels("same.2.exr"));
     assert_eq!(pixels("same.1.exr"), pixels("alone.exr"));
 
-    // What goes on has the seed that it began with, whether the seed of the sequence is given again or not
+    // A resumed frame keeps its seed, whether or not the seed of the sequence is given again
     run("render still.#.pbrt --frames 1-2 --seed 7 --estimator mis -q -o whole.#.exr");
     run("render still.#.pbrt --frames 1-2 --seed 7 --estimator mis --spp 1 --checkpoint c.#.film -q -o half.#.exr");
     for given in ["", "--seed 7"] {
@@ -187,7 +187,7 @@ fn what_is_chosen_for_the_first_frame_is_the_choice_for_all() {
     let plan = setting(&path("f.1.exr"), "plan");
     assert!(plan.contains("\"samples\""), "{plan}");
     assert_eq!(setting(&path("f.2.exr"), "plan"), plan);
-    // Also where the first frame is there already
+    // Also if the image of the first frame exists
     run("1-3");
     assert_eq!(setting(&path("f.3.exr"), "plan"), plan);
     for number in 2..=3 {
@@ -208,7 +208,7 @@ fn parts_of_frames_are_merged_to_the_frames() {
     let frames = "render shot.####.pbrt --frames 1-3:2 --estimator mis -q";
     run(&format!("{frames} -o whole.##.exr"));
     run(&format!("{frames} --part 1/2 -o f.####.1.part --checkpoint c.####.film"));
-    // The other part of a frame alone: what frames share does not tell their files apart
+    // The other part of a frame, rendered alone: parts of single frames and of sequences are compatible
     let seed = setting(&path("whole.03.exr"), "seed");
     run(&format!("render shot.0003.pbrt --estimator mis --seed {seed} -q --part 2/2 -o f.0003.2.part"));
     run(&format!("{frames} --part 2/2 -o f.####.2.part --skip-existing --stats s.json"));
@@ -220,7 +220,7 @@ fn parts_of_frames_are_merged_to_the_frames() {
         assert_eq!(bits(&whole), bits(&merged), "frame {number}");
     }
 
-    // What is stored of each frame goes on to it
+    // Resumes every frame from its own checkpoint
     run(&format!("{frames} --part 1/2 --checkpoint c.####.film --resume c.####.film -o again.####.part"));
     run("merge again.####.part f.####.2.part --frames 3 -q -o n.#.exr");
     assert_eq!(bits(&image(&path("n.3.exr"))), bits(&image(&path("m.03.exr"))));
@@ -232,7 +232,7 @@ fn parts_of_frames_are_merged_to_the_frames() {
     assert_eq!(output.status.code(), Some(3), "{text}");
     assert!(text.contains("frame 1: f.0001.1.part: No such file") && text.contains("1 of 2 frames failed"), "{text}");
     assert!(path("o.3.exr").exists() && !path("o.1.exr").exists());
-    // A part that is not finished is no reason to leave the frame out
+    // An unfinished part is not skipped
     std::fs::write(path("f.0001.1.part"), "half of").unwrap();
     run(&format!("{frames} --part 1/2 -o f.####.1.part --skip-existing"));
     run("merge f.####.2.part f.####.1.part --frames 1,3 -q -o o.#.exr");
@@ -247,7 +247,7 @@ fn ctrl_c_ends_a_sequence_and_its_frame_is_rendered_again() {
         .current_dir(folder.path())
         .spawn()
         .unwrap();
-    // Long enough for the scene to be read, even on a busy machine
+    // Long enough to read the scene, even on a busy machine
     std::thread::sleep(std::time::Duration::from_secs(4));
     assert!(Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap().success());
     assert_eq!(child.wait().unwrap().code(), Some(130));

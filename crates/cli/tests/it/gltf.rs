@@ -1,10 +1,10 @@
-//! glTF scenes: their options belong to the image, and so to parts and checkpoints.
+//! glTF scenes: their options are stored in parts and checkpoints.
 
 use super::parts::{assert_same, lumiris, run};
 use super::program::stderr;
 use std::path::Path;
 
-/// A triangle in a file, which an animation moves by one unit in a second, a camera, and an environment of two colours.
+/// A triangle from a file, animated by one unit per second, a camera, and an environment of two colours.
 fn write_scene(folder: &Path) {
     // (0, 0, 0), (1, 0, 0) and (0, 1, 0)
     let data = "AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAA";
@@ -55,7 +55,7 @@ fn frames_are_times_of_an_animation() {
     let bytes = |name: &str| std::fs::read(folder.path().join(name)).unwrap();
     assert_ne!(bytes("f.0000.exr"), bytes("f.0002.exr"));
 
-    // A part says what time it is of
+    // A part stores its time
     run(&format!("render a.gltf {options} --time-in-scene 0.5 --checkpoint c.film -o half.exr"), folder.path());
     run("render a.gltf --resume c.film --quiet -o resumed.exr", folder.path());
     assert_same("0001.exr", "resumed.exr", folder.path(), "a checkpoint");
@@ -118,17 +118,17 @@ fn cameras_are_listed_and_chosen_by_name_or_index() {
     assert!(stderr(&output).contains("there is no scene `2`; scenes: 0, 1 (b)"), "{}", stderr(&output));
     assert_eq!(lumiris("info a.gltf --camera 0 --camera-auto", folder.path()).status.code(), Some(2));
 
-    // A checkpoint knows its camera
+    // A checkpoint stores its camera
     run(&format!("render a.gltf {options} --camera near --checkpoint c.film -o half.exr"), folder.path());
     run("render a.gltf --resume c.film --quiet -o resumed.exr", folder.path());
     assert_same("1.exr", "resumed.exr", folder.path(), "a checkpoint");
-    // The same by other words
+    // The same choices in other words
     run(
         "render a.gltf --camera 1 --light-units watt --scene-in-file 0 --resume c.film --quiet -o again.exr",
         folder.path(),
     );
     assert_same("1.exr", "again.exr", folder.path(), "an index, and what is the default");
-    // What shows something else is no part of the same image
+    // Other choices make another image
     for (option, difference) in [
         ("--camera 0", "camera: none, not 1 near"),
         ("--camera-auto", "camera: one that frames the scene, not 1 near"),

@@ -5,7 +5,7 @@ use std::io::Write;
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
-/// Every subcommand that loads a scene ends while it does; a scene that never comes to its end takes for ever to load.
+/// Every subcommand that loads a scene can be ended while it does. A scene that never ends keeps it loading.
 #[test]
 fn signals_end_the_loading_of_a_scene_within_a_second() {
     let folder = tempfile::tempdir().unwrap();
@@ -20,7 +20,7 @@ fn signals_end_the_loading_of_a_scene_within_a_second() {
     ] {
         let mut command = command(folder.path(), args);
         let mut child = command.stdin(Stdio::piped()).stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
-        // More than a pipe holds: once it is written, it is read
+        // More than a pipe holds, so part of it has been read once it is written
         let mut scene = child.stdin.take().unwrap();
         scene.write_all(&b"# still going on\n".repeat(1 << 15)).unwrap();
         let start = Instant::now();
@@ -41,7 +41,7 @@ fn a_second_signal_ends_the_program_at_once() {
     let mut child = command(folder.path(), "info -").stdin(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
     let mut scene = child.stdin.take().unwrap();
     scene.write_all(&b"# still going on\n".repeat(1 << 15)).unwrap();
-    // One signal that comes before the other is taken may be lost
+    // A signal can be lost if another one follows before it is handled
     let id = child.id().to_string();
     while child.try_wait().unwrap().is_none() {
         let _ = Command::new("kill").args(["-INT", &id]).stderr(Stdio::null()).status();

@@ -1,4 +1,4 @@
-//! Light groups: where their layers are, which of the documents' commands show them, and what is said where there are none.
+//! Light groups: the files with their layers, documented commands that show them, and messages if there are none.
 
 use super::parts::{image, lumiris, refuse, run};
 use super::program::stderr;

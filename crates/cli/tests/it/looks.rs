@@ -1,4 +1,4 @@
-//! What becomes of a film: exposure and view transforms, and layers, storage and attributes of EXR files.
+//! Display images and EXR files: exposure and view transforms, layers, storage and attributes.
 
 use super::program::{self, folder_with, read, stderr};
 use lumiris::imaging::oiio::{ReadImage, ReadLimits, read_headers, read_part};
@@ -6,7 +6,7 @@ use lumiris::render::cryptomatte::{hash, id};
 use std::path::Path;
 use std::process::{Command, Output};
 
-/// The program without a configuration of OpenColorIO.
+/// The program without an OpenColorIO configuration.
 fn command(folder: &Path, args: &str) -> Command {
     let mut command = program::command(folder, args);
     command.env_remove("OCIO");
@@ -24,7 +24,7 @@ fn first(image: &ReadImage) -> [u8; 3] {
     ["R", "G", "B"].map(|c| (image.image.get(0, 0, image.image.channel(c).unwrap()) * 255.0).round() as u8)
 }
 
-/// A sky of one colour, and a configuration that halves colours or turns their channels around.
+/// A sky of one colour, and an OpenColorIO configuration that halves colours or permutes their channels.
 fn sky() -> tempfile::TempDir {
     let scene = "Film \"rgb\" \"integer xresolution\" [ 8 ] \"integer yresolution\" [ 6 ]\n\
                  Sampler \"independent\" \"integer pixelsamples\" [ 1 ]\nWorldBegin\n\
@@ -51,7 +51,7 @@ fn exposure_and_view_transform_are_part_of_the_image_and_of_its_metadata() {
     let srgb = |v: f32| (lumiris::imaging::color::linear_to_srgb(v) * 255.0).round() as u8;
     assert_eq!(look(""), ([srgb(0.2), srgb(0.4), srgb(0.6)], "0".to_owned(), "srgb".to_owned()));
     assert_eq!(look("--exposure -1").0, [srgb(0.1), srgb(0.2), srgb(0.3)]);
-    // Middle grey in spite of the colour
+    // The luminance becomes middle grey, whatever the colour
     let (_, exposure, _) = look("--exposure auto");
     let luminance = 0.2126 * 0.2 + 0.7152 * 0.4 + 0.0722 * 0.6;
     assert!((exposure.parse::<f64>().unwrap() - (0.18_f64 / luminance).log2()).abs() < 1e-3, "{exposure}");
@@ -70,6 +70,7 @@ fn exposure_and_view_transform_are_part_of_the_image_and_of_its_metadata() {
 
 #[test]
 fn a_configuration_of_open_color_io_makes_the_colours_of_its_views() {
+    // Displays, views and inputs
     let folder = sky();
     let run = |args: &str| {
         let args = format!("render scene.pbrt -q --view-transform ocio -o a.png {args}");
@@ -88,19 +89,23 @@ fn a_configuration_of_open_color_io_makes_the_colours_of_its_views() {
         assert!(off, "{args}: {:?}", first(&image));
         assert!(image.metadata["lumiris:view_transform"].ends_with(name), "{:?}", image.metadata);
     }
+
+    // Names that the configuration does not have
     std::fs::remove_file(folder.path().join("a.png")).unwrap();
     for wrong in ["--ocio-view Sepia", "--ocio-display Wall", "--ocio-input nothing"] {
         let (code, text) = run(wrong);
         assert!(code == Some(3) && text.contains("OpenColorIO: "), "{wrong}: {text}");
         assert!(!folder.path().join("a.png").exists());
     }
+
+    // No common name of linear Rec.709
     let config = std::fs::read_to_string(folder.path().join("config.ocio")).unwrap();
     std::fs::write(folder.path().join("config.ocio"), config.replace("Linear Rec.709 (sRGB)", "ACEScg")).unwrap();
     let (code, text) = run("");
     assert!(code == Some(3) && text.contains("--ocio-input"), "{text}");
 }
 
-/// Two spheres of one kind, a third that an instance places, and a floor; three materials.
+/// Two spheres of one kind, a third from an instance, and a floor; three materials.
 fn shapes() -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     let scene = "LookAt 0 0 -6 0 0 0 0 1 0\nCamera \"perspective\" \"float fov\" [ 50 ]\n\
@@ -117,7 +122,7 @@ fn shapes() -> tempfile::TempDir {
     folder
 }
 
-/// Ids and coverages of a pixel, as far as there are any.
+/// Ids and coverages of a pixel.
 fn ranks(image: &ReadImage, layer: &str, pixel: usize) -> Vec<(f32, f32)> {
     let channels =
         (0..3).flat_map(|group| [["R", "G"], ["B", "A"]].map(|pair| pair.map(|c| format!("{layer}{group:02}.{c}"))));
@@ -128,7 +133,7 @@ fn ranks(image: &ReadImage, layer: &str, pixel: usize) -> Vec<(f32, f32)> {
 #[test]
 fn cryptomattes_are_those_of_the_samples_that_make_the_image() {
     let folder = shapes();
-    // One sample per pixel: the surface that it meets is that of the channels `object` and `material`
+    // With one sample per pixel, the channels `object` and `material` have the same surface
     render(folder.path(), "--cryptomatte --estimator mis -o a.exr");
     let image = read(folder.path(), "a.exr");
     let value = |name: &str, pixel: usize| {
@@ -160,7 +165,7 @@ fn cryptomattes_are_those_of_the_samples_that_make_the_image() {
     }
     assert_eq!(seen.len(), 5, "{seen:?}");
 
-    // The entries that readers look for, by the first seven digits of the hash of the layer's name
+    // Metadata entries, keyed by the first seven digits of the hash of the layer's name
     let key = |layer: &str, entry: &str| {
         let digits = format!("{:08x}", hash(layer));
         image.metadata[&format!("cryptomatte/{}/{entry}", &digits[..7])].clone()
@@ -178,6 +183,7 @@ fn cryptomattes_are_those_of_the_samples_that_make_the_image() {
 
 #[test]
 fn coverage_is_a_share_of_samples_and_survives_parts_and_compression() {
+    // One file with the ids among other layers, one with separate parts, lossy compression and 16 bits
     let folder = shapes();
     let common = "--cryptomatte=object --spp 16 --estimator mis --threads";
     render(folder.path(), &format!("{common} 1 -o a.exr"));
@@ -185,6 +191,8 @@ fn coverage_is_a_share_of_samples_and_survives_parts_and_compression() {
         folder.path(),
         &format!("{common} 2 --tile-size 7 -o b.exr --exr-parts multi --exr-compression dwaa --exr-type half"),
     );
+
+    // Parts and their storage
     let image = read(folder.path(), "a.exr");
     let headers = read_headers(&folder.path().join("b.exr")).unwrap();
     let names: Vec<&str> = headers.iter().map(|h| h.name.as_str()).collect();
@@ -197,6 +205,8 @@ fn coverage_is_a_share_of_samples_and_survives_parts_and_compression() {
     assert!(beauty.is_half && beauty.metadata["compression"].starts_with("dwaa"), "{:?}", beauty.metadata);
     assert!(!ids.is_half && ids.metadata["compression"] == "zip");
     assert!(beauty.metadata.keys().any(|key| key.starts_with("cryptomatte/")));
+
+    // Ids and coverages are the same in both; colours only roughly
     let (mut mixed, mut sum, mut depth) = (0, 0.0, 0);
     for pixel in 0..48 * 32 {
         let ranked = ranks(&image, "CryptoObject", pixel);
@@ -215,6 +225,8 @@ fn coverage_is_a_share_of_samples_and_survives_parts_and_compression() {
         assert!((value(&image, "G") - value(&beauty, "G")).abs() < 0.05 * value(&image, "G").max(0.1));
     }
     assert!(mixed > 20 && sum > 300.0 && (sum as usize) < depth, "{mixed} {sum} {depth}");
+
+    // Lossy compression of ids in one part is refused
     let wrong = "render scene.pbrt --cryptomatte --exr-compression dwaa -o c.exr";
     assert_eq!(command(folder.path(), wrong).output().unwrap().status.code(), Some(2));
 }
@@ -232,7 +244,7 @@ fn exr_files_have_the_standard_attributes_of_openexr() {
         let start = bytes.windows(name.len()).position(|w| w == name.as_bytes()).unwrap() + name.len() + 10 + 4 * index;
         f32::from_le_bytes(bytes[start..start + 4].try_into().unwrap())
     };
-    // The camera stands at z = -6 and looks along +z: the origin is in the middle of the image, 6 ahead
+    // The camera is at z = -6 and points along +z: the origin is in the middle of the image, 6 ahead
     assert_eq!([12, 13, 14, 15].map(|i| value("worldToCamera", i).abs()), [0.0, 0.0, 6.0, 1.0]);
     let [x, y, w] = [12, 13, 15].map(|i| value("worldToNDC", i));
     assert!((x / w - 0.5).abs() < 1e-6 && (y / w - 0.5).abs() < 1e-6, "{x} {y} {w}");

@@ -1,4 +1,4 @@
-//! Renderings whose images cannot be written where they should be.
+//! Renderings whose images cannot be written to their destinations.
 
 use lumiris::imaging::oiio::{ReadLimits, read_image};
 use std::path::{Path, PathBuf};
@@ -8,7 +8,7 @@ const SCENE: &str = "Film \"rgb\" \"integer xresolution\" [ 64 ] \"integer yreso
                      Sampler \"independent\" \"integer pixelsamples\" [ 1 ]\nWorldBegin\nLightSource \"infinite\"\n\
                      Translate 0 0 3\nShape \"sphere\"\n";
 
-/// The place that a message names.
+/// Path of the rescued copy in a message.
 fn rescued(output: &Output, name: &str, temporary: &Path) -> PathBuf {
     let text = String::from_utf8_lossy(&output.stderr);
     let lines: Vec<&str> = text.lines().filter(|line| line.contains(name) && line.contains("; it is in ")).collect();
@@ -26,7 +26,7 @@ fn an_image_whose_folder_vanished_while_it_was_rendered_is_in_the_temporary_fold
     for name in ["out", "tmp"] {
         std::fs::create_dir(path(name)).unwrap();
     }
-    // The scene comes through a pipe, which the program opens once it has checked its outputs
+    // The scene comes through a pipe, which the program opens after it has checked its outputs
     assert!(Command::new("mkfifo").arg(path("scene.pbrt")).status().unwrap().success());
     let child = Command::new(env!("CARGO_BIN_EXE_lumiris"))
         .args(["render", "scene.pbrt", "-o", "out/a.exr", "-o", "b.png"])
@@ -48,7 +48,7 @@ fn an_image_whose_folder_vanished_while_it_was_rendered_is_in_the_temporary_fold
 
 #[test]
 fn an_image_that_does_not_fit_on_the_disk_is_in_the_temporary_folder() {
-    // A disk of 40 kB, which only this process and its children see
+    // A disk of 40 kB, visible only to this process and its children
     let script = "mkdir disk tmp && mount -t tmpfs -o size=40k none disk && exec \"$0\" render scene.pbrt -o disk/a.exr \
                   --resolution 256x192";
     let unshare = |args: &[&str], folder: &Path| {
@@ -58,7 +58,7 @@ fn an_image_that_does_not_fit_on_the_disk_is_in_the_temporary_folder() {
     };
     let folder = tempfile::tempdir().unwrap();
     if !unshare(&["true"], folder.path()).status.success() {
-        // Some systems do not let users mount; the message is tested without a disk as well, in `rescue.rs`
+        // Some systems do not let users mount. `rescue.rs` tests the message without a disk
         return;
     }
     std::fs::write(folder.path().join("scene.pbrt"), SCENE).unwrap();

@@ -1,4 +1,4 @@
-//! What the program says: of files that are not what a command wants, and of the samples and the noise of an image.
+//! Messages about unsuitable files, and about samples and noise of an image.
 
 use super::parts::{image, lumiris, refuse, run};
 use super::program::stderr;
@@ -32,7 +32,7 @@ fn samples_are_told_by_their_mean_and_range() {
     let counts = || samples.image.data.iter().skip(channel).step_by(samples.image.channels.len()).copied();
     let expected = f64::from(counts().sum::<f32>()) / counts().count() as f64;
     assert!((mean.parse::<f64>().unwrap() - expected).abs() <= 0.05 + 1e-9, "{text}, but {expected}");
-    // Looks have a part of the time of 64 samples
+    // Additional emission rays take part of the time of 64 samples
     assert!((40.0..68.0).contains(&expected), "{expected}");
     assert!(said.contains("; adaptive sampling"), "{said}");
     let [least, most] = [counts().fold(f32::INFINITY, f32::min), counts().fold(0.0, f32::max)];
@@ -47,6 +47,7 @@ fn samples_are_told_by_their_mean_and_range() {
 
 #[test]
 fn images_are_described_and_not_read_as_scenes() {
+    // Info
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
     run("render GALLERY --resolution 16x9 --estimator mis --spp 2 -q -o a.exr -o a.png -o a.part", folder);
@@ -59,6 +60,8 @@ fn images_are_described_and_not_read_as_scenes() {
             "{name}"
         );
     }
+
+    // Images and meshes are no scenes
     refuse("render a.exr -o b.exr", folder, 2, &["a.exr is an image, not a scene", "lumiris info a.exr"]);
     refuse("render a.ply -o b.exr", folder, 2, &["a.ply is a mesh, not a scene", "plymesh"]);
     refuse("info a.OBJ", folder, 2, &["a.OBJ is a mesh, not a scene", "convert it to PLY"]);
@@ -86,7 +89,7 @@ fn what_can_hardly_be_meant_is_said() {
     let (code, rough) = said("Material \"conductor\" \"float vroughness\" -1 \"float uroughness\" 0.1");
     assert!(code == Some(3) && rough.contains("vroughness must be at least 0, not -1"), "{rough}");
     assert_eq!(rough.matches("must be at least 0").count(), 1, "{rough}");
-    // What else a mesh without vertices has is no error of its own
+    // Other errors of a mesh without vertices are not reported
     let (code, empty) = said("Shape \"trianglemesh\" \"integer indices\" [ 0 1 2 ]");
     assert!(code == Some(3) && empty.contains("needs `point3 P`") && !empty.contains("has no parameter"), "{empty}");
 }
@@ -123,7 +126,7 @@ fn options_without_effect_are_named() {
         stderr(&lumiris("render GALLERY --resolution 8x6 --spp 1 -o a.exr --estimator mis --exposure 1", folder));
     assert_eq!(warnings(&said), ["--exposure"], "{said}");
 
-    // In a scene file, with the place
+    // In a scene file, with the position
     let head = "Integrator \"direct\" \"integer maxdepth\" 7\n  \"string estimator\" \"mis\" \"integer proposals\" 4";
     std::fs::write(folder.join("s.pbrt"), format!("{head}\nWorldBegin\nLightSource \"infinite\"\n")).unwrap();
     let said = stderr(&lumiris("render s.pbrt --resolution 8x6 --spp 1 -q -o a.png", folder));
@@ -164,6 +167,6 @@ fn there_is_a_sample_however_little_time_there_is() {
     let file = image("a.exr", folder);
     let channel = file.image.channel("samples").unwrap();
     assert!(file.image.data.iter().skip(channel).step_by(file.image.channels.len()).all(|&n| n >= 1.0));
-    // An image of few samples, as far as pilots are concerned
+    // The pilots' sample count for such a short time
     assert_eq!(file.metadata["lumiris:pilot_spp"], "1");
 }

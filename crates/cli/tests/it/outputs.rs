@@ -1,4 +1,4 @@
-//! Where outputs go: through symbolic links, onto files that are read-only, to a full disk and to a closed pipe.
+//! Destinations of outputs: symbolic links, read-only files, a full disk and a closed pipe.
 
 use super::program::{command, folder_with, read, stderr};
 use std::fs::{self, File, Permissions};
@@ -30,7 +30,7 @@ fn outputs_go_to_where_symbolic_links_lead() {
     for name in names {
         symlink(format!("far/{name}"), folder.join(name)).unwrap();
     }
-    // One of them is there, and others may not read it
+    // One file exists, and others may not read it
     fs::write(far.join("a.exr"), "an image of yesterday").unwrap();
     fs::set_permissions(far.join("a.exr"), Permissions::from_mode(0o600)).unwrap();
 
@@ -65,7 +65,7 @@ fn a_file_without_write_permission_is_refused_before_anything_is_done() {
     }
     symlink("a.exr", folder.join("link.exr")).unwrap();
     let before = names_in(folder);
-    // What follows the outputs would be an error as well, or take long
+    // Later arguments would be an error as well, or take long
     let commands = [
         ("a.exr", "render gone.pbrt -o b.exr -o a.exr"),
         ("link.exr", "render gone.pbrt -o link.exr"),
@@ -118,7 +118,7 @@ fn printing_to_a_full_disk_is_an_error() {
         assert_eq!(output.status.code(), Some(3), "{args}: {said}");
         assert!(said.contains("cannot write to the standard output: No space left on device"), "{args}: {said}");
     }
-    // Files are there nevertheless
+    // Files are written nevertheless
     let full = File::options().write(true).open("/dev/full").unwrap();
     let args = "compare i.exr -r i.exr --metrics mse --json a.json --html page";
     assert_eq!(command(folder, args).stdout(full).output().unwrap().status.code(), Some(3));

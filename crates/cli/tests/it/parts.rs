@@ -1,11 +1,12 @@
-//! Parts of images: merged, they have the bits of the image rendered at once; what does not belong together is refused.
+//! Parts of images: merged, they have the bits of the image rendered at once; parts that do not belong together are
+//! refused.
 
 use super::program::{self, stderr};
 use lumiris::imaging::oiio::ReadImage;
 use std::path::Path;
 use std::process::{Command, Output};
 
-/// The program with arguments in one text, where the last of equal options counts and GALLERY is a scene.
+/// The program with arguments in one text. The last of repeated options counts. GALLERY is a scene.
 pub(crate) fn command(args: &str, folder: &Path) -> Command {
     let gallery = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes/demo/gallery.pbrt");
     let mut words: Vec<String> = Vec::new();
@@ -32,7 +33,7 @@ pub(crate) fn run(args: &str, folder: &Path) {
     assert!(output.status.success(), "{args}: {}", stderr(&output));
 }
 
-/// Runs the program, which must fail with the exit code and say all of the words.
+/// Runs the program, which must fail with the exit code and print all of the words.
 pub(crate) fn refuse(args: &str, folder: &Path, code: i32, words: &[&str]) {
     let output = lumiris(args, folder);
     let said = stderr(&output);
@@ -61,7 +62,7 @@ pub(crate) fn assert_same(a: &str, b: &str, folder: &Path, what: &str) {
     assert!(channels.is_empty(), "{what}: {} of {} values differ, first in {}", channels.len(), a.len(), channels[0]);
 }
 
-/// Integrators and estimators, and whether the samples of a pixel can be divided.
+/// Integrators and estimators; true if the samples of a pixel can be divided.
 pub(crate) const METHODS: &[(&str, bool)] = &[
     ("--integrator path --estimator mis", true),
     ("--integrator path --estimator mis --path-reuse 3", true),
@@ -89,7 +90,6 @@ fn merged_parts_have_the_bits_of_the_single_image_whatever_the_method_and_the_sp
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
     for (k, (method, allows_samples)) in METHODS.iter().enumerate() {
-        // The numbers of samples of different pixels are not the same thing as a plan of pilots
         run(&format!("{IMAGE} {method} -o single.exr"), folder);
         let by_tiles =
             ["--part 1/3 --part-by tiles", "--part 2/3 --part-by tiles --threads 1", "--part 3/3 --part-by tiles"];
@@ -101,12 +101,12 @@ fn merged_parts_have_the_bits_of_the_single_image_whatever_the_method_and_the_sp
             "--samples-from 6 --part 1/2 --part-by tiles",
         ];
         let splits: &[&[&str]] = match allows_samples {
-            // Pixels share paths with others in all tiles
+            // Paths are shared by pixels of different tiles
             _ if method.contains("path-reuse") => &[&by_share],
             true => &[&by_tiles, &by_share, &by_hand],
             false => &[&by_tiles],
         };
-        // Each way of dividing for each method would take long; all for the first ones, then in turn
+        // All splits for the first methods, then one per method in turn
         let chosen = |i: &usize| k < 2 || *i == k % splits.len();
         for (i, split) in splits.iter().enumerate().filter(|(i, _)| chosen(i)) {
             for (p, part) in split.iter().enumerate() {
@@ -160,7 +160,7 @@ fn layers_of_light_groups_are_those_of_the_single_image() {
     run(&format!("{render} --resume c.film --threads 1 -o resumed.exr"), folder);
     assert_same("single.exr", "resumed.exr", folder, "resumed");
 
-    // What cannot have layers says so, and is rendered without
+    // An integrator without support for these layers prints a warning
     let output = lumiris(&format!("{render} --integrator irradiance-cache --cache-samples 8 -o cache.exr"), folder);
     assert!(output.status.success() && stderr(&output).contains("light groups have no layers"), "{}", stderr(&output));
     assert!(!image("cache.exr", folder).image.channels.iter().any(|name| name.starts_with("light_")));
@@ -208,7 +208,7 @@ fn what_a_plan_has_chosen_is_the_same_for_all_parts() {
     run("merge 2.part 1.part -o merged.exr", folder);
     assert_same("single.exr", "merged.exr", folder, "by a plan");
 
-    // The same command starts and goes on; another plan is another image
+    // The same command starts and resumes; another plan makes another image
     for _ in 0..2 {
         run(&format!("{planned} --checkpoint c.film --resume c.film -o resumed.exr"), folder);
         assert_same("single.exr", "resumed.exr", folder, "by a plan, resumed");
@@ -222,6 +222,7 @@ fn what_a_plan_has_chosen_is_the_same_for_all_parts() {
 
 #[test]
 fn what_cannot_be_divided_is_refused_with_the_reason() {
+    // Options and settings
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
     let render = format!("{IMAGE} --integrator direct --estimator mis");
@@ -241,11 +242,15 @@ fn what_cannot_be_divided_is_refused_with_the_reason() {
         refuse(&format!("{render} {options}"), folder, 2, &words);
         assert!(!folder.join("a.part").exists());
     }
+
+    // Shared paths
     for shared in ["--estimator mis --path-reuse 3", "--estimator auto --resolution 40x40"] {
         let part = format!("{IMAGE} --integrator path {shared} --part 1/2 --part-by tiles -o a.part");
         refuse(&part, folder, 2, &["share paths", "--part-by samples", "--path-reuse 1"]);
     }
     run(&format!("{IMAGE} --integrator path --part 1/2 --part-by tiles --path-reuse 1 -o a.part"), folder);
+
+    // Checkpoints
     refuse(&format!("{render} --checkpoint no/a -o a.exr"), folder, 3, &["no/a", "does not exist"]);
     refuse(&format!("{render} --resume no -o a.exr"), folder, 3, &["no: ", "No such file"]);
 }
@@ -260,7 +265,7 @@ fn parts_without_pixels_are_parts_and_times_beyond_all_bounds_are_never() {
     run("merge 2.part 1.part 3.part -q -o merged.exr", folder);
     assert_same("single.exr", "merged.exr", folder, "of one tile");
     refuse("merge 2.part 3.part -o m.exr", folder, 3, &["samples 0 to 7 of all pixels"]);
-    // Nothing of the image is there
+    // All parts with pixels are missing
     run("merge 2.part 3.part --allow-missing -q -o black.exr", folder);
     run("merge c.film -q -o checkpoint.exr", folder);
     assert_same("single.exr", "checkpoint.exr", folder, "a checkpoint");
@@ -319,7 +324,7 @@ fn missing_double_and_foreign_parts_are_named() {
         panic!("{}", stderr(&output));
     }
 
-    // What there is
+    // Merges existing parts
     run("merge 3.part 1.part --allow-missing -o some.exr", folder);
     let some = image("some.exr", folder);
     assert_eq!(some.metadata["lumiris:complete"], "false");
@@ -345,7 +350,7 @@ fn parts_that_are_cut_off_or_changed_are_errors_with_the_name_of_the_file() {
         merge(&good[..end]);
     }
     merge(&[&good[..], &[0]].concat());
-    // Every byte counts: some of each region
+    // Every byte is checked: test some of each region
     for at in (0..40).chain((40..len).step_by(len / 60)).chain(len - 25..len) {
         let mut bytes = good.clone();
         bytes[at] ^= 1 << (at % 8);

@@ -1,4 +1,4 @@
-//! Plans: what a rendering chose, given to another one.
+//! Plans: the choices of one rendering, used by another.
 
 use lumiris::imaging::oiio::{ReadImage, ReadLimits, read_image};
 use std::path::Path;
@@ -44,7 +44,7 @@ fn a_plan_gives_the_image_of_the_rendering_that_made_it_to_the_bit() {
     assert!(bits(&auto) == bits(&planned));
     assert_eq!(auto.metadata["lumiris:estimator"], planned.metadata["lumiris:estimator"]);
 
-    // Options override it
+    // Options take precedence over the plan
     let other = render(&["--plan", "plan.json", "--estimator", "mc", "--samples", "1"], "other.exr", folder.path());
     assert_eq!(other.metadata["lumiris:estimator"], "mc");
     assert_eq!(other.metadata["lumiris:samples"], "1");
@@ -67,6 +67,7 @@ fn the_plan_of_a_scene_is_stored_with_what_it_follows_from() {
 
 #[test]
 fn a_plan_of_another_image_is_used_with_a_warning() {
+    // Plans and the warnings about them
     let folder = tempfile::tempdir().unwrap();
     let plan = |scene: &str, image: &str| {
         format!(r#"{{"version": "1", "scene": "{scene}", "image": {image}, "settings": {{"estimator": "mis"}}}}"#)
@@ -83,6 +84,7 @@ fn a_plan_of_another_image_is_used_with_a_warning() {
         (plan("a/fog.pbrt", "[8, 6, 1]"), Some("was made for a/fog.pbrt:")),
         (plan("gallery.pbrt", "[80, 60, 16]"), Some("was made for 80x60 pixels with 16 samples:")),
     ] {
+        // Render with each plan
         std::fs::write(folder.path().join("plan.json"), text).unwrap();
         let output = lumiris(&[&["render", &gallery(), "--plan", "plan.json"], &small[..]].concat(), folder.path());
         assert!(output.status.success(), "{}", stderr(&output));
@@ -95,6 +97,7 @@ fn a_plan_of_another_image_is_used_with_a_warning() {
 
 #[test]
 fn what_is_no_plan_is_an_error_that_says_why() {
+    // Broken plans
     let folder = tempfile::tempdir().unwrap();
     let path = gallery();
     let wrong = [
@@ -110,6 +113,8 @@ fn what_is_no_plan_is_an_error_that_says_why() {
         assert!(stderr(&output).contains("plan.json") && stderr(&output).contains(message), "{}", stderr(&output));
         assert!(!folder.path().join("a.exr").exists());
     }
+
+    // Settings for which no plan can be made
     let output = lumiris(&["render", &path, "--noise", "0.1", "--integrator", "photon-map", "-q"], folder.path());
     assert_eq!(output.status.code(), Some(2), "{}", stderr(&output));
     assert!(stderr(&output).contains("--noise needs"), "{}", stderr(&output));
@@ -120,7 +125,7 @@ fn noise_is_reached_with_samples_where_they_are_needed() {
     let folder = tempfile::tempdir().unwrap();
     let path = gallery();
     let image = |noise: &str, name: &str| {
-        // Trials would differ between both
+        // Trials could choose differently for the two
         let size = ["--resolution", "64x48", "--estimator", "mis", "--samples", "2"];
         let args = ["render", &path, "--integrator", "direct", "--noise", noise, "-q", "-o", name];
         let output = lumiris(&[&args[..], &size].concat(), folder.path());

@@ -1,4 +1,4 @@
-//! The program as tests run it.
+//! Runs the program in tests.
 
 use lumiris::imaging::oiio::{ReadImage, ReadLimits, read_image};
 use std::path::Path;
@@ -12,19 +12,19 @@ pub(crate) fn folder_with(scene: &str) -> TempDir {
     folder
 }
 
-/// The program in a folder, with arguments in one text.
+/// The program with arguments in one text.
 pub(crate) fn command(folder: &Path, args: &str) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_lumiris"));
     command.args(args.split_whitespace()).current_dir(folder);
     command
 }
 
-/// Its messages.
+/// Standard error as text.
 pub(crate) fn stderr(output: &Output) -> String {
     String::from_utf8_lossy(&output.stderr).into_owned()
 }
 
-/// An image of a folder.
+/// Reads an image.
 pub(crate) fn read(folder: &Path, name: &str) -> ReadImage {
     read_image(&folder.join(name), &ReadLimits::default()).unwrap()
 }

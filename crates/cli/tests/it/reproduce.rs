@@ -1,4 +1,4 @@
-//! `lumiris reproduce` from outside: a page and a file of numbers with every figure.
+//! `lumiris reproduce` from outside: the page and the JSON file contain every figure.
 
 use serde_json::Value;
 use std::path::{Path, PathBuf};
@@ -17,17 +17,17 @@ const FAN_FIGURES: [&str; 4] = ["checkers", "statue", "room", "box"];
 
 const PHOTON_FIGURES: [&str; 4] = ["rooms", "ring", "slit", "direct"];
 
-/// Files that the page shows.
+/// Files referenced by the page.
 fn sources(html: &str) -> Vec<&str> {
     html.split("src=\"").skip(1).filter_map(|rest| rest.split('"').next()).collect()
 }
 
-/// A number of the file of numbers.
+/// A number from the JSON file.
 fn number(of: &Value, key: &str) -> f64 {
     of[key].as_f64().unwrap_or_else(|| panic!("{key} of {of}"))
 }
 
-/// A number and its standard error.
+/// A number with its standard error.
 fn estimate(of: &Value, key: &str) -> [f64; 2] {
     ["value", "standard_error"].map(|part| number(&of[key], part))
 }
@@ -36,24 +36,24 @@ fn reached(summary: &Value) -> bool {
     summary["reached"].as_bool().unwrap()
 }
 
-/// The reduction in percent that a row asks for.
+/// Target reduction of a row (percent).
 fn asked(summary: &Value) -> f64 {
     let target = summary["target"].as_str().unwrap();
     target.trim_start_matches('−').split(' ').next().unwrap().parse().unwrap()
 }
 
-/// True if what is left of 1 is the reduction that a row asks for.
+/// True if `left`, the remaining fraction, is at most 1 minus the target reduction.
 fn is_reduced(summary: &Value, left: f64) -> bool {
     left > 0.0 && (1.0 - left) * 100.0 >= asked(summary)
 }
 
-/// All rows of the table at the top.
+/// All rows of the summary table.
 fn summaries(numbers: &Value) -> Vec<&Value> {
     let figures = numbers["figures"].as_object().unwrap().values();
     figures.flat_map(|f| std::iter::once(&f["summary"]).chain(f["also"].as_object().unwrap().values())).collect()
 }
 
-/// The page and the file of numbers have the same verdicts.
+/// The page and the JSON file have the same verdicts.
 fn assert_same_verdicts(html: &str, numbers: &Value) {
     let rows = summaries(numbers);
     for (good, cell) in [(true, "<td class=\"good\">yes</td>"), (false, "<td class=\"bad\">no</td>")] {
@@ -62,7 +62,7 @@ fn assert_same_verdicts(html: &str, numbers: &Value) {
     }
 }
 
-/// A sky, a lamp, a floor and a ball, by the names of the scenes.
+/// A sky, a lamp, a floor and a ball, under the names of the original scenes.
 fn write_scenes(folder: &Path) {
     let head = "LookAt 0 1.6 -4.6  0 0.6 0  0 1 0\nCamera \"perspective\" \"float fov\" [ 34 ]\nWorldBegin\n";
     let sky = "LightSource \"infinite\" \"rgb L\" [ 0.3 0.4 0.6 ]\n";
@@ -75,7 +75,7 @@ fn write_scenes(folder: &Path) {
     }
 }
 
-/// Reproduces a paper on the scenes of a folder: the page's folder, its text, and its numbers.
+/// Reproduces a paper with the scenes of a folder. Returns the page's folder, its text, and its numbers.
 fn reproduced(paper: &str, folder: &Path) -> (PathBuf, String, Value) {
     let output = Command::new(env!("CARGO_BIN_EXE_lumiris"))
         .args(["reproduce", paper, "--out", "page", "--quick", "--size", "16", "--scenes", ".", "-q"])
@@ -104,7 +104,7 @@ fn the_page_and_the_numbers_hold_every_figure() {
         for m in methods.into_iter().flatten() {
             assert_eq!(m["invalid_samples"], 0, "{id} {}", m["name"]);
             assert!(m["at_equal_time"]["value"].as_f64().unwrap() > 0.0, "{id} {}", m["name"]);
-            // All methods are unbiased; of some fifty none has a mean this far off by chance.
+            // All methods are unbiased; the probability that one of some fifty means is this far off is small
             assert!(m["same_mean_p"].as_f64().unwrap() > 1e-6, "{id} {}", m["name"]);
         }
     }
@@ -117,7 +117,7 @@ fn the_page_and_the_numbers_hold_every_figure() {
     }
 }
 
-/// Each verdict is what the numbers beside it say.
+/// Each verdict follows from the numbers.
 fn assert_verdicts_of_resampling(figures: &Value) {
     for id in ["paper-figure-4", "paper-figure-4-lights", "thesis-figure-5.3"] {
         let (summary, n) = (&figures[id]["summary"], &figures[id]["numbers"]);
@@ -130,7 +130,7 @@ fn assert_verdicts_of_resampling(figures: &Value) {
         assert_eq!(reached(summary), expected(summary, "judged"), "{id}");
         let also: Vec<&Value> = figures[id]["also"].as_object().unwrap().values().collect();
         if id == "thesis-figure-5.3" {
-            // With M = N nothing is resampled: the verdict is that of the thesis's M and N
+            // With M = N nothing is resampled, so the verdict uses the thesis's M and N
             let judged = method("judged");
             assert_eq!((number(judged, "proposals"), number(judged, "samples")), (229.0, 64.0));
             assert_eq!(reached(also[0]), expected(also[0], "equal_halves"));
@@ -138,7 +138,7 @@ fn assert_verdicts_of_resampling(figures: &Value) {
         assert_eq!(also.len(), usize::from(id == "thesis-figure-5.3"), "{id}");
     }
 
-    // Systematic samples and stratified proposals leave a quarter of the variance, with an error of a tenth of that
+    // Systematic samples and stratified proposals leave a quarter of the variance, with a relative error of a tenth
     let figure = &figures["thesis-figure-5.4"];
     let methods = figure["numbers"]["methods"].as_array().unwrap();
     let [[none, none_error], [systematic, error]] = [0, 4].map(|i| estimate(&methods[i], "variance"));
@@ -156,7 +156,7 @@ fn assert_verdicts_of_resampling(figures: &Value) {
     assert!(ratios.len() == 2 && ratios.iter().all(|&r| r > 0.9 / 20.0), "{ratios:?}");
 }
 
-/// A lamp, a floor and a ball, by the names of the scenes of optimizing control variates.
+/// A lamp, a floor and a ball, under the names of the scenes of optimizing control variates.
 fn write_fan_scenes(folder: &Path) {
     write_scenes(folder);
     let scene = folder.join("statue-lights.pbrt");
@@ -167,6 +167,7 @@ fn write_fan_scenes(folder: &Path) {
 
 #[test]
 fn the_page_of_control_variates_holds_every_scene_and_method() {
+    // Figures
     let folder = tempfile::tempdir().unwrap();
     write_fan_scenes(folder.path());
     let (page, html, numbers) = reproduced("fan", folder.path());
@@ -189,6 +190,8 @@ fn the_page_of_control_variates_holds_every_scene_and_method() {
         }
         assert_verdicts_of_control_variates(id, figure, methods);
     }
+
+    // Stratification, verdicts and images
     let all = |id: &str| &figures[id]["numbers"]["methods"].as_array().unwrap()[..];
     assert_stratification_helps(&["checkers", "statue", "room"].map(all));
     assert_same_verdicts(&html, &numbers);
@@ -199,14 +202,15 @@ fn the_page_of_control_variates_holds_every_scene_and_method() {
     }
 }
 
-/// Methods of each of the three ways to draw samples with every light alike; `mis` comes first.
+/// Number of methods for each of the three sampling strategies with uniform light selection; `mis` is the first.
 const ROLES: usize = 10;
-/// Places of those without bias, and of `ocv` in the form `paper`.
+/// Indices of unbiased methods.
 const UNBIASED: [usize; 7] = [0, 1, 2, 4, 7, 8, 9];
+/// Index of `ocv` in the form `paper`, which is biased.
 const PAPER: usize = 3;
-/// Places of progressive `ocv` in each of the ways: three with lights alike, three by the light tree.
+/// Indices of progressive `ocv`: with uniform light selection for each strategy, then with the light tree for each.
 const PROGRESSIVE: [usize; 6] = [2, ROLES + 2, 2 * ROLES + 2, 3 * ROLES + 1, 3 * ROLES + 3, 3 * ROLES + 5];
-/// Half the width of a 95 % confidence interval over the standard error, for the four turns of a quick page.
+/// Half the width of a 95 % confidence interval over the standard error, for four renderings (a quick page).
 const STUDENT: f64 = 3.18;
 
 /// The bias of the mean luminance, and its standard error.
@@ -214,8 +218,8 @@ fn bias(m: &Value) -> [f64; 2] {
     [number(&m["bias"], "value"), number(&m["bias"], "half_width_95") / STUDENT]
 }
 
-/// Means are those of the reference within six standard errors, pooled over the methods of a way, since each is from
-/// four turns: 0.2 to 1 % of the mean. The same bound finds the form `paper`, which loses 3 to 10 %.
+/// Means agree with the reference within six standard errors, pooled over the methods of a strategy, since each is from
+/// four replicas: 0.2 to 1 % of the mean. The same bound detects the bias of the form `paper`, which loses 3 to 10 %.
 fn assert_biases(id: &str, methods: &[Value]) {
     let pooled = UNBIASED.iter().map(|&i| bias(&methods[i])[1].powi(2)).sum::<f64>() / UNBIASED.len() as f64;
     let bound = 6.0 * pooled.sqrt();
@@ -226,8 +230,8 @@ fn assert_biases(id: &str, methods: &[Value]) {
     assert!(bias(&methods[PAPER])[0] < -bound, "{id}: {bound} does not find the bias of paper");
 }
 
-/// No method without bias has twice the error of `mis` with independent samples: what was measured is below 1.3 times,
-/// and six standard errors are for chance.
+/// No unbiased method has twice the error of `mis` with independent samples. Measured ratios are below 1.3; six
+/// standard errors allow for chance.
 fn assert_errors(id: &str, methods: &[Value]) {
     let [independent, _] = estimate(&methods[2 * ROLES], "error");
     for way in 0..3 {
@@ -240,8 +244,8 @@ fn assert_errors(id: &str, methods: &[Value]) {
     }
 }
 
-/// Stratified samples have less error than independent ones, by any way to stratify them: 0.45 to 0.7 times in the
-/// geometric mean of three scenes, each of which has an error of a tenth or two.
+/// Stratified samples have less error than independent ones, with both kinds of stratification: 0.45 to 0.7 times in
+/// the geometric mean of three scenes, each with a relative error of 0.1 to 0.2.
 fn assert_stratification_helps(scenes: &[&[Value]]) {
     for stratified in [0, ROLES] {
         let ratio = |methods: &&[Value]| {
@@ -253,9 +257,9 @@ fn assert_stratification_helps(scenes: &[&[Value]]) {
     }
 }
 
-/// The cache has few records in an image of 16 × 16 pixels, and interpolates the edges of shadows: its errors are 74 to
-/// 87 with standard errors of up to 13, and it is 2 ± 0.3 % darker than paths. What the estimators differ by is their
-/// own.
+/// The cache has few records in an image of 16 × 16 pixels, and interpolates across shadow edges: its errors are 74 to
+/// 87 with standard errors of up to 13, and it is 2 ± 0.3 % darker than path tracing. Differences between estimators
+/// are the estimators' own.
 fn assert_box(methods: &[Value]) {
     let [of_mis, its_error] = bias(&methods[0]);
     assert!(of_mis.abs() < 0.04, "interpolation changes the mean by {of_mis}");
@@ -271,8 +275,9 @@ fn assert_box(methods: &[Value]) {
     assert!(beyond(&methods[PAPER]) > 0.0, "the bound does not find the bias of paper");
 }
 
-/// Each verdict is what the numbers say.
+/// Each verdict follows from the numbers.
 fn assert_verdicts_of_control_variates(id: &str, figure: &Value, methods: &[Value]) {
+    // Rows of the summary table
     let mut rows = vec![&figure["summary"]];
     if id != "box" {
         let also = figure["also"].as_object().unwrap();
@@ -282,6 +287,8 @@ fn assert_verdicts_of_control_variates(id: &str, figure: &Value, methods: &[Valu
         rows.extend(by_tree.iter().map(|way| &also[way.as_str()]));
         assert_eq!(also.len() + 1, rows.len());
     }
+
+    // Verdicts on progressive `ocv`
     for (row, place) in rows.into_iter().zip(PROGRESSIVE) {
         let m = &methods[place];
         assert_eq!(m["name"], "ocv, progressive");
@@ -289,6 +296,8 @@ fn assert_verdicts_of_control_variates(id: &str, figure: &Value, methods: &[Valu
         let expected = is_reduced(row, estimate(m, "relative_error")[0]) && is_efficient;
         assert_eq!(reached(row), expected, "{id}: {row}");
     }
+
+    // Light samplers and strategies of all methods
     for (k, m) in methods.iter().enumerate().filter(|_| id != "box") {
         let (light_sampler, points) = (m["light_sampler"].as_str().unwrap(), m["points"].as_str().unwrap());
         assert_eq!(light_sampler, if k < 3 * ROLES { "uniform" } else { "tree" }, "{id} {k}");
@@ -298,7 +307,7 @@ fn assert_verdicts_of_control_variates(id: &str, figure: &Value, methods: &[Valu
     }
 }
 
-/// The scenes of the repository; the rooms with many lights are those with few.
+/// The scenes of the repository; the rooms with few lights also serve as those with many.
 fn write_photon_scenes(folder: &Path) {
     let scenes = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes/keller-wald");
     for name in ["rooms", "ring", "ring-indirect", "ring-geometry", "slit"] {
@@ -324,20 +333,19 @@ fn the_page_of_photon_maps_holds_every_figure_and_its_maps() {
     let maps = |figure: &Value| figure["maps"].as_array().unwrap().clone();
     let count = number;
 
-    // Importance brings photons into the room, and not more of them into the map
+    // Importance increases the photons traced in the room, but not the photons stored in the map
     let rooms = maps(&figures["rooms"]["numbers"]);
     assert_eq!(rooms.len(), 4);
     for pair in rooms.chunks(2) {
         assert!(count(&pair[1], "photons_in_room") > 5.0 * count(&pair[0], "photons_in_room"));
-        // Each number is that of a pilot of 1024 photons or more, a few of which belong to a path: 5 standard
-        // deviations
+        // Each number is from a pilot of 1024 photons or more, with a few photons per path: 5 standard deviations
         let ratio = count(&pair[1], "photons") / count(&pair[0], "photons");
         assert!((ratio - 1.0).abs() < 5.0 * (2.0 * 5.0 / 1024.0_f64).sqrt(), "{ratio}");
     }
     let slit = maps(&figures["slit"]["numbers"]);
     assert!(count(&slit[2], "photons_in_room") > count(&slit[0], "photons_in_room"));
 
-    // The global map stays, the caustic map grows
+    // The size of the global map is constant, the caustic map grows
     for scene in figures["ring"]["numbers"]["scenes"].as_array().unwrap() {
         let maps = maps(scene);
         for pair in maps.windows(2) {
@@ -346,7 +354,7 @@ fn the_page_of_photon_maps_holds_every_figure_and_its_maps() {
         }
     }
 
-    // Direct light is the same by every method without bias
+    // Unbiased methods agree on direct light
     for scene in ["few", "many"] {
         for m in figures["direct"]["numbers"][scene]["methods"].as_array().unwrap() {
             assert_eq!(m["invalid_samples"], 0, "{}", m["name"]);
@@ -361,7 +369,7 @@ fn the_page_of_photon_maps_holds_every_figure_and_its_maps() {
     }
 }
 
-/// Each verdict is what the numbers say.
+/// Each verdict follows from the numbers.
 fn assert_verdicts_of_photon_maps(figures: &Value) {
     let errors =
         |of: &Value| -> Vec<f64> { of["maps"].as_array().unwrap().iter().map(|m| number(m, "error")).collect() };
@@ -375,8 +383,7 @@ fn assert_verdicts_of_photon_maps(figures: &Value) {
         assert_eq!(reached(row), errors.windows(2).all(|pair| pair[1] < pair[0]), "{errors:?}");
     }
 
-    // The cut-off loses a third of the light or more, by far more than its noise: nobody would call that hardly
-    // perceivable
+    // The cut-off loses a third of the light or more, by far more than its noise. That is not "hardly perceivable"
     let [loss, error] = estimate(&figures["slit"]["numbers"]["maps"][2], "bias");
     assert!(loss + 3.0 * error < -0.1, "{loss} ± {error}");
     assert!(!reached(&figures["slit"]["summary"]));

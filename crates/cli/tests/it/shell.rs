@@ -13,10 +13,10 @@ fn output(program: &str, args: &[&str]) -> String {
     out.into_owned()
 }
 
-/// `make install` of the program under test, below a folder.
+/// `make install` of the program under test, into a folder.
 fn install(prefix: &Path) {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
-    // Already built, by who runs this test
+    // Already built by the test runner
     let (binary, prefix) = (format!("BINARY={BINARY}"), format!("PREFIX={}", prefix.display()));
     output("make", &["-C", &root.display().to_string(), "install", "CARGO=true", &binary, &prefix]);
 }
@@ -52,7 +52,7 @@ fn make_install_puts_program_completions_and_manual_where_shells_look() {
     assert!(page("lumiris.1").contains("lumiris\\-render(1)"), "{}", page("lumiris.1"));
     let help = output(BINARY, &["--help"]);
     let commands = help.lines().skip_while(|l| *l != "Commands:").skip(1).take_while(|l| !l.is_empty());
-    // The rest of a description may stand on a line of its own, further to the right
+    // The rest of a description may follow on a separate line, further to the right
     let names = commands.filter_map(|l| l.strip_prefix("  ")?.split(' ').next().filter(|name| !name.is_empty()));
     let names: Vec<&str> = names.collect();
     assert!(names.contains(&"render") && names.len() >= 10, "{help}");
@@ -63,11 +63,11 @@ fn make_install_puts_program_completions_and_manual_where_shells_look() {
     assert!(page("lumiris-render.1").contains("\\-\\-estimator"));
 }
 
-/// Lines of help that begin with an option.
+/// Number of help lines that begin with an option.
 fn options(help: &str) -> usize {
     let begins = |line: &&str| {
         let rest = line.trim_start();
-        // Further lines of help, which may begin with the name of another option, are indented by more
+        // Continuation lines can begin with the name of another option, but are indented more
         (1..=6).contains(&(line.len() - rest.len())) && rest.starts_with('-') && rest.contains("--")
     };
     help.lines().filter(begins).count()

@@ -1,4 +1,4 @@
-//! Watching an image while it converges: a tev that the test plays, and the page over HTTP and in the browser.
+//! Watching an image while it converges: with a simulated tev, and the page over HTTP and in the browser.
 
 use crate::browser::Browser;
 use crate::checkpoints::Random;
@@ -26,7 +26,7 @@ fn lumiris(folder: &Path, args: &str) -> Child {
     command(folder, &format!("render scene.pbrt {args}")).stderr(Stdio::piped()).spawn().unwrap()
 }
 
-/// Reads the messages of tev's protocol, as its documentation describes them.
+/// Parser of tev's protocol, after its documentation.
 struct Message<'a>(&'a [u8]);
 
 impl Message<'_> {
@@ -56,7 +56,7 @@ impl Message<'_> {
     }
 }
 
-/// An image as tev has it.
+/// An image as received by tev.
 #[derive(Default)]
 struct Shown {
     name: String,
@@ -71,6 +71,7 @@ impl Shown {
         let mut message = Message(bytes);
         match message.byte() {
             4 => {
+                // Create an image
                 message.byte();
                 self.name = message.text();
                 self.size = [message.u32(), message.u32()];
@@ -79,6 +80,7 @@ impl Shown {
                 self.data = vec![f32::NAN; self.size[0] * self.size[1] * count];
             }
             6 => {
+                // Update a tile
                 message.byte();
                 assert_eq!(message.text(), self.name);
                 let count = message.u32();
@@ -103,6 +105,7 @@ impl Shown {
 
 #[test]
 fn tev_has_the_final_image_to_the_bit() {
+    // Render, and receive everything
     let folder = folder();
     let tev = TcpListener::bind("127.0.0.1:0").unwrap();
     let args = format!("-q -o a.exr --crop 0.1,1,0,0.9 --tev={}", tev.local_addr().unwrap());
@@ -113,6 +116,7 @@ fn tev_has_the_final_image_to_the_bit() {
     let output = child.wait_with_output().unwrap();
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
 
+    // The last state has the bits of the file
     let (mut shown, mut rest) = (Shown::default(), &bytes[..]);
     while !rest.is_empty() {
         let length = u32::from_le_bytes(rest[..4].try_into().unwrap()) as usize;
@@ -153,13 +157,13 @@ fn without_tev_nothing_is_rendered_and_when_it_goes_the_image_is() {
     assert!(!folder.path().join("b.exr").exists());
 }
 
-/// A rendering without end, and the address of its page.
+/// An endless rendering, and the address of its page.
 struct Endless {
     child: Child,
     address: String,
 }
 
-/// A test that fails leaves no rendering behind.
+/// A test that fails leaves no process behind.
 impl Drop for Endless {
     fn drop(&mut self) {
         let _ = self.child.kill();
@@ -167,7 +171,7 @@ impl Drop for Endless {
     }
 }
 
-/// The address of the page, which the program says first.
+/// The address of the page, from the program's first message.
 fn address_of(stderr: &mut BufReader<ChildStderr>) -> String {
     let mut lines = stderr.lines().map(Result::unwrap);
     let said = lines.find_map(|l| Some(l.split_once("at http://")?.1.trim_end_matches('/').to_owned()));
@@ -207,7 +211,7 @@ impl Endless {
         self.ask("GET", path, &self.address)
     }
 
-    /// The state, once the 12 tiles have a sample each.
+    /// The state, once all 12 tiles have a sample.
     fn state(&self) -> Value {
         loop {
             let state: Value = serde_json::from_slice(&self.get("/state").1).unwrap();
@@ -228,7 +232,7 @@ impl Endless {
 fn there_are_pixels_to_see_before_pilots_are_done() {
     let folder = folder();
     let view = Endless::of(folder.path(), "--noise 0.0000001 --spp 1000000000");
-    // All tiles, while the pilot of the noise goes on
+    // All tiles arrive while the pilot for the noise target runs
     view.state();
     assert_eq!(view.stop(), Some(130));
     assert!(!folder.path().join("a.exr").exists(), "the first sample has not been rendered");
@@ -243,7 +247,7 @@ fn the_server_knows_the_page_its_data_and_nothing_else() {
     assert_eq!(state["layers"][0], serde_json::json!({ "name": "beauty", "channels": 3 }));
     assert_eq!(state["finished"], false);
 
-    // Tiles: all at first, and then those that changed since
+    // Tiles: all at first, then those that changed
     let number = |bytes: &[u8], at: usize| u32::from_le_bytes(bytes[at..at + 4].try_into().unwrap());
     let tiles = format!("/tiles?image={}&layer=0&since=0", state["image"]);
     let (status, bytes) = view.get(&tiles);
@@ -278,7 +282,7 @@ fn the_server_knows_the_page_its_data_and_nothing_else() {
         assert!(body.len() < 100, "{path}: {}", String::from_utf8_lossy(&body));
     }
     assert_eq!(view.ask("POST", "/state", &view.address).0, 405);
-    // A page of another site, under whose name this address is
+    // DNS rebinding: a page of another site uses its own name for this address
     let port = view.address.rsplit_once(':').unwrap().1;
     assert_eq!(view.ask("GET", "/state", &format!("evil.example:{port}")).0, 403);
     assert_eq!(view.ask("GET", "/state", &format!("localhost:{port}")).0, 200);
@@ -289,10 +293,10 @@ fn the_server_knows_the_page_its_data_and_nothing_else() {
     assert!(folder.path().join("a.exr").exists());
 }
 
-/// The status of an answer, or `None` if the connection ends without one.
+/// The status of an answer; `None` if the connection ends without one.
 fn status(mut stream: TcpStream) -> Option<u16> {
     let mut answer = Vec::new();
-    // Who has not sent all may lose the connection before the answer is read
+    // A client that has not sent everything may lose the connection before it reads the answer
     let _ = stream.read_to_end(&mut answer);
     String::from_utf8_lossy(&answer).split(' ').nth(1)?.parse().ok()
 }
@@ -306,7 +310,7 @@ fn requests_are_short_and_have_no_body_whatever_they_announce() {
         let stream = view.send(format!("GET / HTTP/1.1\r\n{host}{body}\r\n").as_bytes());
         assert!([Some(400), Some(413)].contains(&status(stream)), "{body}");
     }
-    // A line and a head without an end: cut after 16 kB, long before a megabyte has been sent
+    // Endless lines and heads are cut off after 16 kB, long before a megabyte has been sent
     for head in ["GET /".to_owned(), format!("GET / HTTP/1.1\r\n{host}X: ")] {
         let mut stream = view.send(head.as_bytes());
         let sent = (0..256).take_while(|_| stream.write_all(&[b'a'; 4096]).is_ok()).count();
@@ -316,7 +320,7 @@ fn requests_are_short_and_have_no_body_whatever_they_announce() {
     assert_eq!(status(view.send(filler(15_000).as_bytes())), Some(200));
     assert_ne!(status(view.send(filler(17_000).as_bytes())), Some(200));
 
-    // Connections that are half open, or do not read, keep nobody else out
+    // Connections that are half open, or that do not read, do not block others
     let state = view.state();
     let tiles = format!("GET /tiles?image={}&layer=0&since=0 HTTP/1.1\r\n{host}\r\n", state["image"]);
     let held: Vec<TcpStream> =
@@ -324,12 +328,12 @@ fn requests_are_short_and_have_no_body_whatever_they_announce() {
     let start = Instant::now();
     assert_eq!(view.get("/state").0, 200);
     assert!(start.elapsed() < Duration::from_secs(8), "{:?}", start.elapsed());
-    // The oldest of them are ended
+    // The oldest are closed
     assert_eq!(status(held.into_iter().next().unwrap()), None);
     assert_eq!(view.stop(), Some(130));
 }
 
-/// A request that is changed at some places: bytes replaced, left out, repeated, or pieces of other requests put in.
+/// A request with random changes: bytes replaced, removed or repeated, or pieces of other requests inserted.
 fn malformed(random: &mut Random, address: &str) -> Vec<u8> {
     const LINES: [&str; 6] = [
         "GET / HTTP/1.1\r\n",
@@ -353,6 +357,8 @@ fn malformed(random: &mut Random, address: &str) -> Vec<u8> {
         b"\0\xff\xfe",
         b"&since=99999999999999999999",
     ];
+
+    // Change a valid request up to four times
     let mut below = |n: usize| random.below(n as u64) as usize;
     let mut bytes = format!("{}Host: {address}\r\n\r\n", LINES[below(LINES.len())]).into_bytes();
     for _ in 0..=below(4) {
@@ -386,7 +392,7 @@ fn ten_thousand_malformed_requests_leave_the_image_as_it_is() {
     let alone = lumiris(folder.path(), &format!("{args} -q -o a.exr")).wait_with_output().unwrap();
     assert!(alone.status.success());
 
-    // The page is there while the scene is awaited, and while it is rendered
+    // The page exists while the program waits for the scene, and while it renders
     let mut watched = command(folder.path(), &format!("render - {args} -o b.exr --view=0"));
     let mut child = watched.stdin(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
     let mut stderr = BufReader::new(child.stderr.take().unwrap());
@@ -405,7 +411,7 @@ fn ten_thousand_malformed_requests_leave_the_image_as_it_is() {
                     }
                     let request = malformed(&mut Random(index), &address);
                     let reached = exchange(&address, &request);
-                    // Once it is rendered, the page is gone
+                    // The page is gone after the rendering
                     assert!(index > REQUESTS / 4 || reached.is_ok(), "request {index}: {reached:?}");
                 }
             });
@@ -431,7 +437,7 @@ fn a_tev_that_reads_slowly_holds_nothing_up() {
     while child.try_wait().unwrap().is_none() && start.elapsed() < Duration::from_secs(30) {
         // An error is the end of the connection
         let _ = stream.read(&mut [0; 1 << 15]);
-        // It says things that nobody understands, too
+        // It also sends garbage
         let _ = stream.write_all(&[7; 4096]);
         std::thread::sleep(Duration::from_millis(100));
     }
@@ -464,7 +470,7 @@ fn the_page_shows_the_image_while_it_converges() {
     browser.wait_for("/%.*elapsed.*left/.test(document.getElementById('status').textContent)");
     assert_eq!(browser.run("document.title"), "scene.pbrt");
     assert_eq!(browser.run("[picture.width, picture.height]"), serde_json::json!([50, 36]));
-    // The corner is sky
+    // The corner shows the sky
     let corner = "[...context.getImageData(0, 0, 1, 1).data]";
     let srgb = |v: f32| (lumiris::imaging::color::linear_to_srgb(v) * 255.0).round();
     let near = |found: Value, expected: [f32; 3]| {
@@ -476,11 +482,11 @@ fn the_page_shows_the_image_while_it_converges() {
     browser.run("exposure.value = 1; exposure.oninput()");
     near(browser.run(corner), [0.8, 0.4, 0.2]);
 
-    // It goes on
+    // The image changes
     browser.run("window.before = version");
     browser.wait_for("version !== window.before");
 
-    // The wheel enlarges what is under the mouse, and shows its numbers
+    // The wheel zooms in at the pointer, and shows the pixel's values
     let before = browser.run("view.scale").as_f64().unwrap();
     browser.point([450.0, 320.0]);
     browser.wheel([450.0, 320.0], -240.0);
@@ -498,7 +504,7 @@ fn the_page_shows_the_image_while_it_converges() {
     assert_eq!(view.stop(), Some(130));
     browser.wait_for("/finished/.test(document.getElementById('status').textContent)");
     let complaints = browser.complaints.borrow();
-    // The end of the program, and that this test reads pixels
+    // The end of the program, and a warning because this test reads pixels
     let expected = ["ERR_CONNECTION", "willReadFrequently"];
     assert!(complaints.iter().all(|c| expected.iter().any(|e| c.contains(e))), "{complaints:?}");
 }

@@ -148,6 +148,7 @@ fn body_at(body: &[Knot], t: f32) -> (Knot, Vec3) {
 fn spines(body: &[Knot]) -> Vec<Stroke> {
     let mut out = Vec::new();
     let mut next = 6.0;
+    // Spines are half a radius apart, where the body is thick enough
     for i in 1..body.len() {
         let k = body[i];
         if k.along < next || k.radius < 0.035 {
@@ -202,12 +203,15 @@ fn mane(body: &[Knot]) -> Vec<Stroke> {
 
 /// A leg that reaches to the shaft: the limb with its toes, the claws, and flames at the elbow.
 fn leg(body: &[Knot], at: f32, direction: f32) -> [Vec<Stroke>; 3] {
+    // Points around the shaft, relative to the angle and height of the root
     let (k, _) = body_at(body, at);
     let angle = k.center.y.atan2(k.center.x);
     let z = k.center.z;
     let place = |turn: f32, radius: f32, up: f32| around(angle + direction * turn, radius, z + up);
     let (elbow, wrist) = (place(0.3, 0.66, 0.02), place(0.6, 0.47, -0.13));
     let outward = Vec3::new(angle.cos(), angle.sin(), 0.0);
+
+    // The limb
     let points = [
         (k.center, 0.115),
         (place(0.14, 0.56, 0.04), 0.1),
@@ -217,6 +221,8 @@ fn leg(body: &[Knot], at: f32, direction: f32) -> [Vec<Stroke>; 3] {
         (place(0.68, 0.41, -0.16), 0.055),
     ];
     let mut out = limb(&points, outward + Vec3::Z, 5);
+
+    // Toes and claws
     let mut claws = Vec::new();
     for toe in 0..4 {
         let (spread, drop) = [(0.46, -0.27), (0.74, -0.31), (0.98, -0.25), (1.02, -0.1)][toe];
@@ -228,6 +234,8 @@ fn leg(body: &[Knot], at: f32, direction: f32) -> [Vec<Stroke>; 3] {
         let ridge = end + (tip - end) * 0.5 + outward * 0.014;
         claws.extend(limb(&[(end, 0.022), (ridge, 0.015), (tip, 0.002)], outward, 4));
     }
+
+    // Flames at the elbow
     let mut flames = Vec::new();
     for i in 0..4 {
         let bend = (outward + Vec3::Z * (0.6 - 0.4 * i as f32)).normalize();

@@ -70,12 +70,17 @@ pub(super) fn head_parts(head: &Head) -> Vec<Part> {
 
 /// Skull, muzzle, lower jaw, cheeks and nose.
 fn skull(head: &Head) -> Vec<Stroke> {
+    // Skull and muzzle
     let mut out = head.stroke(&[[-0.2, 0.0, -0.05, 0.52], [0.15, 0.0, 0.02, 0.52], [0.6, 0.0, -0.02, 0.38]], 3);
     for side in [0.13, -0.13] {
         out.extend(head.stroke(&[[0.4, side, -0.02, 0.32], [0.9, side, -0.02, 0.25], [1.5, side, 0.0, 0.21]], 3));
     }
+
+    // Nose and cheeks
     out.extend(head.both(&[[1.5, 0.17, 0.12, 0.14], [1.62, 0.2, 0.1, 0.11]], 1));
     out.extend(head.both(&[[0.0, 0.42, -0.28, 0.26], [0.3, 0.42, -0.3, 0.2]], 1));
+
+    // The two halves of the lower jaw
     for side in [0.12, -0.12] {
         out.extend(head.stroke(
             &[
@@ -92,6 +97,7 @@ fn skull(head: &Head) -> Vec<Stroke> {
 
 /// Brows, lips, wrinkles of the nose, nostrils, and the tongue.
 fn ridges(head: &Head) -> Vec<Stroke> {
+    // Brows and lips
     let mut out = head.both(&[[0.18, 0.5, 0.3, 0.1], [0.45, 0.44, 0.42, 0.13], [0.78, 0.26, 0.28, 0.08]], 3);
     out.extend(head.both(&[[0.2, 0.5, 0.06, 0.07], [0.5, 0.46, 0.04, 0.06], [0.8, 0.34, 0.12, 0.05]], 3));
     out.extend(head.both(
@@ -102,14 +108,20 @@ fn ridges(head: &Head) -> Vec<Stroke> {
         &[[0.1, 0.33, -0.42, 0.06], [0.5, 0.27, -0.56, 0.055], [1.0, 0.19, -0.74, 0.05], [1.32, 0.06, -0.75, 0.045]],
         4,
     ));
+
+    // Wrinkles of the nose
     for i in 0..5 {
         let f = 0.85 + 0.14 * i as f32;
         out.extend(head.stroke(&[[f, 0.27, 0.14, 0.035], [f + 0.05, 0.0, 0.25, 0.05], [f, -0.27, 0.14, 0.035]], 3));
     }
+
+    // Nostrils
     for i in 0..3 {
         let f = 1.66 - 0.06 * i as f32;
         out.extend(head.both(&[[f, 0.28 - 0.02 * i as f32, 0.02, 0.04], [f, 0.26, 0.14 + 0.03 * i as f32, 0.045]], 2));
     }
+
+    // The tongue
     out.extend(head.stroke(
         &[
             [0.2, 0.0, -0.45, 0.12],

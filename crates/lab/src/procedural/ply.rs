@@ -15,6 +15,7 @@ pub fn write_ply(path: &Path, mesh: &TriangleMesh) -> io::Result<()> {
 }
 
 fn write_to(file: &mut impl Write, mesh: &TriangleMesh) -> io::Result<()> {
+    // The header
     let positions = mesh.positions();
     let has_normals = mesh.normals.len() == positions.len();
     let normals = if has_normals { "property float nx\nproperty float ny\nproperty float nz\n" } else { "" };
@@ -27,6 +28,8 @@ fn write_to(file: &mut impl Write, mesh: &TriangleMesh) -> io::Result<()> {
         positions.len(),
         mesh.triangle_count()
     )?;
+
+    // Vertices, with normals where the mesh has them
     for (i, p) in positions.iter().enumerate() {
         let vectors = if has_normals { [p, &mesh.normals[i]] } else { [p, p] };
         for v in &vectors[..1 + usize::from(has_normals)] {
@@ -35,6 +38,8 @@ fn write_to(file: &mut impl Write, mesh: &TriangleMesh) -> io::Result<()> {
             }
         }
     }
+
+    // Triangles
     for t in &mesh.indices {
         file.write_all(&[3])?;
         for i in t {

@@ -205,6 +205,7 @@ fn key(x: f32, t: f32) -> f32 {
 
 /// The bands of the pedestal by height; [`super::dragon`] has its profile.
 fn pedestal(spot: &Spot) -> f32 {
+    // Petals on the upper face; the lower face is plain
     let (a, z) = (spot.angle, spot.along);
     if z > 0.445 {
         return within(spot.radius, 0.6, 0.9).map_or(0.0, |t| 0.02 * petals(a, 36.0, t));
@@ -212,6 +213,8 @@ fn pedestal(spot: &Spot) -> f32 {
     if spot.radius < 0.5 {
         return 0.0;
     }
+
+    // Key pattern, petals, beads and petals, from bottom to top
     if let Some(t) = within(z, 0.02, 0.1) {
         return 0.008 * key(a * 36.0 / TAU, t);
     }
@@ -264,6 +267,8 @@ mod tests {
             Relief::Shaft,
             Relief::Rock { height: 0.05 },
         ];
+
+        // Bounds, and equal heights at both ends of the angle
         let mut stream = pcg32([1, 2, 3]);
         for relief in all {
             let (mut low, mut high) = (f32::INFINITY, f32::NEG_INFINITY);

@@ -106,6 +106,7 @@ impl Part {
         let amplitude = self.relief.amplitude();
         match &self.shape {
             Shape::Strokes(strokes) => {
+                // The nearest selected stroke, with the relief at its nearest point
                 let (mut nearest, mut at) = (f32::INFINITY, (0, 0.0));
                 for &i in selected {
                     let (d, t) = strokes[i as usize].distance(p);
@@ -134,11 +135,13 @@ pub fn smooth_min(a: f32, b: f32, k: f32) -> f32 {
 
 /// The smooth curve through points [Catmull and Rom 1974], `steps` pieces between two of them.
 pub fn spline(points: &[Knot], steps: usize) -> Vec<Knot> {
+    // Missing neighbours repeat the end points
     let at = |i: isize| points[i.clamp(0, points.len() as isize - 1) as usize];
     let mut knots = Vec::new();
     for i in 0..points.len() as isize - 1 {
         let [a, b, c, d] = [at(i - 1), at(i), at(i + 1), at(i + 2)];
         for step in 0..steps {
+            // The weights of a uniform Catmull–Rom spline
             let t = step as f32 / steps as f32;
             let w = [
                 ((2.0 - t) * t - 1.0) * t * 0.5,

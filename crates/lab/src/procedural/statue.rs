@@ -173,6 +173,7 @@ mod tests {
             low + (high - low) * Vec3::new(stream.random::<f32>(), stream.random::<f32>(), stream.random::<f32>())
         };
         let mut signs = [0; 3];
+        // A ball within a wider one
         for i in 0..1200 {
             let half = if i % 2 == 0 { 0.05 } else { 0.012 };
             let center = random(dragon::LOW, dragon::HIGH);
@@ -180,6 +181,7 @@ mod tests {
             let near = field.near(Some(&wider), Ball { center, radius: half * 1.7321 });
             let sign = field.is_inside(&near);
             signs[sign.map_or(2, usize::from)] += 1;
+            // Values at points of the ball
             for _ in 0..2 {
                 let p = center + random(Vec3::splat(-half), Vec3::splat(half));
                 let value = field.value(&everything, p);

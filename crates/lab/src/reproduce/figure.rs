@@ -73,6 +73,7 @@ pub fn write(
     figures: &[Figure],
     elapsed: Duration,
 ) -> Result<PathBuf, ReproduceError> {
+    // The summary table and the facts
     let threads = options.threads();
     let mut page = Page::new(study.title);
     page.push(Block::Text(study.intro.to_owned()));
@@ -85,11 +86,14 @@ pub fn write(
         ("time".to_owned(), format!("{:.0} s", elapsed.as_secs_f64())),
         ("numbers".to_owned(), study.numbers.to_owned()),
     ]));
+
+    // A section for each figure
     for f in figures {
         page.push(Block::section(f.id, f.title));
         page.extend(f.blocks.iter().cloned());
     }
 
+    // The numbers as JSON
     let by_figure: serde_json::Map<String, Value> = figures.iter().map(|f| (f.id.to_owned(), f.json())).collect();
     let numbers = json!({
         "version": env!("CARGO_PKG_VERSION"), "command": options.command, "threads": threads,

@@ -368,6 +368,7 @@ pub fn turns(
     turns: std::ops::Range<u32>,
     observer: Observer<'_>,
 ) -> Result<Vec<Measured>, ReproduceError> {
+    // The order of the methods rotates by one from turn to turn
     let count = methods.len() as u32;
     let mut measured: Vec<Measured> = methods.iter().map(|&m| Measured::new(m)).collect();
     for turn in turns {

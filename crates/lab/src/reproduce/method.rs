@@ -151,6 +151,7 @@ impl Method {
 
     /// Applies the method to the settings; `depth` is the number of bounces in the scene file.
     pub(super) fn apply(&self, settings: &mut Settings, depth: u32) {
+        // Integrator and estimator
         let (kind, max_depth) = match self.transport {
             Transport::Direct => (IntegratorKind::Direct, 1),
             Transport::Path => (IntegratorKind::Path, depth),
@@ -167,12 +168,16 @@ impl Method {
             light_sampler: self.light_sampler,
             ..*i
         };
+
+        // Variants of the estimators
         i.ocv.form = self.form;
         i.cache.cached = Cached::All;
         i.ris.proposals = if self.per_pixel { Proposals::Optimal } else { Proposals::Fixed(self.proposals) };
         i.ris.strata = self.strata;
         i.ris.target = self.target;
         i.contributing.noncontributing_samples = Some(self.noncontributing_samples);
+
+        // Sampler and proposal points
         (settings.sampling.sampler, i.ris.points) = match self.points {
             Points::Independent => (SamplerKind::Independent, ProposalPoints::Independent),
             Points::PerEstimate => (SamplerKind::Stratified, ProposalPoints::Stratified),

@@ -149,6 +149,7 @@ impl Block {
     /// The data of the block for the template.
     fn context(&self) -> Value {
         match self {
+            // The key `kind` selects the branch of the template
             Block::Section { id, title } => context! { kind => "section", id => id.as_str(), title => title.as_str() },
             Block::Text(text) => context! { kind => "text", text => text.as_str() },
             Block::Note(text) => context! { kind => "note", text => text.as_str() },
@@ -221,6 +222,7 @@ mod tests {
 
     #[test]
     fn every_element_is_closed_and_nothing_comes_from_elsewhere() {
+        // A page with tables, images and a chart
         let mut page = Page::new("t");
         let mut table = Table::new(&["a", "b"]);
         table.row([Cell::text("x"), Cell::number("1")]);
@@ -232,6 +234,8 @@ mod tests {
             Block::Images((0..3).map(shown).collect()),
             Block::Chart(Chart::new("x", "y").with("s", vec![[1.0, 2.0], [10.0, 20.0]])),
         ]);
+
+        // Every tag is closed, and there are no external resources
         let html = page.html();
         for name in ["html", "head", "body", "table", "tr", "td", "div", "figure", "h2", "svg", "a", "style"] {
             let open = html.matches(&format!("<{name}>")).count() + html.matches(&format!("<{name} ")).count();

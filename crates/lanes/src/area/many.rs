@@ -1,4 +1,4 @@
-//! Directions from many points to one surface. The formulas are those of the modules of `lights::area`.
+//! Directions from many points to one surface. The formulas are in the modules of `lights::area`.
 
 use super::spherical::SphericalSetup;
 use super::{Rectangle, barycentric};
@@ -6,7 +6,8 @@ use crate::lane::{F, LANES, M, Vec3s, load, narrowed, or_zero, store, widened};
 use fearless_simd::{Level, Simd, dispatch, f64x8, prelude::*};
 use lumiris_numbers::math::{Vec3, gamma};
 
-/// Largest diagonal, by the distance of the centre, that is sampled by area.
+/// Largest diagonal, relative to the distance of the centre, for sampling by area. Larger rectangles are sampled by
+/// solid angle.
 pub const MAX_EXTENT: f32 = 0.5;
 
 /// Directions from many points to one surface.
@@ -22,9 +23,9 @@ pub struct PointsOnLight<'a> {
     pub pdf: &'a mut [f32],
 }
 
-/// A direction from each of the points `from` to a rectangle, whose corners are off by `flatness_error`: uniform in
-/// solid angle where that is accurate and large, else uniform in area. Slices have one length, a multiple of
-/// [`LANES`].
+/// Samples a direction from each of the points `from` to a rectangle whose corners are off by up to `flatness_error`.
+/// Directions are uniform in solid angle where this is accurate and the solid angle is large, else uniform in area.
+/// Slices have the same length, a multiple of [`LANES`].
 pub fn sample_rectangle(
     level: Level,
     rectangle: &Rectangle,
@@ -44,15 +45,18 @@ fn sample_rectangle_lanes<S: Simd>(
     u: [&[f32]; 2],
     out: &mut PointsOnLight<'_>,
 ) {
+    // Constants of the rectangle
     let zero = F::splat(simd, 0.0);
     let (n, size) = (Vec3s::splat(simd, rectangle.n), rectangle.size);
     let center = rectangle.corner + rectangle.ex * (0.5 * size.x) + rectangle.ey * (0.5 * size.y);
     let (corner, ex, ey) = (rectangle.corner, rectangle.ex, rectangle.ey);
     for i in (0..out.pdf.len()).step_by(LANES) {
         let from = Vec3s::load(simd, from, i);
+        // Solid angle or area
         let (u0, u1) = (load(simd, u[0], i), load(simd, u[1], i));
         let (s, t, density, is_spherical) = spherical_place(rectangle, center, from, (u0, u1));
         let (s, t) = (is_spherical.select(s, u0 * size.x), is_spherical.select(t, u1 * size.y));
+        // Directions and densities
         let p = rectangle.point(s, t);
         let d = p.minus(from);
         let t2 = d.dot(d);
@@ -64,6 +68,7 @@ fn sample_rectangle_lanes<S: Simd>(
         store(or_zero(is_sample, pdf), out.pdf, i);
         wi.store(&mut out.wi, i);
         p.store(&mut out.p, i);
+        // Error bounds
         let (s, t) = (s.abs(), t.abs());
         let error = Vec3s {
             x: (s * ex.x.abs() + t * ey.x.abs() + corner.x.abs()) * gamma(6) + flatness_error,
@@ -74,7 +79,8 @@ fn sample_rectangle_lanes<S: Simd>(
     }
 }
 
-/// Places on the edges uniform in solid angle, the density, and where that is to be used.
+/// Positions along the edges uniform in solid angle, their density (1/sr), and the mask of lanes in which they are
+/// used.
 #[inline(always)]
 fn spherical_place<S: Simd>(
     rectangle: &Rectangle,
@@ -93,8 +99,8 @@ fn spherical_place<S: Simd>(
     (narrowed(s), narrowed(t), density, is_spherical)
 }
 
-/// A point from each of the points `from` on a triangle of corners `p`, unit normal and area, uniform in area; as
-/// [`sample_rectangle`].
+/// Samples a direction from each of the points `from` to a triangle, given by its corners, unit normal and area,
+/// uniform in area; see [`sample_rectangle`].
 pub fn sample_triangle(
     level: Level,
     triangle: ([Vec3; 3], Vec3, f32),
@@ -113,6 +119,7 @@ fn sample_triangle_lanes<S: Simd>(
     u: [&[f32]; 2],
     out: &mut PointsOnLight<'_>,
 ) {
+    // As for rectangles sampled by area
     let n = Vec3s::splat(simd, n);
     for i in (0..out.pdf.len()).step_by(LANES) {
         let b = barycentric(load(simd, u[0], i), load(simd, u[1], i));

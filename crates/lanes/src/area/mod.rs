@@ -1,4 +1,4 @@
-//! Surfaces of constant emission, as many points see them. The formulas are those of the modules of `lights::area`.
+//! Area lights of constant emission, sampled from many points. The formulas are in the modules of `lights::area`.
 //!
 //! Reading order: [`spherical`], [`many`].
 

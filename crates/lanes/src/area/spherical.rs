@@ -1,18 +1,17 @@
-//! Spherical rectangles [Ureña, Fajardo and King 2013], as `lights::area::rectangle` describes them, from many points at
-//! once.
+//! Spherical rectangles [Ureña, Fajardo and King 2013] from many points at once; see `lights::area::rectangle`.
 
 use super::Rectangle;
 use fearless_simd::{Simd, f64x8, mask64x8, prelude::*};
 use lumiris_numbers::math::DVec3;
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, FRAC_PI_8, PI, TAU};
 
-/// Smallest solid angle that is sampled by solid angle, in steradians: of what is nearly edge-on, angles in f64 keep
-/// their digits down to here.
+/// Smallest solid angle (sr) that is sampled by solid angle. Above it, f64 angles are accurate even for rectangles that
+/// are nearly edge-on.
 pub const MIN_SOLID_ANGLE: f64 = 1e-4;
 /// Smallest distance from the plane, in diagonals of the rectangle, that is sampled by solid angle.
 pub const MIN_HEIGHT: f64 = 1e-5;
 
-/// Points as they see a rectangle, and what their samples need.
+/// Rectangle in the frame of each point, with precomputed values for sampling.
 #[derive(Clone, Copy)]
 pub(super) struct SphericalSetup<S: Simd> {
     x: [f64x8<S>; 2],
@@ -37,7 +36,7 @@ impl<S: Simd> SphericalSetup<S> {
         SphericalSetup { x, y, z0, solid_angle, rotation: (g23.0 * scale, -(g23.1 * scale)), b, k: z2 / below }
     }
 
-    /// As the points `from` see `rectangle`.
+    /// The setup for the points `from`.
     #[inline(always)]
     pub(super) fn seen(rectangle: &Rectangle, from: [f64x8<S>; 3]) -> Self {
         let (corner, ex, ey) = (rectangle.corner.as_dvec3(), rectangle.ex.as_dvec3(), rectangle.ey.as_dvec3());
@@ -46,7 +45,7 @@ impl<S: Simd> SphericalSetup<S> {
         let x = [x0, x0 + f64::from(rectangle.size.x)];
         let y = [y0, y0 + f64::from(rectangle.size.y)];
         let (xx, yy, zz) = ([x[0] * x[0], x[1] * x[1]], [y[0] * y[0], y[1] * y[1]], z0 * z0);
-        // e^{ig} up to a positive factor of the inner angles, and their products in pairs
+        // e^{ig} of the inner angles up to a positive factor, and pairwise products
         let g0 = (x[1] * y[0], -(z0 * (xx[1] + yy[0] + zz).sqrt()));
         let g1 = (-(x[1] * y[1]), -(z0 * (xx[1] + yy[1] + zz).sqrt()));
         let g2 = (x[0] * y[1], -(z0 * (xx[0] + yy[1] + zz).sqrt()));
@@ -55,16 +54,16 @@ impl<S: Simd> SphericalSetup<S> {
         Self::new(x, y, z0, g23, angle(product(g01, g23)))
     }
 
-    /// The distances from the corner along the edges.
+    /// Distances from the corner along the edges.
     #[inline(always)]
     pub(super) fn place(&self, u0: f64x8<S>, u1: f64x8<S>) -> (f64x8<S>, f64x8<S>) {
         let simd = u0.token();
         let one = f64x8::splat(simd, 1.0);
-        // cos and sin of u·S − (g2 + g3).
+        // cos and sin of u·S − (g2 + g3)
         let (sin_us, cos_us) = sin_cos_turns_f64(u0 * (self.solid_angle * (1.0 / TAU)));
         let cos = cos_us * self.rotation.0 - sin_us * self.rotation.1;
         let sin = cos_us * self.rotation.1 + sin_us * self.rotation.0;
-        // With fu = f/sin, x = −z0·sgn(fu)/√(fu² + b0² − 1).
+        // With fu = f/sin, x = −z0·sgn(fu)/√(fu² + b0² − 1)
         let f = cos * self.b[0] - self.b[1];
         let under_root = (f * f - sin * sin * self.k).max(1e-300);
         let x = sin * (-self.z0).copysign(f) / under_root.sqrt();
@@ -80,7 +79,7 @@ impl<S: Simd> SphericalSetup<S> {
         (x - self.x[0], y - self.y[0])
     }
 
-    /// True where the rectangle is neither edge-on nor so small that its angles lose their digits.
+    /// True unless the rectangle is edge-on, or so small that its angles lose precision.
     #[inline(always)]
     pub(super) fn is_accurate(&self, rectangle: &Rectangle) -> mask64x8<S> {
         let simd = self.z0.token();
@@ -100,7 +99,7 @@ fn product<S: Simd>(a: (f64x8<S>, f64x8<S>), b: (f64x8<S>, f64x8<S>)) -> (f64x8<
     (a.0 * b.0 - a.1 * b.1, a.0 * b.1 + a.1 * b.0)
 }
 
-/// The argument of a complex number in [0, 2π); of one slightly below the positive axis, 0.
+/// The argument of a complex number in [0, 2π); 0 for numbers slightly below the positive real axis.
 #[inline(always)]
 fn angle<S: Simd>((x, y): (f64x8<S>, f64x8<S>)) -> f64x8<S> {
     let simd = x.token();
@@ -109,14 +108,14 @@ fn angle<S: Simd>((x, y): (f64x8<S>, f64x8<S>)) -> f64x8<S> {
     a.simd_lt(f64x8::splat(simd, -1e-6)).select(a + TAU, a.max(zero))
 }
 
-/// The argument of x + iy in [−π, π]; errors below 2⁻⁴⁸. NaN at 0.
+/// The argument of x + iy in [−π, π], with errors below 2⁻⁴⁸. NaN at 0.
 #[inline(always)]
 pub fn atan2<S: Simd>(y: f64x8<S>, x: f64x8<S>) -> f64x8<S> {
     let simd = x.token();
     let zero = f64x8::splat(simd, 0.0);
     let is_steep = y.abs().simd_gt(x.abs());
     let (large, small) = (is_steep.select(y.abs(), x.abs()), is_steep.select(x.abs(), y.abs()));
-    // The difference to the nearest multiple of π/8, by the tangent of a difference
+    // The difference to the nearest multiple of π/8, from the tangent of a difference
     let is_third = small.simd_gt(large * TAN_3_PI_16);
     let is_second = small.simd_gt(large * TAN_PI_16);
     let tangent = is_third.select(f64x8::splat(simd, 1.0), is_second.select(f64x8::splat(simd, TAN_PI_8), zero));
@@ -148,7 +147,7 @@ const TAN_PI_8: f64 = 0.414_213_562_373_095_03;
 /// tan 3π/16.
 const TAN_3_PI_16: f64 = 0.668_178_637_919_298_9;
 
-/// sin 2πt and cos 2πt for |t| < 2²⁰, by the series about the nearest quarter turn; errors below 2⁻⁴⁵.
+/// sin 2πt and cos 2πt for |t| < 2²⁰, from series around the nearest quarter turn; errors below 2⁻⁴⁵.
 #[inline(always)]
 pub fn sin_cos_turns_f64<S: Simd>(t: f64x8<S>) -> (f64x8<S>, f64x8<S>) {
     let simd = t.token();
@@ -173,7 +172,7 @@ pub fn sin_cos_turns_f64<S: Simd>(t: f64x8<S>) -> (f64x8<S>, f64x8<S>) {
         - 0.5)
         * x2
         + 1.0;
-    // Of the quarters modulo 4, which are exact.
+    // The quarters modulo 4, exact
     let k = quarters - (quarters * 0.25).floor() * 4.0;
     let (one, two, three) = (f64x8::splat(simd, 1.0), f64x8::splat(simd, 2.0), f64x8::splat(simd, 3.0));
     let (is_1, is_2, is_3): (mask64x8<S>, mask64x8<S>, mask64x8<S>) =

@@ -1,10 +1,11 @@
-//! Directional albedos of GGX reflection, tabulated, of which multiple scattering is made up.
+//! Tabulated directional albedos of GGX reflection, and the multiple scattering computed from them.
 //!
-//! E(μ) is the albedo of a surface of facets that reflect everything, seen from the cosine μ; E₅(μ) that of facets whose
-//! reflectance is (1 − wo·m)⁵. Facets of Schlick's reflectance F₀ + (F₉₀ − F₀)(1 − wo·m)⁵ then have F₀(E − E₅) + F₉₀E₅.
-//! What E lacks of 1 is light that meets more than one facet. It comes back by [Kulla and Conty 2017]
+//! E(μ) is the albedo, for a direction with cosine μ, of a surface whose microfacets reflect everything; E₅(μ) is the
+//! albedo for the reflectance (1 − wo·m)⁵. Schlick's reflectance F₀ + (F₉₀ − F₀)(1 − wo·m)⁵ has the albedo
+//! F₀(E − E₅) + F₉₀E₅. The missing energy 1 − E is light that hits more than one facet. It is restored by
+//! [Kulla and Conty 2017]
 //!
-//! f_ms(wo, wi) = F_ms (1 − E(wo)) (1 − E(wi)) / (π (1 − Ē)),   F_ms = F̄² Ē/(1 − F̄ (1 − Ē)),   F̄ = F₀ + (F₉₀ − F₀)/21
+//! f_ms(wo, wi) = F_ms (1 − E(wo)) (1 − E(wi)) / (π (1 − Ē)),  F_ms = F̄² Ē/(1 − F̄ (1 − Ē)),  F̄ = F₀ + (F₉₀ − F₀)/21
 //!
 //! with Ē = 2∫E μ dμ. It is reciprocal, and with F = 1 no light is lost.
 
@@ -30,12 +31,12 @@ pub struct Tables {
 
 static TABLES: LazyLock<Tables> = LazyLock::new(Tables::new);
 
-/// The tables, which are made when they are first used.
+/// The tables, computed at their first use.
 pub fn tables() -> &'static Tables {
     &TABLES
 }
 
-/// An entry of a table, and the place between it and the next one.
+/// Index of a table entry, and the fraction between it and the next.
 #[derive(Clone, Copy, Debug)]
 pub struct Place<N> {
     first: N,
@@ -43,7 +44,7 @@ pub struct Place<N> {
 }
 
 impl<N: Number> Place<N> {
-    /// Of `x` in 0..1, among `count` entries that are evenly spaced.
+    /// The position of `x` in 0..1 among `count` evenly spaced entries.
     #[inline(always)]
     pub fn new(x: N, count: usize) -> Self {
         let x = x.greater(x.constant(0.0)).lesser(x.constant(1.0)) * (count - 1) as f32;
@@ -51,7 +52,7 @@ impl<N: Number> Place<N> {
         Place { first, t: x - first }
     }
 
-    /// Linear between the entries of a table.
+    /// Interpolates linearly between the entries of a table.
     #[inline(always)]
     pub fn between(self, table: &[f32]) -> N {
         let zero = self.t.constant(0.0);
@@ -59,7 +60,7 @@ impl<N: Number> Place<N> {
         a + (N::entry(table, zero, 0, self.first + 1.0) - a) * self.t
     }
 
-    /// Linear between the rows of a table, at the place `column` of each.
+    /// Interpolates linearly between the rows of a table, at the position `column` in each row.
     #[inline(always)]
     pub fn between_rows(self, table: &[f32], columns: usize, column: Place<N>) -> N {
         let of_row = column.of_row(table, self.first, columns);
@@ -73,7 +74,7 @@ impl<N: Number> Place<N> {
     }
 }
 
-/// The place of α in the tables.
+/// The position of α in the tables.
 #[inline(always)]
 pub fn roughness<N: Number>(alpha: N) -> Place<N> {
     Place::new(alpha.root(), ROUGHNESSES)
@@ -112,7 +113,7 @@ impl Tables {
         tables
     }
 
-    /// 2∫E μ dμ of what the table interpolates.
+    /// 2∫E μ dμ of the interpolated table.
     fn mean_of(&self, row: Place<f32>) -> [f32; 2] {
         const N: usize = 512;
         let mut sum = [0.0; 2];
@@ -125,7 +126,7 @@ impl Tables {
     }
 }
 
-/// [E, E₅] by stratified visible normals, whose weight is G/G1(wo).
+/// [E, E₅] from stratified visible normals, which have the weight G/G1(wo).
 fn integrate(alpha: f32, mu: f32) -> [f32; 2] {
     let mu = mu.max(1e-4);
     let facets = Facets { alpha_x: alpha, alpha_y: alpha };

@@ -2,12 +2,14 @@
 //!
 //! f(wo, wi) = f_r(wo, wi) + b T(wo) T(wi),
 //!
-//! b being the sum over the reflections at the base, T(w) the transmittance of the coat from outside, R(w) its
+//! where b is the sum over the reflections at the base, T(w) the transmittance of the coat from outside, and R(w) its
 //! reflectance. Both sides of the surface are coated.
 //!
 //! [`Coated`] has a rough interface, whose T and R are tabulated: rows of [`COSINES`] pairs (T, R), evenly spaced in
-//! √cos θ. Parameters: b, the base's albedo over T(wo) that lobes are chosen by, η, alphas, row of the table and the
-//! place between that and the next one. [`SmoothCoated`] has a smooth one. Parameters: b, that albedo, η, thickness.
+//! √cos θ. Parameters: b, the base's albedo over T(wo) for choosing lobes, η, alphas, row of the table, and fraction
+//! between this row and the next.
+//!
+//! [`SmoothCoated`] has a smooth interface. Parameters: b, the albedo as above, η, thickness.
 
 use super::facets::Facets;
 use super::fresnel::{fr_dielectric, reflect};
@@ -17,10 +19,10 @@ use lumiris_numbers::math::number::{Mask as _, Number};
 use lumiris_numbers::math::v3::V3;
 use std::f32::consts::FRAC_1_PI;
 
-/// Nodes of the tables over √cos θ.
+/// Entries of the tables over √cos θ.
 pub const COSINES: usize = 128;
 
-/// A rough coat of equal roughness in all directions.
+/// A rough, isotropic coat.
 #[derive(Debug)]
 pub struct Coated;
 
@@ -28,7 +30,7 @@ pub struct Coated;
 #[derive(Debug)]
 pub struct SmoothCoated;
 
-/// Linear between two entries of a row; `column` counts numbers.
+/// Interpolates linearly between two entries of a row; `column` counts numbers.
 #[inline(always)]
 fn between<N: Number>(tables: &[f32], row: N, column: N, t: N) -> N {
     let a = N::entry(tables, row, 2 * COSINES, column);
@@ -36,7 +38,7 @@ fn between<N: Number>(tables: &[f32], row: N, column: N, t: N) -> N {
     a + (b - a) * t
 }
 
-/// T, or R, of the cosine `cos` between the rows `row` and the next.
+/// T or R for the cosine `cos`, interpolated between `row` and the next row.
 #[inline(always)]
 fn directional<N: Number>(tables: &[f32], [row, t]: [N; 2], cos: N, is_reflectance: bool) -> N {
     let (zero, one) = (cos.constant(0.0), cos.constant(1.0));
@@ -50,13 +52,13 @@ fn directional<N: Number>(tables: &[f32], [row, t]: [N; 2], cos: N, is_reflectan
     below + (between(tables, row + 1.0, column, x - first) - below) * t
 }
 
-/// [T, R] of a rough coat by its table, for a direction of the cosine `cos` ≥ 0.
+/// [T, R] of a rough coat from its table, for the cosine `cos` ≥ 0.
 #[inline(always)]
 pub fn rough_directional<N: Number>(tables: &[f32], row: [N; 2], cos: N) -> [N; 2] {
     [directional(tables, row, cos, false), directional(tables, row, cos, true)]
 }
 
-/// [T, R] of a smooth coat for a direction of the cosine `cos` ≥ 0.
+/// [T, R] of a smooth coat for the cosine `cos` ≥ 0.
 #[inline(always)]
 pub fn smooth_directional<N: Number>(cos: N, eta: N, thickness: N) -> [N; 2] {
     let (zero, one) = (cos.constant(0.0), cos.constant(1.0));
@@ -66,21 +68,21 @@ pub fn smooth_directional<N: Number>(cos: N, eta: N, thickness: N) -> [N; 2] {
     [passes.or_zero(one.above(fresnel) & cos_t.above(zero)), fresnel]
 }
 
-/// Probability of sampling the interface, in proportion to the albedos; `albedo` is the base's over T(wo).
+/// Probability of sampling the interface, proportional to the albedos; `albedo` is the base's albedo over T(wo).
 #[inline(always)]
 pub fn p_interface<N: Number>(albedo: N, [t, r]: [N; 2]) -> N {
     let sum = r + albedo * t;
     (r / sum).or_zero(sum.above(r.constant(0.0)))
 }
 
-/// What the base adds: f·cos θi, and the density of the cosine.
+/// Contribution of the base: f·cos θi, and the density of cosine sampling.
 #[inline(always)]
 fn base<N: Number>(p: &[N], t: N, cos: N) -> Value<N> {
     let factor = t * cos;
     Value { f_cos: [p[0] * factor, p[1] * factor, p[2] * factor], pdf: cos * FRAC_1_PI }
 }
 
-/// Density of reflection by a rough interface, and its f·cos θi; both directions are in the upper hemisphere.
+/// Density of reflection by a rough interface, and its f·cos θi. Both directions are in the upper hemisphere.
 #[inline(always)]
 pub fn interface<N: Number>(p: &[N], wo: V3<N>, wi: V3<N>) -> (N, N) {
     let h = wo.plus(wi);
@@ -89,7 +91,7 @@ pub fn interface<N: Number>(p: &[N], wo: V3<N>, wi: V3<N>) -> (N, N) {
     (pdf.or_zero(fresnel.above(pdf.constant(0.0))), d_g * fresnel)
 }
 
-/// Value and density in the upper hemisphere by T and R of `wo` and T of `wi`, of a rough interface.
+/// Value and density of a rough coat for directions in the upper hemisphere, given T and R of `wo` and T of `wi`.
 #[inline(always)]
 pub fn rough_value<N: Number>(p: &[N], (wo, wi): (V3<N>, V3<N>), of_wo: [N; 2], t_wi: N) -> Value<N> {
     let (density, reflected) = interface(p, wo, wi);
@@ -98,13 +100,14 @@ pub fn rough_value<N: Number>(p: &[N], (wo, wi): (V3<N>, V3<N>), of_wo: [N; 2], 
     Value { f_cos: [r + reflected, g + reflected, b + reflected], pdf: choice * density + (-choice + 1.0) * pdf }
 }
 
-/// A direction of the interface or of the cosine, and where it is of the interface; `wo` is in the upper hemisphere.
+/// Samples a direction of the interface or the base; the mask is true for the interface. `wo` is in the upper
+/// hemisphere.
 #[inline(always)]
 pub fn rough_direction<N: Number>(p: &[N], wo: V3<N>, of_wo: [N; 2], u: [N; 3]) -> (V3<N>, N::Mask) {
     let is_interface = p_interface(p[3], of_wo).above(u[0]);
     let u = [u[1], u[2]];
     let facets = Facets { alpha_x: p[5], alpha_y: p[6] };
-    // A branch for one direction; of many, some are of each kind
+    // A branch if all lanes agree, else both are computed
     let wi = if is_interface.all() {
         reflect(wo, facets.sample_m(wo, u))
     } else if !is_interface.any() {
@@ -121,7 +124,7 @@ pub fn kind<N: Number>(is_interface: N::Mask, of_interface: u8, like: N) -> N {
     N::choose(is_interface, flags(like, of_interface | lobe::REFLECTION), flags(like, lobe::DIFFUSE | lobe::REFLECTION))
 }
 
-/// −1 where `w` is in the lower hemisphere, else 1.
+/// −1 if `w` is in the lower hemisphere, else 1.
 #[inline(always)]
 pub fn flip<N: Number>(w: V3<N>) -> N {
     let one = w.z.constant(1.0);
@@ -168,6 +171,7 @@ impl BsdfKernel for SmoothCoated {
 
     #[inline(always)]
     fn sample<N: Number>(p: &[N], _tables: &[f32], wo: V3<N>, u: [N; 3]) -> Drawn<N> {
+        // Choose between mirror and base
         let (cos_o, zero) = (wo.z.magnitude(), wo.z.constant(0.0));
         let of_wo = smooth_directional(cos_o, p[4], p[5]);
         let choice = p_interface(p[3], of_wo);
@@ -183,6 +187,8 @@ impl BsdfKernel for SmoothCoated {
             ],
             pdf: N::choose(is_mirror, choice, (-choice + 1.0) * pdf),
         };
+
+        // The base reflects to the side of `wo`
         let cosine = cosine.with_z(cosine.z.signed_as(wo.z));
         let wi = V3::choose(is_mirror, V3 { x: -wo.x, y: -wo.y, z: wo.z }, cosine);
         let kind = kind(is_mirror, lobe::SPECULAR, cos_o);

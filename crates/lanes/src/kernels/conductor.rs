@@ -1,5 +1,5 @@
-//! Reflection by a metal, smooth or with GGX microfacets: f = D F G / (4 cos θo cos θi) [Cook and Torrance 1982;
-//! Walter et al. 2007], one scattering event only. Parameters: alphas, η, k.
+//! Reflection by a metal, smooth or with GGX microfacets: f = D F G / (4 cos θo cos θi) [Cook and Torrance 1982; Walter
+//! et al. 2007]. Single scattering only. Parameters: alphas, η, k.
 
 use super::facets::Facets;
 use super::fresnel::{fr_complex, reflect};
@@ -16,7 +16,7 @@ fn facets<N: Number>(p: &[N]) -> Facets<N> {
     Facets { alpha_x: p[0], alpha_y: p[1] }
 }
 
-/// Reflectance of the channels, times `factor`.
+/// Reflectance of the channels times `factor`.
 #[inline(always)]
 fn metal<N: Number>(p: &[N], cos: N, factor: N) -> [N; 3] {
     [fr_complex(cos, p[2], p[5]) * factor, fr_complex(cos, p[3], p[6]) * factor, fr_complex(cos, p[4], p[7]) * factor]
@@ -35,6 +35,7 @@ impl BsdfKernel for Conductor {
 
     #[inline(always)]
     fn sample<N: Number>(p: &[N], _tables: &[f32], wo: V3<N>, u: [N; 3]) -> Drawn<N> {
+        // A mirror by default, microfacets where the surface is rough
         let (zero, one) = (wo.z.constant(0.0), wo.z.constant(1.0));
         let is_smooth = facets(p).is_smooth();
         let mirror = V3 { x: -wo.x, y: -wo.y, z: wo.z };
@@ -47,6 +48,8 @@ impl BsdfKernel for Conductor {
             (d_g, pdf) = (N::choose(is_smooth, one, of_rough), N::choose(is_smooth, one, pdf_rough));
             cos_m = N::choose(is_smooth, cos_m, wo.dot(m).magnitude());
         }
+
+        // Value and flags
         let value = Value { f_cos: metal(p, cos_m, d_g), pdf };
         let kind = N::choose(
             is_smooth,

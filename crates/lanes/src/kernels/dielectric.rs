@@ -1,9 +1,9 @@
 //! Reflection and refraction at a dielectric interface, smooth or with GGX microfacets [Walter et al. 2007].
 //!
 //! Reflection: f = D F G / (4 cos θo cos θi), half vector m = wo + wi. Transmission: m = wo + η'wi,
-//! f = D (1 − F) G |wo·m wi·m| / (|cos θo cos θi| (wi·m + wo·m/η')²), times 1/η'² for radiance, where η' is the index
-//! of the side of `wi` relative to the side of `wo`. One scattering event only. Parameters: η of the side of −z
-//! relative to that of +z, alphas.
+//! f = D (1 − F) G |wo·m wi·m| / (|cos θo cos θi| (wi·m + wo·m/η')²), times 1/η'² for radiance. η' is the index of
+//! refraction on the side of `wi` relative to the side of `wo`. Single scattering only. Parameters: η on the side of −z
+//! relative to the side of +z, alphas.
 
 use super::facets::Facets;
 use super::fresnel::{fr_inverse, inverse_eta, reflect, refract};
@@ -11,7 +11,7 @@ use super::{BsdfKernel, Drawn, Value, flags, lobe, same_side};
 use lumiris_numbers::math::number::{Mask as _, Number};
 use lumiris_numbers::math::v3::V3;
 
-/// What is transported along the path, which decides whether transmission scales by 1/η².
+/// Transported quantity, which decides whether transmission scales by 1/η².
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Transport {
     /// Paths from the camera.
@@ -20,7 +20,7 @@ pub enum Transport {
     Importance,
 }
 
-/// Which lobes a sample, a value or a density is of.
+/// Selected lobes of a sample, value or density.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Select {
     /// Both.
@@ -35,21 +35,21 @@ pub enum Select {
 #[derive(Debug)]
 pub struct Dielectric;
 
-/// Transmission alone: out of an interior whose reflections are no vertices.
+/// Transmission only: out of an interior whose internal reflections are not path vertices.
 #[derive(Debug)]
 pub struct Exit;
 
 /// Interface between the outside (+z) and a dielectric (−z).
 #[derive(Clone, Copy, Debug)]
 pub struct Interface<N> {
-    /// Index of refraction of the side of −z relative to that of +z.
+    /// Index of refraction on the side of −z relative to the side of +z.
     pub eta: N,
     /// Microfacets.
     pub facets: Facets<N>,
 }
 
 impl Select {
-    /// Probability of reflection among the selected lobes, and where they carry light.
+    /// Probability of reflection among the selected lobes, and the mask of lanes in which these carry light.
     #[inline(always)]
     fn p_reflect<N: Number>(self, fresnel: N) -> (N, N::Mask) {
         let (zero, one) = (fresnel.constant(0.0), fresnel.constant(1.0));
@@ -61,7 +61,7 @@ impl Select {
     }
 }
 
-/// Value of both lobes, and of the selected ones.
+/// The value if its lobe is selected, else 0.
 #[inline(always)]
 fn selected<N: Number>(select: Select, value: N, is_reflection: N::Mask) -> N {
     match select {
@@ -78,7 +78,7 @@ impl<N: Number> Interface<N> {
         Interface { eta: p[0], facets: Facets { alpha_x: p[1], alpha_y: p[2] } }
     }
 
-    /// True where all scattering is by deltas.
+    /// True if all scattering is specular.
     #[inline(always)]
     pub fn is_specular(self) -> N::Mask {
         let from_one = (self.eta - 1.0).magnitude();
@@ -91,7 +91,7 @@ impl<N: Number> Interface<N> {
         let (zero, one) = (wo.z.constant(0.0), wo.z.constant(1.0));
         let inverse = inverse_eta(wo.z, self.eta);
         let h = wo.times(N::choose(same_side(wo, wi), one, inverse)).plus(wi);
-        // Along the normal in the upper hemisphere
+        // Oriented to the upper hemisphere
         let scale = one.signed_as(h.z) / h.dot(h).root();
         let (o_m, i_m) = (wo.dot(h) * scale, wi.dot(h) * scale);
         let faces = (i_m * wi.z).above(zero) & (o_m * wo.z).above(zero);
@@ -100,7 +100,7 @@ impl<N: Number> Interface<N> {
         (f_cos[0], pdf)
     }
 
-    /// The same for a normal along `h`, with the cosines of `wo` and `wi` to it.
+    /// f·|cos θi| and density (1/sr) for a half vector along `h`, whose cosines with `wo` and `wi` are `o_m` and `i_m`.
     #[inline(always)]
     fn of_normal(
         self,
@@ -109,6 +109,7 @@ impl<N: Number> Interface<N> {
         inverse: N,
         (select, transport): (Select, Transport),
     ) -> (N, N) {
+        // Reflection or transmission
         let is_reflection = same_side(wo, wi);
         let fresnel = fr_inverse(o_m, inverse);
         let (p, exists) = select.p_reflect(fresnel);
@@ -119,14 +120,16 @@ impl<N: Number> Interface<N> {
             Transport::Radiance => inverse * inverse,
             Transport::Importance => inverse.constant(1.0),
         };
+        // Values of the selected lobes
         let f_cos = d_g * N::choose(is_reflection, fresnel, (-fresnel + 1.0) * jacobian * scale);
         let pdf = density * N::choose(is_reflection, p, (-p + 1.0) * jacobian);
         (selected(select, f_cos, is_reflection), pdf.or_zero(exists))
     }
 
-    /// Reflection or refraction, chosen by the Fresnel reflectance of the sampled microfacet.
+    /// Samples reflection or refraction, chosen by the Fresnel reflectance of the sampled microfacet.
     #[inline(always)]
     pub fn sample(self, wo: V3<N>, u: [N; 3], select: Select, transport: Transport) -> Drawn<N> {
+        // Sample a microfacet, then reflection or refraction
         let (zero, one) = (wo.z.constant(0.0), wo.z.constant(1.0));
         let is_specular = self.is_specular();
         let up = V3 { x: zero, y: zero, z: one };

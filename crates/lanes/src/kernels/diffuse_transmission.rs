@@ -10,7 +10,7 @@ use std::f32::consts::FRAC_1_PI;
 #[derive(Debug)]
 pub struct DiffuseTransmission;
 
-/// Probability of sampling reflection, in proportion to the largest channels; 1 if the surface is black.
+/// Probability of sampling reflection, proportional to the largest channels; 1 if the surface is black.
 #[inline(always)]
 pub fn p_reflect<N: Number>(p: &[N]) -> N {
     let r = p[0].greater(p[1]).greater(p[2]);
@@ -18,14 +18,14 @@ pub fn p_reflect<N: Number>(p: &[N]) -> N {
     N::choose(sum.above(r.constant(0.0)), r / sum, r.constant(1.0))
 }
 
-/// True where the surface is not black.
+/// True unless the surface is black.
 #[inline(always)]
 fn exists<N: Number>(p: &[N]) -> N::Mask {
     let sum = p[0].greater(p[1]).greater(p[2]) + p[3].greater(p[4]).greater(p[5]);
     sum.above(sum.constant(0.0))
 }
 
-/// Value of the side of `wo` or of the other one, and the density.
+/// Value and density of reflection or transmission.
 #[inline(always)]
 fn of_side<N: Number>(p: &[N], reflects: N::Mask, cos: N) -> Value<N> {
     let density = cos * FRAC_1_PI;

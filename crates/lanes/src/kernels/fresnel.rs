@@ -11,8 +11,8 @@ pub fn reflect<N: Number>(w: V3<N>, n: V3<N>) -> V3<N> {
     n.times(w.dot(n) * 2.0).minus(w)
 }
 
-/// Direction to which `w` refracts at a surface with normal `n`, and 1/η along that path (1/η, or η where `w` lies on
-/// the side of `-n`); the mask is false at total internal reflection.
+/// The refracted direction of `w` at a surface with normal `n`, and 1/η along the path (η if `w` is on the side of
+/// `-n`). The mask is false at total internal reflection.
 #[inline(always)]
 pub fn refract<N: Number>(w: V3<N>, n: V3<N>, eta: N) -> (V3<N>, N, N::Mask) {
     let (cos, one) = (w.dot(n), eta.constant(1.0));
@@ -24,20 +24,20 @@ pub fn refract<N: Number>(w: V3<N>, n: V3<N>, eta: N) -> (V3<N>, N, N::Mask) {
     (n.times(along).minus(w.times(inverse)), inverse, one.above(sin2_t))
 }
 
-/// 1/η of the path of which one direction has the cosine `cos` with the normal.
+/// 1/η along a path, one direction of which has the cosine `cos` with the normal.
 #[inline(always)]
 pub fn inverse_eta<N: Number>(cos: N, eta: N) -> N {
     N::choose(eta.constant(0.0).above(cos), eta, eta.constant(1.0) / eta)
 }
 
-/// Reflectance of a dielectric interface for the cosine of incidence `cos`, which is negative for light that comes
-/// from the side of `-n`. 1 at total internal reflection.
+/// Reflectance of a dielectric interface for the cosine of incidence `cos`, which is negative for light from the side
+/// of `-n`. 1 at total internal reflection.
 #[inline(always)]
 pub fn fr_dielectric<N: Number>(cos: N, eta: N) -> N {
     fr_inverse(cos, inverse_eta(cos, eta))
 }
 
-/// The same by 1/η along the path.
+/// Reflectance of a dielectric interface, given 1/η along the path.
 #[inline(always)]
 pub fn fr_inverse<N: Number>(cos: N, inverse: N) -> N {
     let one = cos.constant(1.0);
@@ -50,15 +50,15 @@ pub fn fr_inverse<N: Number>(cos: N, inverse: N) -> N {
     one.if_above(sin2_t, r, one)
 }
 
-/// Reflectance of an interface to an absorbing medium of complex index η + ik. With perpendicular
-/// s = (t1 − t2)/(t1 + t2) and parallel s (t3 − t4)/(t3 + t4), their mean is s t3/(t3 + t4).
+/// Reflectance of an interface to an absorbing medium with the complex index η + ik. With the perpendicular reflectance
+/// s = (t1 − t2)/(t1 + t2) and the parallel reflectance s (t3 − t4)/(t3 + t4), their mean is s t3/(t3 + t4).
 #[inline(always)]
 pub fn fr_complex<N: Number>(cos: N, eta: N, k: N) -> N {
     let (zero, one) = (cos.constant(0.0), cos.constant(1.0));
     let cos = cos.greater(zero).lesser(one);
     let (cos2, eta2, k2) = (cos * cos, eta * eta, k * k);
     let sin2 = one - cos2;
-    // a² + b² and a of the refracted wave vector a + ib.
+    // a² + b² and a of the refracted wave vector a + ib
     let t0 = eta2 - k2 - sin2;
     let a2_plus_b2 = (t0 * t0 + eta2 * k2 * 4.0).safe_root();
     let a = ((a2_plus_b2 + t0) * 0.5).safe_root();
@@ -66,7 +66,7 @@ pub fn fr_complex<N: Number>(cos: N, eta: N, k: N) -> N {
     let t2 = a * cos * 2.0;
     let t3 = cos2 * a2_plus_b2 + sin2 * sin2;
     let t4 = t2 * sin2;
-    // Only at grazing incidence on no interface at all (η = 1, k = 0) do the sums vanish; reflect all as the limit does.
+    // The sums vanish only at grazing incidence without an interface (η = 1, k = 0). The limit is total reflection
     let divisor = (t1 + t2) * (t3 + t4);
     let r = ((t1 - t2) * t3 / divisor).greater(zero).lesser(one);
     divisor.if_above(zero, r, one)

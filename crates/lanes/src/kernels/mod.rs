@@ -1,7 +1,7 @@
-//! Scattering of one kind, written once: for a single direction, for one BSDF and many directions, and for many vertices.
+//! BSDFs, each written once for three uses: a single direction, one BSDF with many directions, and many vertices.
 //!
-//! Directions are in the shading frame, n = +z. A kernel is a [`BsdfKernel`]; [`rows`] evaluates it over columns. What
-//! is symmetric has two equal sides.
+//! Directions are in the shading frame, n = +z. A kernel is a [`BsdfKernel`]; [`rows`] evaluates it over columns.
+//! Two-sided BSDFs behave the same on both sides.
 //!
 //! Reading order: this file, [`fresnel`], [`facets`], [`diffuse`], [`diffuse_transmission`], [`conductor`],
 //! [`dielectric`], [`thin_dielectric`], [`coated`], [`albedo`], [`sheen`], [`principled`], [`rows`].
@@ -31,17 +31,17 @@ pub use thin_dielectric::ThinDielectric;
 use lumiris_numbers::math::number::Number;
 use lumiris_numbers::math::v3::V3;
 
-/// Flags of samples. A sum of them is a whole number.
+/// Flags of samples. A sum of flags is a whole number.
 pub mod lobe {
     /// To the side of `wo`.
     pub const REFLECTION: u8 = 1;
     /// To the other side.
     pub const TRANSMISSION: u8 = 2;
-    /// Lambertian or as wide.
+    /// Lambertian or similarly wide.
     pub const DIFFUSE: u8 = 4;
-    /// A rough peak.
+    /// A rough lobe.
     pub const GLOSSY: u8 = 8;
-    /// A delta: the density is a probability, and values and densities leave it out.
+    /// A delta. The density is a probability; values and densities of other directions do not include it.
     pub const SPECULAR: u8 = 16;
 }
 
@@ -59,30 +59,30 @@ pub struct Value<N> {
 pub struct Drawn<N> {
     /// Direction to the light.
     pub wi: V3<N>,
-    /// f·|cos θi| by channel (1/sr); of a delta, its weight times `pdf`.
+    /// f·|cos θi| by channel (1/sr). For a delta, its weight times `pdf`.
     pub f_cos: [N; 3],
-    /// Density (1/sr); of a delta, its probability; 0 where there is no sample.
+    /// Density (1/sr). For a delta, its probability. 0 if there is no sample.
     pub pdf: N,
-    /// Sum of flags of [`lobe`].
+    /// Sum of [`lobe`] flags.
     pub lobe: N,
-    /// Index of refraction of the side of `wi` relative to that of `wo`; 1 for reflection.
+    /// Index of refraction on the side of `wi` relative to the side of `wo`; 1 for reflection.
     pub eta: N,
 }
 
-/// Scattering of one kind: `p` are its parameters, `tables` what is tabulated of them.
+/// A BSDF. `p` are its parameters, `tables` its tabulated values.
 pub trait BsdfKernel {
     /// Number of parameters.
     const PARAMS: usize;
 
-    /// Value and density.
+    /// Value and density for a pair of directions.
     fn evaluate<N: Number>(p: &[N], tables: &[f32], wo: V3<N>, wi: V3<N>) -> Value<N>;
 
-    /// A direction, by `u[0]` among the lobes and by the others within one. Directions that carry no light are samples
-    /// as well.
+    /// Samples a direction: `u[0]` chooses the lobe, `u[1]` and `u[2]` the direction within it. Directions with a value
+    /// of zero are samples, too.
     fn sample<N: Number>(p: &[N], tables: &[f32], wo: V3<N>, u: [N; 3]) -> Drawn<N>;
 }
 
-/// Most parameters of a kernel.
+/// Largest number of parameters of a kernel.
 pub const MAX_PARAMS: usize = principled::PARAMS;
 
 /// The kernels.
@@ -96,15 +96,15 @@ pub enum Kernel {
     Conductor,
     /// Glass.
     Dielectric,
-    /// Refraction alone.
+    /// Refraction only.
     Exit,
     /// A sheet of glass.
     ThinDielectric,
-    /// Lambertian under a rough coat.
+    /// Lambertian base under a rough coat.
     Coated,
-    /// Lambertian under a smooth coat.
+    /// Lambertian base under a smooth coat.
     SmoothCoated,
-    /// Metal, glossy diffuse or glass under a coat.
+    /// Metal, glossy diffuse or glass, under a coat.
     Principled,
 }
 
@@ -126,13 +126,13 @@ impl Kernel {
 }
 
 impl<N: Number> Value<N> {
-    /// The same for all channels.
+    /// The same value for all channels.
     #[inline(always)]
     pub fn grey(f_cos: N, pdf: N) -> Self {
         Value { f_cos: [f_cos, f_cos, f_cos], pdf }
     }
 
-    /// Zero where the mask is false, and where it is not finite: a value as a whole.
+    /// Zero where the mask is false. Values with a non-finite channel, and non-finite densities, become 0, too.
     #[inline(always)]
     pub fn kept(self, mask: N::Mask) -> Self {
         let [r, g, b] = self.f_cos;
@@ -143,13 +143,13 @@ impl<N: Number> Value<N> {
 }
 
 impl<N: Number> Drawn<N> {
-    /// Of the parts of one value.
+    /// A sample with the given value and density.
     #[inline(always)]
     pub fn new(wi: V3<N>, value: Value<N>, lobe: N, eta: N) -> Self {
         Drawn { wi, f_cos: value.f_cos, pdf: value.pdf, lobe, eta }
     }
 
-    /// No sample where the mask is false, and where the direction is along the surface.
+    /// Removes samples where the mask is false, and directions along the surface.
     #[inline(always)]
     pub fn kept(self, mask: N::Mask) -> Self {
         let zero = self.pdf.constant(0.0);
@@ -159,13 +159,13 @@ impl<N: Number> Drawn<N> {
     }
 }
 
-/// A sum of flags.
+/// A sum of flags as a number.
 #[inline(always)]
 fn flags<N: Number>(like: N, flags: u8) -> N {
     like.constant(f32::from(flags))
 }
 
-/// True where both directions are on one side.
+/// True if both directions are on the same side.
 #[inline(always)]
 fn same_side<N: Number>(wo: V3<N>, wi: V3<N>) -> N::Mask {
     (wo.z * wi.z).above(wo.z.constant(0.0))

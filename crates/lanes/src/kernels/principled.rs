@@ -1,19 +1,20 @@
-//! Metal, glossy diffuse or glass under a coat, with a part of the parameters of OpenPBR, which are those of glTF's
-//! metallic-roughness model: GGX facets of Schlick's reflectance.
+//! Metal, glossy diffuse or glass, under a coat. The parameters are a subset of OpenPBR's, in the form of glTF's
+//! metallic-roughness model: GGX microfacets with Schlick's reflectance.
 //!
-//! With the metalness m and the transmission t, the surface is m metal, (1 − m)(1 − t) glossy diffuse and (1 − m)t glass.
-//! All reflect by the same facets, with the multiple scattering of [`super::albedo`]. S(w) being the albedo of the
-//! dielectric reflection, light that passes the facets
+//! With the metalness m and the transmission t, the surface is a mixture of m metal, (1 − m)(1 − t) glossy diffuse and
+//! (1 − m)t glass. All of them reflect by the same microfacets, with the multiple scattering of [`super::albedo`]. S(w)
+//! is the albedo of the dielectric reflection. Light that is not reflected by the facets
 //!
-//! * is reflected by a diffuse base: ρ (1 − S(wo)) (1 − S(wi)) / (π (1 − S̄)), which loses nothing where ρ = 1;
-//! * goes through a thin sheet as if reflected and mirrored at the sheet, times the base colour: roughness blurs the
+//! * is reflected by a diffuse base: ρ (1 − S(wo)) (1 − S(wi)) / (π (1 − S̄)), which conserves energy for ρ = 1;
+//! * passes a thin sheet, as if reflected and mirrored at the sheet, times the base colour: roughness blurs the
 //!   background, and nothing is refracted;
 //! * or is refracted into a solid by [`Interface`], whose exact reflectance replaces Schlick's.
 //!
-//! A coat of weight c and albedo S_c lets min(1 − c S_c(wo), 1 − c S_c(wi)) of the light below through: reciprocal, and
-//! never more than is left. Between them is [`super::sheen`], the fuzz of OpenPBR, which has it above the coat.
+//! A coat of weight c and albedo S_c transmits min(1 − c S_c(wo), 1 − c S_c(wi)) of the light below. This is
+//! reciprocal, and never more than the energy left by the coat. [`super::sheen`], OpenPBR's fuzz, is between coat and
+//! surface; OpenPBR has it above the coat.
 //!
-//! Smooth facets are as rough as the smoothest that count as rough, so there are no deltas. Parameters: see [`Params`].
+//! Smooth facets get the smallest roughness that counts as rough, so there are no deltas. Parameters: see [`Params`].
 
 use super::albedo::{self, Place, roughness};
 use super::dielectric::{Interface, Select, Transport};
@@ -25,37 +26,37 @@ use lumiris_numbers::math::number::{Mask as _, Number};
 use lumiris_numbers::math::v3::V3;
 use std::f32::consts::FRAC_1_PI;
 
-/// Reflectance of a coat at normal incidence, of an index of refraction of 1.5.
+/// Reflectance of a coat at normal incidence, for an index of refraction of 1.5.
 const COAT_F0: f32 = 0.04;
 
 /// The kernel.
 #[derive(Debug)]
 pub struct Principled;
 
-/// The parameters, in this order.
+/// The parameters, in array order.
 #[derive(Clone, Copy, Debug)]
 pub struct Params<N> {
-    /// Reflectance of the metal, albedo of the diffuse base, transmittance of the glass.
+    /// Reflectance of the metal, albedo of the diffuse base, and transmittance of the glass.
     pub base_color: V3<N>,
-    /// Part that is metal.
+    /// Share of metal.
     pub metalness: N,
     /// Reflectance of the dielectric at normal incidence.
     pub f0: V3<N>,
     /// Reflectance of the dielectric at grazing angles.
     pub f90: N,
-    /// Facets; not smooth.
+    /// Microfacets; never smooth.
     pub facets: Facets<N>,
-    /// Part of the dielectric that is glass.
+    /// Share of glass in the dielectric.
     pub transmission: N,
     /// Index of refraction of the glass; 0 for a thin sheet.
     pub eta: N,
-    /// Colour of the sheen; black is none.
+    /// Colour of the sheen; black for none.
     pub sheen: V3<N>,
     /// Roughness of the sheen.
     pub sheen_alpha: N,
     /// Weight of the coat.
     pub coat: N,
-    /// Roughness of the coat; not smooth.
+    /// Roughness of the coat; never smooth.
     pub coat_alpha: N,
 }
 
@@ -73,43 +74,43 @@ struct Schlick<N> {
 /// Probabilities of the lobes for one `wo`; their sum is 1.
 #[derive(Clone, Copy, Debug)]
 pub struct Choice<N> {
-    /// The facets' reflection.
+    /// Reflection by the microfacets.
     pub facets: N,
-    /// The coat's reflection.
+    /// Reflection by the coat.
     pub coat: N,
-    /// Through a thin sheet.
+    /// Transmission through a thin sheet.
     pub thin: N,
-    /// By a solid's interface.
+    /// Reflection or refraction by a solid's interface.
     pub solid: N,
-    /// By the cosine.
+    /// Cosine-weighted reflection.
     pub diffuse: N,
 }
 
-/// All that does not depend on directions.
+/// Values that do not depend on directions.
 #[derive(Clone, Copy)]
 struct Surface<N> {
     p: Params<N>,
-    /// Parts that are diffuse, thin glass, and solid glass.
+    /// Shares of diffuse base, thin glass and solid glass.
     diffuse: N,
     thin: N,
     solid: N,
-    /// The roughness that albedos are tabulated for.
+    /// Position of the roughness in the albedo tables.
     roughness: Place<N>,
     /// [Ē, Ē₅].
     mean: [N; 2],
     dielectric: Schlick<N>,
-    /// Metal, diffuse and thin glass together.
+    /// Metal, diffuse base and thin glass together.
     facets: Schlick<N>,
 }
 
-/// All that depends on one direction.
+/// Values that depend on one direction.
 #[derive(Clone, Copy)]
 struct Seen<N> {
     /// [E, E₅].
     e: [N; 2],
     /// Albedo of a white sheen.
     sheen: N,
-    /// [E, E₅] of the coat, and its albedo times its weight.
+    /// E of the coat; its albedo times its weight.
     coat_e: N,
     coat: N,
 }
@@ -135,7 +136,7 @@ fn rest<N: Number>(c: V3<N>) -> V3<N> {
     V3 { x: -c.x + 1.0, y: -c.y + 1.0, z: -c.z + 1.0 }
 }
 
-/// F_ms of one channel.
+/// F_ms for one channel.
 #[inline(always)]
 fn multiple_fresnel<N: Number>(f0: N, f90: N, mean: N) -> N {
     let f = f0 + (f90 - f0) * (1.0 / 21.0);
@@ -165,7 +166,7 @@ impl<N: Number> Schlick<N> {
         self.f0.plus(self.f90.minus(self.f0).times(x.squared().squared() * x))
     }
 
-    /// Albedo of single scattering, and of multiple scattering.
+    /// Albedos of single scattering and of multiple scattering.
     #[inline(always)]
     fn albedos(self, [e, e5]: [N; 2]) -> [V3<N>; 2] {
         [self.f0.times(e - e5).plus(self.f90.times(e5)), self.fms.times(-e + 1.0)]
@@ -189,7 +190,7 @@ impl<N: Number> Schlick<N> {
 }
 
 impl<N: Number> Params<N> {
-    /// From the array.
+    /// Reads the parameters from an array.
     #[inline(always)]
     pub fn new(p: &[N]) -> Self {
         Params {
@@ -207,7 +208,7 @@ impl<N: Number> Params<N> {
         }
     }
 
-    /// Probabilities of the lobes seen from `wo`.
+    /// Probabilities of the lobes for `wo`.
     #[inline(always)]
     pub fn choice(self, wo: V3<N>) -> Choice<N> {
         let surface = Surface::new(self);
@@ -219,13 +220,13 @@ impl<N: Number> Params<N> {
         Facets { alpha_x: self.coat_alpha, alpha_y: self.coat_alpha }
     }
 
-    /// True where there is a sheen.
+    /// True if there is a sheen.
     #[inline(always)]
     fn has_sheen(self) -> N::Mask {
         largest(self.sheen).above(self.coat.constant(0.0))
     }
 
-    /// True where there is a coat.
+    /// True if there is a coat.
     #[inline(always)]
     fn has_coat(self) -> N::Mask {
         self.coat.above(self.coat.constant(0.0))
@@ -248,7 +249,7 @@ impl<N: Number> Surface<N> {
         Surface { p, diffuse, thin, solid, roughness, mean, dielectric, facets }
     }
 
-    /// Schlick's reflectance of the coat, and its Ē.
+    /// Schlick's reflectance of the coat, and the Ē of its roughness.
     #[inline(always)]
     fn coat(&self) -> (Schlick<N>, N) {
         let [mean, _] = albedo::tables().mean(roughness(self.p.coat_alpha));
@@ -270,9 +271,10 @@ impl<N: Number> Surface<N> {
         seen
     }
 
-    /// Probabilities in proportion to albedos; multiple scattering and sheen are drawn with the diffuse lobe.
+    /// Lobe probabilities proportional to albedos. Multiple scattering and sheen are sampled with the diffuse lobe.
     #[inline(always)]
     fn choice(&self, of_wo: Seen<N>) -> Choice<N> {
+        // Albedos
         let (zero, one) = (self.p.coat.constant(0.0), self.p.coat.constant(1.0));
         let [single, multiple] = self.facets.albedos(of_wo.e);
         let (single, multiple) = (average(single), average(multiple));
@@ -281,6 +283,7 @@ impl<N: Number> Surface<N> {
         let sheen = average(self.p.sheen) * of_wo.sheen;
         let uncoated = one - of_wo.coat;
         let below = uncoated * (one - largest(self.p.sheen) * of_wo.sheen);
+        // Weights
         let weights = Choice {
             facets: single * below,
             coat: of_wo.coat,
@@ -288,6 +291,8 @@ impl<N: Number> Surface<N> {
             solid: self.solid * below,
             diffuse: (self.diffuse * base * passes + multiple) * below + sheen * uncoated,
         };
+
+        // Normalise
         let sum = weights.facets + weights.coat + weights.thin + weights.solid + weights.diffuse;
         let exists = sum.above(zero);
         Choice {
@@ -299,9 +304,10 @@ impl<N: Number> Surface<N> {
         }
     }
 
-    /// Value and density, by the probabilities for `wo`.
+    /// Value and density, given the lobe probabilities for `wo`.
     #[inline(always)]
     fn value(&self, wo: V3<N>, wi: V3<N>, of_wo: Seen<N>, choice: Choice<N>) -> Value<N> {
+        // Mirror both directions to the upper hemisphere
         let (zero, side) = (wo.z.constant(0.0), wo.z * wi.z);
         let (reflects, crosses) = (side.above(zero), zero.above(side));
         let (up_o, up_i) = (wo.with_z(wo.z.magnitude()), wi.with_z(wi.z.magnitude()));
@@ -312,6 +318,7 @@ impl<N: Number> Surface<N> {
         let cosine = up_i.z * FRAC_1_PI;
         let multiple = (-of_wo.e[0] + 1.0) * (-of_wi.e[0] + 1.0) * cosine / left(self.mean[0]);
 
+        // Facets, diffuse base and thin sheet
         let mut f = self.reflected(cos_m, single, multiple).plus(self.diffused(of_wo, of_wi, cosine));
         let mut pdf =
             N::choose(reflects, choice.facets, choice.thin) * density + (choice.diffuse * cosine).or_zero(reflects);
@@ -319,6 +326,8 @@ impl<N: Number> Surface<N> {
         if crosses.any() {
             f = V3::choose(crosses, self.through(cos_m, single, multiple), f);
         }
+
+        // Solid glass
         let is_solid = self.solid.above(zero);
         if is_solid.any() {
             let glass = Interface { eta: self.p.eta, facets: self.p.facets };
@@ -327,11 +336,15 @@ impl<N: Number> Surface<N> {
             f = f.plus(colored.times((of_glass * self.solid).or_zero(is_solid)));
             pdf = pdf + (choice.solid * of_pdf).or_zero(is_solid);
         }
+
+        // Sheen
         if self.p.has_sheen().any() {
             let passes = -largest(self.p.sheen) * of_wo.sheen.greater(of_wi.sheen) + 1.0;
             let fibres = sheen::white(up_o, up_i, self.p.sheen_alpha);
             f = f.times(passes).plus(self.p.sheen.times(fibres.or_zero(reflects & self.p.has_sheen())));
         }
+
+        // Coat
         if self.p.has_coat().any() {
             let (single, density) = self.p.coat_facets().reflection(up_o, up_i, h);
             let (schlick, mean) = self.coat();
@@ -373,7 +386,7 @@ impl<N: Number> Surface<N> {
     }
 }
 
-/// 1 − Ē, at least a little.
+/// 1 − Ē, at least 10⁻⁶.
 #[inline(always)]
 fn left<N: Number>(mean: N) -> N {
     (-mean + 1.0).greater(mean.constant(1e-6))
@@ -404,7 +417,7 @@ impl BsdfKernel for Principled {
         let is_solid = solid_end.above(u[0]) & !(is_facets | is_coat | is_thin);
         let is_mirror = is_facets | is_coat | is_thin;
 
-        // In the upper hemisphere, but for solids
+        // In the upper hemisphere, except for solids
         let up = wo.with_z(wo.z.magnitude());
         let mut wi = cosine_hemisphere([u[1], u[2]]);
         if is_mirror.any() {

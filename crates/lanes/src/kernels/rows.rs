@@ -1,6 +1,6 @@
-//! Kernels over columns: many vertices of one kernel, one direction each, or one BSDF and many directions.
+//! Kernels over columns: many vertices with one direction each, or one BSDF with many directions.
 //!
-//! Columns may have any length: the last vector overlaps the one before it, and fewer rows than one vector are padded.
+//! Columns may have any length: the last vector overlaps the previous one, and fewer rows than one vector are padded.
 
 use super::*;
 use crate::lane::{Columns3, ColumnsMut3, F, LANES, Vec3s, begin, load, padded, store};
@@ -8,22 +8,22 @@ use crate::wide::Wide;
 use fearless_simd::{Level, Simd, dispatch, prelude::*};
 use lumiris_numbers::math::{Frame, Vec3};
 
-/// Vertices whose scattering is of one kernel.
+/// Vertices with the same kernel.
 #[derive(Clone, Copy, Debug)]
 pub struct Rows<'a> {
-    /// Parameters, a column each.
+    /// Parameters, one column each.
     pub params: &'a [&'a [f32]],
     /// Tables of the kernel.
     pub tables: &'a [f32],
     /// Shading normals.
     pub ns: Columns3<'a>,
-    /// x of the shading frames; `None` if any will do, which then is that of [`Frame::from_z`].
+    /// x axes of the shading frames; `None` for isotropic BSDFs, which use [`Frame::from_z`].
     pub tangents: Option<Columns3<'a>>,
     /// Unit directions to the viewer, in world space.
     pub wo: Columns3<'a>,
 }
 
-/// One BSDF in a frame, seen from a direction.
+/// One BSDF in a frame, for one direction to the viewer.
 #[derive(Clone, Copy, Debug)]
 pub struct One<'a> {
     /// Parameters.
@@ -45,22 +45,22 @@ pub struct Values<'a> {
     pub pdf: &'a mut [f32],
 }
 
-/// Columns of samples, see [`Drawn`].
+/// Columns of samples; see [`Drawn`].
 #[derive(Debug)]
 pub struct Directions<'a> {
     /// Unit directions to the light, in world space.
     pub wi: ColumnsMut3<'a>,
-    /// f·|cos θi| (1/sr) by channel; of deltas, their weights times `pdf`.
+    /// f·|cos θi| (1/sr) by channel. For deltas, their weights times `pdf`.
     pub f_cos: ColumnsMut3<'a>,
-    /// Density per steradian; of deltas, their probability; 0 where there is no sample.
+    /// Density per steradian. For deltas, their probability. 0 if there is no sample.
     pub pdf: &'a mut [f32],
-    /// Sums of flags of [`lobe`].
+    /// Sums of [`lobe`] flags.
     pub lobe: &'a mut [f32],
-    /// Indices of refraction of the side of `wi` relative to that of `wo`; 1 for reflection.
+    /// Indices of refraction on the side of `wi` relative to the side of `wo`; 1 for reflection.
     pub eta: &'a mut [f32],
 }
 
-/// Calls a function of one kernel.
+/// Calls a generic function for a kernel.
 macro_rules! of_kernel {
     ($kernel:expr, $function:ident, $($argument:expr),*) => {
         match $kernel {
@@ -77,7 +77,7 @@ macro_rules! of_kernel {
     };
 }
 
-/// Values and densities for unit directions `wi` in world space, one for each row.
+/// Values and densities for unit directions `wi` in world space, one per row.
 pub fn evaluate(level: Level, kernel: Kernel, rows: &Rows<'_>, wi: Columns3<'_>, out: &mut Values<'_>) {
     let n = out.pdf.len();
     if n >= LANES {
@@ -91,7 +91,7 @@ pub fn evaluate(level: Level, kernel: Kernel, rows: &Rows<'_>, wi: Columns3<'_>,
     out.copy(&values, n);
 }
 
-/// The same for one BSDF and many directions.
+/// Values and densities of one BSDF for many directions.
 pub fn evaluate_one(level: Level, kernel: Kernel, one: &One<'_>, wi: Columns3<'_>, out: &mut Values<'_>) {
     let n = out.pdf.len();
     if n >= LANES {
@@ -103,7 +103,7 @@ pub fn evaluate_one(level: Level, kernel: Kernel, one: &One<'_>, wi: Columns3<'_
     out.copy(&values, n);
 }
 
-/// A direction for each row, by numbers from 0 to 1: the first chooses the lobe.
+/// Samples a direction per row from uniform numbers: the first of them chooses the lobe.
 pub fn sample(level: Level, kernel: Kernel, rows: &Rows<'_>, u: Columns3<'_>, out: &mut Directions<'_>) {
     let n = out.pdf.len();
     if n >= LANES {
@@ -120,7 +120,7 @@ pub fn sample(level: Level, kernel: Kernel, rows: &Rows<'_>, u: Columns3<'_>, ou
     }
 }
 
-/// Columns of values over an array.
+/// Columns of values that refer to an array.
 fn of(values: &mut [[f32; LANES]; 4]) -> Values<'_> {
     let [r, g, b, pdf] = values;
     Values { f_cos: [r, g, b], pdf }
@@ -136,7 +136,7 @@ impl Values<'_> {
     }
 }
 
-/// Rows that are fewer than the lanes, padded.
+/// Fewer rows than lanes, padded.
 struct Few<'a> {
     params: [[f32; LANES]; MAX_PARAMS],
     count: usize,
@@ -169,8 +169,7 @@ impl<'a> Few<'a> {
     }
 }
 
-// Each kernel has a function of its own, for the time that compiling takes: it grows faster than a function without
-// vector registers does.
+// One function per kernel limits compile time, which grows faster than a function's size
 
 #[inline(never)]
 fn evaluate_rows<K: BsdfKernel>(level: Level, rows: &Rows<'_>, wi: Columns3<'_>, out: &mut Values<'_>) {
@@ -239,7 +238,7 @@ fn params<S: Simd, K: BsdfKernel>(simd: S, rows: &Rows<'_>, i: usize) -> [Wide<S
     p
 }
 
-/// x, y and z of the shading frames.
+/// x, y and z axes of the shading frames.
 #[inline(always)]
 fn frames<S: Simd>(simd: S, rows: &Rows<'_>, i: usize) -> [V3<Wide<S>>; 3] {
     let z: V3<Wide<S>> = Vec3s::load(simd, rows.ns, i).into();

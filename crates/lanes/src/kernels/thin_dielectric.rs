@@ -10,7 +10,7 @@ use lumiris_numbers::math::v3::V3;
 #[derive(Debug)]
 pub struct ThinDielectric;
 
-/// Reflectance of the sheet for the cosine of incidence `cos`.
+/// Reflectance of the sheet for the cosine of incidence `cos`, of either sign.
 #[inline(always)]
 pub fn reflectance<N: Number>(cos: N, eta: N) -> N {
     let (r, one) = (fr_dielectric(cos.magnitude(), eta), cos.constant(1.0));

@@ -18,6 +18,7 @@ fn numbers(stream: &mut Pcg32, n: usize) -> Vec<f32> {
 
 #[test]
 fn weights_are_those_of_single_samples_to_the_bit_at_all_levels() {
+    // Numbers with all special cases, against the formulas for single samples
     let mut stream = pcg32([5, 6, 7]);
     for heuristic in [Heuristic::Balance, Heuristic::Power, Heuristic::Maximum] {
         for n in LENGTHS {
@@ -53,7 +54,7 @@ fn weights_of_two_techniques_sum_to_one_at_the_edges_of_a_tie() {
             let q: Vec<f32> =
                 p.iter().map(|p| f32::from_bits((p * edge).to_bits().wrapping_add_signed(ulps))).collect();
             let ones = vec![1.0; p.len()];
-            // r·p of one technique, whose luminance does not matter
+            // r·p of one technique; the luminance is irrelevant
             let weights = |level, p: &[f32], p_other: &[f32]| {
                 let [mut q_hat, mut r, mut w] = [(); 3].map(|()| vec![0.0; p.len()]);
                 let (f_cos, heuristic) = ([&ones[..]; 3], Heuristic::Maximum);

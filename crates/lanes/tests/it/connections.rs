@@ -13,7 +13,7 @@ use lumiris_test_support::random::{Pcg32, RngExt, pcg32};
 const FROM: usize = 2 * LANES;
 const TO: usize = 5;
 
-/// Points, bounds of their errors, geometric and shading normals.
+/// Points with their error bounds, geometric and shading normals.
 struct Set([Vec<Vec3>; 4]);
 
 impl Set {
@@ -39,10 +39,12 @@ impl Set {
 
 #[test]
 fn segments_are_those_of_single_pairs_at_all_levels() {
+    // All levels
     let stream = &mut pcg32([8, 1, 4]);
     let (from, to) = (Set::random(FROM, stream), Set::random(TO, stream));
     assert_same_bits::<7>(FROM * TO, |level, out| Set::connect(level, &from, &to, out));
 
+    // Each pair by itself
     let mut out: [Vec<f32>; 7] = std::array::from_fn(|_| vec![-7.0; FROM * TO]);
     Set::connect(level(), &from, &to, out.each_mut().map(|v| &mut v[..]));
     let mut connected = 0;

@@ -6,6 +6,7 @@ use lumiris_test_support::assert_chi_squared;
 
 #[test]
 fn lanes_give_the_bits_of_the_scalar_twins() {
+    // Strata
     for (case, m) in [1, 2, 3, 7, 8, 15, 16, 17, 100, 128, 255, 256, 1000, 65535, 65536].into_iter().enumerate() {
         let [phi, seed, ..] = pcg4d([case as u32, 1, 2, 3]);
         let mut a = [vec![0; m], vec![0; m]];
@@ -16,6 +17,7 @@ fn lanes_give_the_bits_of_the_scalar_twins() {
         strata_scalar(phi, seed, m as u32, out, jitter);
         assert_eq!(a, b);
 
+        // Points on the curve
         let t: Vec<u32> = (0..m as u32).map(|i| pcg4d([i, 5, case as u32, 7])[0]).collect();
         let mut c = [vec![0.0; m], vec![0.0; m]];
         let mut d = c.clone();
@@ -52,6 +54,7 @@ fn jitter_completes_the_coordinates() {
 
 #[test]
 fn strata_hold_one_position_each_and_the_samples_of_a_pixel_stratify_each() {
+    // The positions of all samples by stratum
     let m = 12_u32;
     let samples = 64_u32;
     let mut rows: Vec<Vec<u32>> = vec![Vec::new(); m as usize];
@@ -66,6 +69,8 @@ fn strata_hold_one_position_each_and_the_samples_of_a_pixel_stratify_each() {
             rows[i].push(((xi + u64::from(m) / 2) >> 26).min(63) as u32);
         }
     }
+
+    // All values of the samples are different in each stratum
     for row in &mut rows {
         row.sort_unstable();
         assert_eq!(*row, (0..samples).collect::<Vec<_>>());

@@ -11,7 +11,7 @@ use lumiris_test_support::random::{RngExt, pcg32};
 fn lanes_are_the_same_at_all_levels() {
     let mut stream = pcg32([6, 6, 6]);
     let [width, height] = [36, 20];
-    // Some rows and many texels are black.
+    // Some rows and many texels are black
     let values: Vec<f32> = (0..width * height)
         .map(|i| if i / width % 7 == 3 { 0.0 } else { (stream.random::<f32>() - 0.3).max(0.0).powi(6) })
         .collect();
@@ -45,7 +45,7 @@ fn points_of_the_square_have_the_bits_of_each_by_itself() {
     let mut stream = pcg32([6, 6, 7]);
     let mut w: [Vec<f32>; 3] = Default::default();
     for i in 0..64 * LANES {
-        // Axes, where coordinates are 0, and then any direction
+        // First the axes, which have coordinates of 0, then random directions
         let axis = if i % 2 == 0 { 1.0 } else { -1.0 };
         let v = match i {
             0..6 => Vec3::AXES[i / 2] * axis,

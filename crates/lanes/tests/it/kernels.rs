@@ -1,4 +1,4 @@
-//! Tests of `lumiris_lanes::kernels`: vertices in lanes, many directions of one BSDF, and single directions have the same
+//! Tests of `lumiris_lanes::kernels`: rows in lanes, many directions of one BSDF, and single directions have the same
 //! bits.
 
 use super::support::{LENGTHS, assert_same_bits};
@@ -7,13 +7,13 @@ use lumiris_lanes::kernels::*;
 use lumiris_numbers::math::{Frame, Vec3, warp};
 use lumiris_test_support::random::{Pcg32, RngExt, pcg32};
 
-/// Value and density, by parameters, tables and both directions.
+/// Value and density, given parameters, tables and both directions.
 type Evaluate = fn(&[f32], &[f32], [Vec3; 2]) -> [f32; 4];
 
-/// A sample, by parameters, tables, a direction and numbers.
+/// A sample, given parameters, tables, the direction to the viewer, and random numbers.
 type Sample = fn(&[f32], &[f32], Vec3, [f32; 3]) -> [f32; 9];
 
-/// A kernel with a way to draw its parameters.
+/// A kernel with a generator of its parameters.
 struct Case {
     kernel: Kernel,
     params: fn(&mut Pcg32) -> Vec<f32>,
@@ -44,7 +44,7 @@ fn numbers(s: &mut Pcg32, n: usize) -> Vec<f32> {
     (0..n).map(|_| s.random::<f32>()).collect()
 }
 
-/// Smooth, hardly rough, or any.
+/// Smooth, slightly rough, or any roughness.
 fn alpha(s: &mut Pcg32) -> f32 {
     match s.random::<f32>() {
         x if x < 0.2 => 0.0,
@@ -58,7 +58,7 @@ fn metal(s: &mut Pcg32) -> Vec<f32> {
     [vec![alpha(s), alpha(s)], index].concat()
 }
 
-/// No interface, glass, and glass from inside.
+/// No interface, glass, or glass from inside.
 fn glass(s: &mut Pcg32) -> Vec<f32> {
     let eta = if s.random::<f32>() < 0.2 { 1.0 } else { uniform(s, 0.4, 2.5) };
     vec![eta, alpha(s), alpha(s)]
@@ -77,7 +77,7 @@ fn smooth_coat(s: &mut Pcg32) -> Vec<f32> {
     [numbers(s, 4), vec![uniform(s, 1.0, 2.0), thickness]].concat()
 }
 
-/// Each of coat, sheen, metal and glass is there or not.
+/// Coat, sheen, metal and glass are each present or absent.
 fn principled(s: &mut Pcg32) -> Vec<f32> {
     let part = |s: &mut Pcg32| (s.random::<f32>() * 1.5 - 0.5).max(0.0);
     let mut p = numbers(s, 18);
@@ -112,7 +112,7 @@ fn tables() -> Vec<f32> {
     (0..TABLE_ROWS * COSINES * 2).map(|i| 0.9 * ((i * 37 % 101) as f32 / 101.0)).collect()
 }
 
-/// Any direction, often one that grazes, and some that lie on an axis of the frame.
+/// A random direction: often grazing, sometimes on an axis of the frame or NaN.
 fn direction(s: &mut Pcg32, frame: &Frame) -> Vec3 {
     let w = warp::sample_uniform_sphere(s.random::<[f32; 2]>());
     match s.random::<f32>() {
@@ -132,7 +132,7 @@ fn slices<const N: usize>(columns: &[Vec<f32>; N]) -> [&[f32]; N] {
     columns.each_ref().map(|column| &column[..])
 }
 
-/// Columns that are expected, with one kind of NaN.
+/// Compares columns with the expected ones. All kinds of NaN are equal.
 fn assert_columns<const N: usize>(expected: &[[f32; N]], run: impl Fn(lumiris_lanes::Level, [&mut [f32]; N])) {
     assert_same_bits::<N>(expected.len(), |level, mut out| {
         run(level, out.each_mut().map(|column| &mut **column));
@@ -147,6 +147,7 @@ fn assert_columns<const N: usize>(expected: &[[f32; N]], run: impl Fn(lumiris_la
 
 #[test]
 fn rows_are_single_vertices_in_all_bits() {
+    // Parameters, frames and directions
     let (s, tables) = (&mut pcg32([5, 0, 1]), tables());
     let mut samples = [0; 3];
     for case in cases() {
@@ -163,6 +164,7 @@ fn rows_are_single_vertices_in_all_bits() {
             let wi: Vec<Vec3> = frames.iter().map(|frame| direction(s, frame)).collect();
             let u: Vec<[f32; 3]> = (0..n).map(|_| s.random::<[f32; 3]>()).collect();
 
+            // In columns
             let [wo_columns, wi_columns] =
                 [&wo, &wi].map(|w| columns(&w.iter().map(Vec3::to_array).collect::<Vec<_>>()));
             let ns = columns(&frames.iter().map(|frame| frame.z.to_array()).collect::<Vec<_>>());
@@ -179,6 +181,7 @@ fn rows_are_single_vertices_in_all_bits() {
                 wo: slices(&wo_columns),
             };
 
+            // Values
             let values: Vec<[f32; 4]> = (0..n)
                 .map(|i| {
                     let local = [wo[i], wi[i]].map(|w| frames[i].to_local(w));
@@ -190,6 +193,7 @@ fn rows_are_single_vertices_in_all_bits() {
                 evaluate(level, case.kernel, &rows, slices(&wi_columns), &mut Values { f_cos: [r, g, b], pdf });
             });
 
+            // Samples
             let drawn: Vec<[f32; 9]> = (0..n)
                 .map(|i| {
                     let mut drawn = (case.sample)(&params[i], &tables, frames[i].to_local(wo[i]), u[i]);

@@ -1,4 +1,4 @@
-//! The kernels at every level; outside the crate, so that they are compiled once.
+//! Tests of the kernels at every level. They are outside the crate, so that kernels are compiled once.
 #![allow(clippy::unwrap_used)]
 
 mod area;

@@ -12,7 +12,7 @@ impl Term for Row {
     }
 }
 
-/// Terms of magnitudes from 2⁻⁴⁰ of the limits up to these.
+/// Terms of magnitudes from 2⁻⁴⁰ of the limits up to the limits.
 fn rows(count: usize) -> Vec<Row> {
     let mut s = pcg32([5, 6, 7]);
     let mut number = |limit: f64| ((s.random::<f32>() - 0.5) * (-40.0 * s.random::<f32>()).exp2()) * limit as f32;
@@ -24,7 +24,7 @@ fn rows(count: usize) -> Vec<Row> {
 fn sums_of_all_levels_are_those_of_whole_numbers() {
     let quanta = |x: f64, digits: i32| {
         let x = x * 2.0_f64.powi(digits);
-        // Numbers of more digits are whole
+        // Larger numbers are whole
         if x.abs() < 2.0_f64.powi(51) { (x + 0.5_f64.copysign(x)).trunc() as i128 } else { x as i128 }
     };
     for count in [0, 1, 2, 7, 64, MOST] {

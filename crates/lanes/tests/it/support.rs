@@ -1,8 +1,8 @@
-//! Levels and lengths that kernels are tested at.
+//! Levels and lengths at which kernels are tested.
 
 use lumiris_lanes::Level;
 
-/// All levels of this machine, the scalar one first if it is compiled.
+/// All levels of this machine, the scalar one first if it is compiled in.
 pub(crate) fn levels() -> Vec<Level> {
     #[cfg(feature = "scalar")]
     let scalar = Some(Level::fallback());
@@ -20,7 +20,7 @@ pub(crate) fn assert_same_bits<const N: usize>(len: usize, mut run: impl FnMut(L
     for level in levels() {
         let mut out: [Vec<f32>; N] = std::array::from_fn(|_| vec![-7.0; len]);
         run(level, out.each_mut().map(|v| &mut v[..]));
-        // NaN is NaN: its payload is not kept by all.
+        // Payloads of NaN may differ
         let bits = out.map(|v| v.iter().map(|x| if x.is_nan() { u32::MAX } else { x.to_bits() }).collect());
         match &first {
             None => first = Some(bits),

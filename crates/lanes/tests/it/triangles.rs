@@ -31,7 +31,7 @@ fn first_hits_are_those_of_f64() {
         let rays: Vec<(Vec3, Vec3)> = (0..21).map(|_| (point() * 2.0, point())).collect();
         let [t, b1, b2, index] = run(&triangles, &columns(&rays));
         for (i, (o, d)) in rays.iter().map(|(o, d)| (o.as_dvec3(), d.as_dvec3())).enumerate() {
-            // By Cramer's rule; rays within 1e-5 of an edge may go either way
+            // Cramer's rule; rays within 1e-5 of an edge may hit or miss
             let mut expected = (f64::INFINITY, 0);
             let mut is_close = false;
             for (k, p) in triangles.iter().enumerate() {

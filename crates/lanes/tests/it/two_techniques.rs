@@ -1,4 +1,4 @@
-//! Proposals of two techniques that [`lumiris_lanes::combine`] weighs, on an integral of known value.
+//! Proposals of two techniques weighted by [`lumiris_lanes::combine`], for an integral with a known value.
 
 use lumiris_lanes::combine;
 use lumiris_numbers::estimators::mis::Heuristic;
@@ -10,15 +10,15 @@ use lumiris_test_support::random::{Pcg32, RngExt};
 const RUNS: usize = 500_000;
 const HEURISTICS: [Heuristic; 3] = [Heuristic::Balance, Heuristic::Power, Heuristic::Maximum];
 const LINE: Integral = Integral::Line;
-/// Proposals of each technique.
+/// Number of proposals of each technique.
 const NUMBERS: [u32; 2] = [5, 3];
 
-/// Significance of one of the hypotheses here, which together reject true ones with probability 1 %.
+/// Significance level of each hypothesis; together they reject true hypotheses with a probability of 1 %.
 fn level() -> f64 {
     sidak(0.01, 12)
 }
 
-/// Techniques on the line: ½ + x, and 2 on the lower half.
+/// Techniques on the line, with the densities ½ + x, and 2 on the lower half.
 fn sample(technique: usize, u: f64) -> [f64; 2] {
     match technique {
         0 => LINE.sample([u, 0.0]),
@@ -30,7 +30,7 @@ fn densities(x: [f64; 2]) -> [f32; 2] {
     [LINE.pdf(x) as f32, if x[0] < 0.5 { 2.0 } else { 0.0 }]
 }
 
-/// Proposals of one technique in columns, of both one after the other.
+/// Proposals of both techniques in columns, the first technique first.
 #[derive(Default)]
 struct Table {
     x: Vec<[f64; 2]>,
@@ -57,8 +57,9 @@ impl Table {
         [&mut self.q_hat, &mut self.r, &mut self.weight].into_iter().for_each(|v| v.resize(self.x.len(), 0.0));
     }
 
-    /// q̂, r and w of all proposals; the techniques are weighted by the expected numbers `m`.
+    /// q̂, r and w of all proposals. The techniques are weighted by the expected numbers `m`.
     fn weigh(&mut self, heuristic: Heuristic, m: [f32; 2]) {
+        // Each technique's proposals need the density of the other technique
         let ones = [1.0; (NUMBERS[0] + NUMBERS[1]) as usize];
         let first = NUMBERS[0] as usize;
         for (own, range) in [(0, 0..first), (1, first..self.x.len())] {
@@ -81,7 +82,7 @@ impl Table {
     }
 }
 
-/// Two of the proposals of each run, which are weighted by the expected numbers `m`.
+/// Estimates from two of the proposals of each run. The techniques are weighted by the expected numbers `m`.
 fn estimates(heuristic: Heuristic, key: u32, m: [f32; 2]) -> [Welford; 3] {
     let (mut table, mut draws) = (Table::default(), Vec::new());
     run(RUNS, [key, heuristic as u32, 0], |stream| {

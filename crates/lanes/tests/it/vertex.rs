@@ -37,6 +37,7 @@ fn at(v: &Three, i: usize) -> Vec3 {
 
 #[test]
 fn kernels_are_the_same_at_all_levels() {
+    // Hits
     let stream = &mut pcg32([8, 1, 1]);
     let (corners, normals) = ([0, 1, 2].map(|_| vectors(stream, 4.0)), [0, 1, 2].map(|_| vectors(stream, 1.0)));
     let (b, d) = ([numbers(stream, 0.5), numbers(stream, 0.5)], directions(stream));
@@ -57,6 +58,7 @@ fn kernels_are_the_same_at_all_levels() {
         points(level, &hits, &mut out);
     });
 
+    // Segments
     let (ns, wo, wi) = (directions(stream), directions(stream), directions(stream));
     let (p, p_error) = (vectors(stream, 9.0), vectors(stream, 1e-6).map(|v| v.iter().map(|x| x.abs()).collect()));
     let from = Ends { p: slices(&p), p_error: slices(&p_error), n: slices(&ns) };
@@ -97,6 +99,7 @@ fn segments_are_those_of_single_points() {
 
 #[test]
 fn contributions_are_weighted_as_single_samples() {
+    // One sample has no density
     let stream = &mut pcg32([8, 1, 3]);
     let (f_cos, li) = (vectors(stream, 1.0), vectors(stream, 5.0));
     let [mut p, p_other] = [0, 1].map(|_| numbers(stream, 3.0).iter().map(|p| p.abs()).collect::<Vec<f32>>());

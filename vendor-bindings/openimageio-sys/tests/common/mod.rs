@@ -1,4 +1,4 @@
-//! A little of a safe layer, enough for the tests.
+//! A small safe layer for the tests.
 #![allow(dead_code, reason = "each test binary uses a part of it")]
 
 use openimageio_sys::*;
@@ -7,19 +7,19 @@ use std::ffi::{CStr, CString, c_char};
 use std::path::{Path, PathBuf};
 use std::ptr;
 
-/// Memory limit of the tests' pictures (bytes).
+/// Memory limit for the tests' images (bytes).
 pub const LIMIT: u64 = 1 << 28;
 
 pub fn api() -> &'static Api {
     load().unwrap()
 }
 
-/// A file in cargo's directory for the temporary files of tests.
+/// A file in cargo's folder for temporary files of tests.
 pub fn temp(name: &str) -> PathBuf {
     Path::new(env!("CARGO_TARGET_TMPDIR")).join(name)
 }
 
-/// Calls a function with a buffer for the message.
+/// Calls a function with a buffer for the error message.
 pub fn check(call: impl FnOnce(*mut c_char, usize) -> i32) -> Result<(), (i32, String)> {
     let mut message = [0 as c_char; 512];
     let code = call(message.as_mut_ptr(), message.len());
@@ -138,7 +138,7 @@ pub struct Part<'a> {
 pub struct Output(pub *mut OiioOutput);
 
 impl Output {
-    /// Creates a file with its parts; not opened yet.
+    /// Creates a file with its parts, without opening it.
     pub fn create(path: &Path, parts: &[Part<'_>]) -> Result<Output, (i32, String)> {
         let path = c(path.to_str().unwrap());
         let mut output = ptr::null_mut();
@@ -213,7 +213,7 @@ impl Drop for Output {
     }
 }
 
-/// Writes a picture of one part.
+/// Writes an image with one part.
 pub fn write_picture(
     path: &Path,
     width: i32,

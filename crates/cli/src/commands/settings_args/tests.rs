@@ -1,5 +1,4 @@
-//! What the table promises: metadata given back on the command line or in a scene file yield the settings they came
-//! from.
+//! Promise of the table: metadata that are repeated on the command line or in a scene file yield the original settings.
 
 use super::*;
 use lumiris::import::{LoadOptions, load};
@@ -24,8 +23,9 @@ fn settings_of_scene(head: &str) -> Settings {
     loaded.settings
 }
 
-/// Values of a kind: the bounds of its range, all names and words.
+/// Test values of a kind: numbers in its range, and all names and words.
 fn values(kind: &Kind) -> Vec<Value> {
+    // One text per variant
     let texts: Vec<String> = match kind {
         Kind::Choice { names, .. } => names.iter().map(ToString::to_string).collect(),
         Kind::Integer { range, words } => {
@@ -48,7 +48,7 @@ fn values(kind: &Kind) -> Vec<Value> {
     texts.iter().map(|text| kind.parse(text).unwrap()).collect()
 }
 
-/// Settings of an image that `row` affects.
+/// Settings to which `row` applies.
 fn where_it_applies(row: &Setting) -> Settings {
     for kind in IntegratorKind::VARIANTS {
         for estimator in EstimatorKind::VARIANTS {
@@ -64,7 +64,7 @@ fn where_it_applies(row: &Setting) -> Settings {
     panic!("--{} applies to no image", row.flag)
 }
 
-/// `settings` with the renderer's choices made explicit.
+/// `settings` with the automatic choices made explicit.
 fn resolved(mut settings: Settings) -> Settings {
     for row in rows() {
         if let Some(value) = row.resolved.filter(|_| row.applies.to(&settings)).and_then(|resolved| resolved(&settings))
@@ -75,7 +75,7 @@ fn resolved(mut settings: Settings) -> Settings {
     settings
 }
 
-/// Every value of every setting, in an image that it affects.
+/// Every value of every setting, with other settings to which it applies.
 fn cases() -> impl Iterator<Item = (&'static Setting, Settings)> {
     rows().flat_map(|row| {
         values(&row.kind).into_iter().map(move |value| {
@@ -87,7 +87,7 @@ fn cases() -> impl Iterator<Item = (&'static Setting, Settings)> {
     })
 }
 
-/// Parameters of a scene file that set `value`.
+/// Scene-file parameters that set `value`.
 fn parameters(row: &Setting, value: Value) -> String {
     let key = row.parameters[0];
     match (value, row.parameters) {
@@ -119,7 +119,7 @@ fn metadata_given_back_on_the_command_line_are_the_same_settings() {
 #[test]
 fn metadata_written_into_a_scene_file_are_the_same_settings() {
     for (row, settings) in cases() {
-        // What scene files call stratified is pbrt's sampler
+        // In scene files, `stratified` is pbrt's sampler
         if settings.sampling.sampler == SamplerKind::Stratified {
             continue;
         }
@@ -142,6 +142,7 @@ fn metadata_written_into_a_scene_file_are_the_same_settings() {
 #[test]
 fn old_names_mean_what_they_meant() {
     let mut names = 0;
+    // Options and their aliases
     for (row, settings) in cases() {
         let Some(value) = (row.get)(&settings) else { continue };
         for alias in row.aliases.iter().filter(|_| row.is_option) {
@@ -149,6 +150,8 @@ fn old_names_mean_what_they_meant() {
             assert_eq!(old, new, "--{alias}={value}");
             names += 1;
         }
+
+        // Parameters and their old names
         for (name, old) in row.old_parameters {
             let present = parameters(row, value);
             let head = |text: &str| match row.directive {
@@ -163,7 +166,7 @@ fn old_names_mean_what_they_meant() {
     assert!(names > 20, "{names}");
 }
 
-/// Settings as recorded in metadata, of some rows: all others, and those that the image does not depend on, are at their defaults.
+/// Settings of the selected rows that apply to the image. All others have their defaults.
 fn of_rows(settings: Settings, is_one: fn(&Setting) -> bool) -> Settings {
     let mut recorded = Settings::default();
     for row in rows().filter(|row| is_one(row) && row.applies.to(&settings)) {
@@ -176,10 +179,13 @@ fn of_rows(settings: Settings, is_one: fn(&Setting) -> bool) -> Settings {
 
 #[test]
 fn help_has_the_range_and_the_default_of_every_setting_under_its_heading() {
+    // The section of each heading
     let mut command = SettingsArgs::augment_args(Command::new("test"));
     let text = command.render_long_help().to_string();
     for group in GROUPS {
         let part = text.split(&format!("{}:\n", heading(group))).nth(1).unwrap_or_else(|| panic!("{}", group.title));
+
+        // Default and range of each option in it
         for row in group.rows.iter().filter(|row| row.is_option) {
             let option = part.split(&format!("--{} ", row.flag)).nth(1).unwrap_or_else(|| panic!("--{}", row.flag));
             let option = option.split("\n      --").next().unwrap_or_default();

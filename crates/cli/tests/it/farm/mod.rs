@@ -1,5 +1,5 @@
-//! `lumiris farm slurm`: its jobs give the bits of the image rendered at once. In a cluster of two nodes that this machine
-//! plays (`make test-farm`), and with an `sbatch` that runs jobs on the spot.
+//! `lumiris farm slurm`: its jobs give the bits of the image rendered at once. Tested in a simulated cluster of two
+//! nodes (`make test-farm`), and with an `sbatch` that runs jobs immediately.
 
 use crate::parts::{assert_same, command, run};
 use crate::program::{read, stderr};
@@ -10,7 +10,7 @@ use std::process::{Command, Output};
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
-/// Runs the tasks of a job at once, and writes down how it was called.
+/// An `sbatch` that runs the tasks of a job immediately and logs its arguments.
 const SBATCH: &str = r#"#!/bin/bash
 echo "$@" >>"$CALLS"
 id=$(wc -l <"$CALLS")
@@ -25,7 +25,7 @@ echo "$id;cluster"
 "#;
 const FARM: &str = "farm slurm GALLERY --resolution 40x36 --spp 7 --parts 3 -o image.exr";
 
-/// A folder with an unfriendly name and programs of a queue.
+/// A folder with an unfriendly name, and programs that simulate a queue.
 fn queue() -> (tempfile::TempDir, PathBuf) {
     let root = tempfile::tempdir().unwrap();
     for (name, text) in
@@ -70,7 +70,7 @@ fn jobs_render_the_bits_of_the_image_at_once_in_any_folder_and_do_nothing_again(
     assert!(calls[1].contains("--array=1-3") && calls[1].contains("--dependency=afterok:1 "), "{}", calls[1]);
     assert!(calls[2].contains("--dependency=afterok:2 "), "{}", calls[2]);
 
-    // There are no trials where the estimator is named
+    // A named estimator needs no plan
     let output = farm(&FARM.replace("image.exr", "small.exr --integrator path --estimator mis --submit"), &folder)
         .output()
         .unwrap();
@@ -79,7 +79,7 @@ fn jobs_render_the_bits_of_the_image_at_once_in_any_folder_and_do_nothing_again(
     run("render GALLERY --resolution 40x36 --spp 7 -q --integrator path --estimator mis -o whole.exr", &folder);
     assert_same("small.exr", "whole.exr", &folder, "without a plan");
 
-    // Again
+    // Again: finished parts are not rendered again
     let modified = |name: &str| fs::metadata(folder.join("image.farm").join(name)).unwrap().modified().unwrap();
     let before = modified("2.part");
     assert_success(&farm(&args, &folder).output().unwrap());
@@ -88,7 +88,7 @@ fn jobs_render_the_bits_of_the_image_at_once_in_any_folder_and_do_nothing_again(
     assert!(log.contains("part 2 of 3 is rendered") && log.contains("part 2 of 3 is complete"), "{log}");
 }
 
-/// Scenes of two frames, in the folder.
+/// Scenes of two frames.
 fn write_frames(folder: &Path) {
     for number in [1, 2] {
         let scene = format!(
@@ -100,7 +100,7 @@ fn write_frames(folder: &Path) {
     }
 }
 
-/// Fails unless frames have the pixels of images rendered at once.
+/// Fails unless the frames have the pixels of images rendered at once.
 fn assert_frames(folder: &Path, plan: &str) {
     for number in 1..=2 {
         run(&format!("render shot.####.pbrt --frames {number} -q {plan} -o whole.####.exr"), folder);
@@ -129,7 +129,7 @@ fn frames_have_jobs_of_their_own_and_those_that_are_merged_are_left_alone() {
         assert!(calls[i].contains(words), "{}", calls[i]);
     }
 
-    // What is left of a frame is rendered again, and the other is not submitted
+    // Only the missing frame is rendered and submitted
     fs::remove_file(folder.join("out.farm/0002.merged")).unwrap();
     fs::remove_file(folder.join("out.farm/0002.1.part")).unwrap();
     fs::remove_file(folder.join("out.0002.exr")).unwrap();
@@ -198,7 +198,7 @@ fn what_cannot_be_rendered_or_submitted_is_refused() {
     refuse(&format!("{frames} --dir a#b"), 2, "a --dir without #");
     assert!(!folder.join("image.farm").exists());
 
-    // Other files are kept
+    // Foreign files are kept
     fs::create_dir(folder.join("image.farm")).unwrap();
     fs::write(folder.join("image.farm/mine"), "").unwrap();
     refuse(FARM, 3, "not of this rendering");
@@ -206,7 +206,7 @@ fn what_cannot_be_rendered_or_submitted_is_refused() {
     assert_success(&farm(FARM, &folder).output().unwrap());
     refuse(&format!("{FARM} --seed 9"), 3, "not of this rendering");
 
-    // Jobs before one that is refused are cancelled
+    // If a job is refused, the jobs before it are cancelled
     let output = farm(&format!("{FARM} --submit"), &folder).env("FAIL_AT", "2").output().unwrap();
     assert_eq!(output.status.code(), Some(3));
     assert!(stderr(&output).contains("invalid partition specified"), "{}", stderr(&output));
@@ -214,7 +214,7 @@ fn what_cannot_be_rendered_or_submitted_is_refused() {
     assert!(!folder.join("image.farm/jobs").exists());
 }
 
-/// A cluster, which ends with the value.
+/// A cluster. Dropping it stops its daemons.
 struct Cluster(PathBuf);
 
 impl Cluster {
@@ -224,7 +224,7 @@ impl Cluster {
         assert!(output.status.success(), "{action} {node}: {}", stderr(&output));
     }
 
-    /// Runs a program of Slurm, and returns what it prints.
+    /// Runs a program of Slurm, and returns its output.
     fn slurm(&self, line: &str) -> String {
         let mut words = line.split_whitespace();
         let output =
@@ -267,14 +267,14 @@ fn a_cluster_renders_the_bits_of_the_image_though_a_task_is_requeued_and_a_node_
     let films = || [1, 2].iter().all(|i| folder.join(format!("image.farm/{i}.film")).exists());
     wait_until("checkpoints of two tasks", 60, films);
 
-    // A task goes back to the queue, and the node of another one goes down, its daemon first
+    // One task is requeued; the node of another goes down, its daemon first
     cluster.slurm(&format!("scontrol requeue {array}_1"));
     let node = cluster.slurm(&format!("squeue --noheader --format=%N --jobs={array}_2"));
     let pid = fs::read_to_string(cluster.0.join(format!("{node}.pid"))).unwrap();
     assert!(Command::new("kill").args(["-KILL", pid.trim()]).status().unwrap().success());
     cluster.slurm(&format!("scontrol update nodename={node} state=down reason=test"));
     let is_done = || {
-        // Slurm waits two minutes before it starts such tasks again
+        // Slurm waits two minutes before it restarts such tasks
         for task in [1, 2] {
             if cluster.slurm(&format!("squeue --noheader --format=%r --jobs={array}_{task}")) == "BeginTime" {
                 cluster.slurm(&format!("scontrol update jobid={array}_{task} starttime=now"));

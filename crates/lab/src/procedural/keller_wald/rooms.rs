@@ -130,8 +130,11 @@ pub fn building(b: &Building) -> String {
 
 /// Comment, camera and materials.
 fn head(b: &Building, out: &mut String) {
+    // The camera faces a door of its room
     let [i, j] = b.seen().map(|r| PITCH * r as f32);
     let door = b.door(b.seen(), 0);
+
+    // The file, with names by the number of lights
     let count = b.lights * b.lights;
     let name = if count == 1 { "rooms".to_owned() } else { format!("rooms-{}", b.rooms * b.rooms * count) };
     let lights = if count == 1 { "one light".to_owned() } else { format!("{count} lights") };

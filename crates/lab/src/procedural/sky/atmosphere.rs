@@ -217,12 +217,15 @@ impl Atmosphere {
 
     /// Ψ for all heights and sun directions.
     fn multiple_table(&self) -> Vec<Spectrum> {
+        // An entry of the table: uniform in the square root of the height and in the cosine of the sun's zenith angle
         let entry = |i: usize| {
             let height = ((i / TABLE[1]) as f32 / (TABLE[0] - 1) as f32).powi(2) * THICKNESS;
             let mu_s = 2.0 * (i % TABLE[1]) as f32 / (TABLE[1] - 1) as f32 - 1.0;
             let r = GROUND + height.clamp(0.01, THICKNESS - 0.01);
             let (mut second, mut f) = ([0.0; BANDS], [0.0; BANDS]);
             let [rows, columns] = [8, 4];
+
+            // Averages over directions: the second order and f
             for k in 0..rows * columns {
                 let mu = 2.0 * ((k / columns) as f32 + 0.5) / rows as f32 - 1.0;
                 let phi = PI * ((k % columns) as f32 + 0.5) / columns as f32;
@@ -234,6 +237,8 @@ impl Atmosphere {
                     f[b] += returned[b] / (rows * columns) as f32;
                 }
             }
+
+            // The geometric series over all orders
             std::array::from_fn(|b| second[b] / (1.0 - f[b].min(0.98)))
         };
         use rayon::prelude::*;

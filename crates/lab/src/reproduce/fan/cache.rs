@@ -90,11 +90,14 @@ pub(super) fn run(setup: &Setup<'_>, time: Duration) -> Result<Figure, Reproduce
 }
 
 fn figure(setup: &Setup<'_>, o: &Outcome) -> Result<Figure, ReproduceError> {
+    // The table of errors relative to mis
     let pair = |i: usize| [&o.measured[i], &o.measured[0]];
     let errors = |i: usize| [&o.errors[i], &o.errors[0]];
     let systematic = o.errors[0].systematic.max(0.0).sqrt();
     let mut table = Table::new(&HEADER);
     (0..o.names.len()).for_each(|i| table.row(method_row(o.names[i], pair(i), errors(i))));
+
+    // Text, facts and images
     let mut blocks = vec![
         Block::Text(
             "A box by irradiance caching, as in figure 4: everything that its diffuse walls reflect is interpolated between records, \
@@ -127,6 +130,7 @@ fn figure(setup: &Setup<'_>, o: &Outcome) -> Result<Figure, ReproduceError> {
     blocks.extend(variances(setup, &o.truth, o.size, &list, "box-variance", "stratified over all rays")?);
     blocks.push(Block::Table(table));
 
+    // The summary and the numbers
     let rows: Vec<Value> = (0..o.names.len()).map(|i| method_json(o.names[i], pair(i), errors(i))).collect();
     let reason = format!(
         "the bias of the interpolation alone is {}; without it {} → {}",

@@ -34,12 +34,15 @@ pub(super) fn measure(
     numbers: Numbers,
     size: [u32; 2],
 ) -> Result<Growth, ReproduceError> {
+    // The reference
     let small = size.map(|s| (s / SHRINK).max(8));
     let mut stage = Stage::load(&setup.scenes.join(case.file), small, setup.options.threads)?;
     let list = methods(numbers);
     let range = LONG_TURNS..LONG_TURNS + LONG.1;
     let long = turns(&mut stage, &[list[Role::Balance.place(1)]], View::Centres, LONG.0, range, setup.observer)?;
     let truth = Truth::new(&long[0]);
+
+    // Errors by the number of camera rays
     let chosen: Vec<_> = (0..FULL_WAYS).flat_map(|way| PAIR.map(|r| list[r.place(way)])).collect();
     let mut curves = [const { Vec::new() }; FULL_WAYS];
     for (k, &rays) in RAYS[usize::from(setup.options.quick)].iter().enumerate() {

@@ -74,6 +74,7 @@ pub(super) fn summary(
     [e, base_errors]: [&Errors; 2],
     reason: String,
 ) -> Summary {
+    // The measured result against the target
     let [mis, ocv] = asked.paper;
     let (left, time) = (e.relative(base_errors), m.time_ratio(base));
     let efficiency = e.efficiency(base_errors, time);
@@ -104,6 +105,7 @@ pub(super) fn summary(
 
 /// The section of a case.
 pub(super) fn direct(setup: &Setup<'_>, o: &Outcome<'_>) -> Result<Figure, ReproduceError> {
+    // Facts
     let (triangles, lights) = o.facts;
     let n = o.numbers;
     let base = &o.measured[0];
@@ -134,9 +136,13 @@ pub(super) fn direct(setup: &Setup<'_>, o: &Outcome<'_>) -> Result<Figure, Repro
             ),
         ]),
     ];
+
+    // Images, tables and the growth with camera rays
     blocks.extend(images(setup, o)?);
     blocks.extend(tables(o));
     blocks.push(growth(o));
+
+    // A summary for each kind of sampling
     let asked =
         Asked { paper: o.case.paper, time: o.case.paper_time, target: o.case.target, efficient: o.case.efficient };
     let row =
@@ -153,11 +159,14 @@ pub(super) fn direct(setup: &Setup<'_>, o: &Outcome<'_>) -> Result<Figure, Repro
 
 /// The remark beside the result of a row of the table.
 fn reason(o: &Outcome<'_>, way: usize) -> String {
+    // The light tree compared with uniform light selection
     if let Some(alike) = way.checked_sub(FULL_WAYS) {
         let [mis, ocv] = [Role::Balance, Role::Progressive]
             .map(|r| percent(o.errors[r.place(way)].relative(&o.errors[r.place(alike)])));
         return format!("against lights chosen alike: mis {mis}, ocv {ocv}");
     }
+
+    // The other estimators
     let others: Vec<String> = [Role::Paper, Role::Optimal, Role::Correlated]
         .iter()
         .map(|&r| format!("{} {}", r.name(), percent(o.relative(r, way))))
@@ -165,6 +174,8 @@ fn reason(o: &Outcome<'_>, way: usize) -> String {
     let mut text = others.join("; ");
     let equal = |role: Role| percent(o.relative(role, way));
     text += &format!("; in the time of mis: ocv {}, ris {}", equal(Role::EqualTime), equal(Role::Ris));
+
+    // With antialiasing
     if let Some(shown) = SHOWN_WAYS.iter().position(|&shown| shown == way) {
         let errors = o.antialiased_errors(shown);
         text += &format!(
@@ -174,6 +185,8 @@ fn reason(o: &Outcome<'_>, way: usize) -> String {
             percent(errors[1].relative(&errors[0]))
         );
     }
+
+    // The contribution of stratification
     if way == 1 {
         let gain = o.errors[Role::Balance.place(1)].relative(&o.errors[Role::Balance.place(2)]);
         text += &format!("; stratification alone changes the error of mis by {}", percent(gain));
@@ -182,6 +195,7 @@ fn reason(o: &Outcome<'_>, way: usize) -> String {
 }
 
 fn tables(o: &Outcome<'_>) -> Vec<Block> {
+    // Methods by kind of sampling
     let mut blocks = Vec::new();
     for (way, of_way) in WAYS.iter().enumerate() {
         let mut table = Table::new(&HEADER);
@@ -193,6 +207,8 @@ fn tables(o: &Outcome<'_>) -> Vec<Block> {
         blocks.push(Block::Note(format!("Samples {}{lights}:", of_way.name)));
         blocks.push(Block::Table(table));
     }
+
+    // The same with antialiasing
     for (shown, &way) in SHOWN_WAYS.iter().enumerate() {
         let mut table = Table::new(&HEADER);
         let (all, errors) = (&o.antialiased[shown], o.antialiased_errors(shown));
@@ -218,6 +234,7 @@ fn growth(o: &Outcome<'_>) -> Block {
 }
 
 fn images(setup: &Setup<'_>, o: &Outcome<'_>) -> Result<Vec<Block>, ReproduceError> {
+    // Antialiased images and their crops, then the reference
     let (out, id) = (&setup.options.out, o.case.id);
     let exposure = gain(&o.truth.radiance);
     let (antialiased, errors) = (&o.antialiased[0], o.antialiased_errors(0));
@@ -237,6 +254,7 @@ fn images(setup: &Setup<'_>, o: &Outcome<'_>) -> Result<Vec<Block>, ReproduceErr
     whole.push(Shown { file, title: "reference".to_owned(), caption: String::new() });
 
     let mut blocks = vec![Block::Images(whole), Block::Images(crops)];
+    // Variance images
     for (way, of_way) in WAYS.iter().enumerate().take(FULL_WAYS) {
         let chosen = [Role::Balance, Role::Progressive, Role::Correlated, Role::Ris];
         let list: Vec<(&str, &Measured)> = chosen.iter().map(|r| (r.name(), &o.measured[r.place(way)])).collect();
@@ -254,6 +272,7 @@ pub(super) fn variances(
     file: &str,
     way: &str,
 ) -> Result<Vec<Block>, ReproduceError> {
+    // All maps have the same scale
     let maps: Vec<Vec<f64>> = list.iter().map(|(_, m)| truth.weighted(&m.variance_map())).collect();
     let scale = Scale::of_values(HEAT, maps.iter().flatten());
     let mut shown = Vec::new();
@@ -268,6 +287,7 @@ pub(super) fn variances(
 }
 
 fn numbers(o: &Outcome<'_>) -> Value {
+    // Methods, with pixel centres and with antialiasing
     let all: Vec<Value> = (WAYS.iter().enumerate())
         .flat_map(|(way, of_way)| of_way.roles.iter().map(move |&role| (way, role)))
         .map(|(way, role)| method_json(role.name(), o.pair(role, way), o.errors(role, way)))
@@ -280,6 +300,8 @@ fn numbers(o: &Outcome<'_>) -> Value {
             SHOWN.iter().enumerate().map(row).collect::<Vec<Value>>()
         })
         .collect();
+
+    // Curves of the relative error over the number of camera rays
     let curve = |way: usize| -> Vec<Value> {
         let point =
             |(rays, left): &(u32, Estimate)| json!({ "camera_rays": rays, "relative_error": estimate_json(*left) });

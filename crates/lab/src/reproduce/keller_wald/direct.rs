@@ -55,8 +55,11 @@ struct Named {
 fn methods(sample_counts: SampleCounts) -> Vec<Named> {
     let named = |name, role, method: Method| Named { name, role, method: method.stratified() };
     let by = |light_sampler| Method { light_sampler, ..Method::mis(SAMPLES) };
+    // Resampling without and with visibility in the target function
     let ris = Method::ris(sample_counts.proposals, sample_counts.samples).strata(Strata::Systematic);
     let known = Method { target: Target::Visibility, ..ris };
+
+    // The first method is the baseline
     vec![
         named("mis, all lights", Role::All, Method::mis(SAMPLES)),
         named("mis, all lights, by power", Role::Other, by(LightSamplerKind::Power)),
@@ -168,6 +171,7 @@ fn prepare_visibility_cache(setup: &Setup<'_>, stage: &mut Stage) -> (u64, f64) 
 }
 
 fn figure(setup: &Setup<'_>, few: &Outcome, many: &Outcome) -> Result<Figure, ReproduceError> {
+    // Images and tables of both buildings
     let mut blocks = vec![Block::Text(
         "Direct light in rooms with a light each, of which a point sees one or two: the others are behind walls, and no bound on \
          their distance and direction tells. Below it 2,500 rooms with four lights each."
@@ -181,6 +185,7 @@ fn figure(setup: &Setup<'_>, few: &Outcome, many: &Outcome) -> Result<Figure, Re
     blocks.push(Block::Text("Processor time for each shadow segment, everything included:".to_owned()));
     blocks.push(Block::Table(growth_table(few, many)));
 
+    // Efficiency of the best unbiased method against mis and ris, and its cost with more lights
     let best = few.best();
     let [left, left_of_ris] = [Role::All, Role::Resampled].map(|role| few.against(best, role));
     let factor = |e: Estimate| if e.value > 0.0 { 1.0 / e.value } else { 0.0 };
@@ -226,6 +231,7 @@ fn figure(setup: &Setup<'_>, few: &Outcome, many: &Outcome) -> Result<Figure, Re
 
 /// Gain and loss by omitting lights.
 fn biased_summary(o: &Outcome) -> Summary {
+    // The bias relative to the best unbiased method
     let i = o.place(Role::Biased);
     let (own, true_mean) = (o.measured[i].mean(), o.measured[o.best()].mean());
     let value = own.value / true_mean.value.max(1e-300);
@@ -286,6 +292,7 @@ fn images(setup: &Setup<'_>, o: &Outcome, name: &str) -> Result<Vec<Block>, Repr
 }
 
 fn table(o: &Outcome) -> Table {
+    // Columns
     let header = [
         "method",
         "N",
@@ -296,6 +303,8 @@ fn table(o: &Outcome) -> Table {
         "against ris",
         "same mean, p",
     ];
+
+    // A row for each method
     let mut table = Table::new(&header);
     let base = &o.measured[o.place(Role::All)];
     for (i, m) in o.measured.iter().enumerate() {

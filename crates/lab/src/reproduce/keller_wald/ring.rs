@@ -106,6 +106,7 @@ fn row(setup: &Setup<'_>, seen: &[Option<Seen>], (q, maps): (u64, Maps), error: 
 }
 
 fn figure(setup: &Setup<'_>, outcomes: &[Outcome; 2]) -> Result<Figure, ReproduceError> {
+    // A text, then images and a table for each scene
     let mut blocks = vec![Block::Text(format!(
         "A polished ring on a table: both maps shown directly, and below them the caustic map alone, a part of the image, beside that of \
          {LONGER} times the photon paths of the finest. Only the first ⌊qN⌋ of N photon paths fill the global map, so that the caustic map \
@@ -113,6 +114,7 @@ fn figure(setup: &Setup<'_>, outcomes: &[Outcome; 2]) -> Result<Figure, Reproduc
          has to say that it does."
     ))];
     for o in outcomes {
+        // Both maps shown directly
         let exposure = gain(&o.rows[o.rows.len() - 1].all);
         let caption = |r: &Row| {
             format!("{} photons in the global map, {} in the caustic map", r.maps.global.len(), r.maps.caustic.len())
@@ -127,6 +129,8 @@ fn figure(setup: &Setup<'_>, outcomes: &[Outcome; 2]) -> Result<Figure, Reproduc
             })
             .collect();
         blocks.push(prints(setup, exposure, &whole)?);
+
+        // The caustic map, enlarged, and its reference
         let parts: Vec<_> = (o.rows.iter())
             .map(|r| (format!("{}", r.q), format!("caustic, q = 1/{}", r.q), &r.caustic))
             .chain([("reference".to_owned(), "caustic, reference".to_owned(), &o.reference)])

@@ -119,6 +119,7 @@ fn figure(
     rows: &[Row; 4],
 ) -> Result<Figure, ReproduceError> {
     let setup = judge.setup;
+    // Figure 1: point clouds from above
     let mut blocks = vec![Block::Text(
         "Figure 1: photons of a building of 10 × 10 rooms with one light each, from above. The standard map, importons, and about as many \
          photons as in the standard map, deposited by importance; the camera stands in one room and sees a part of the next."
@@ -134,17 +135,23 @@ fn figure(
         cloud("importance", "map by importance", rows[1].maps.positions()),
     ];
     blocks.extend(clouds(setup, &plan(setup, judge.job), &list)?);
+
+    // Figure 2: the maps shown directly
     blocks.push(Block::Text(
         "Figure 2: the maps shown directly, each with the number of nearest photons k that serves it best. Rows have the same number of photons."
             .to_owned(),
     ));
     blocks.push(maps_shown(judge, size, rows)?);
     blocks.push(Block::Table(table(rows)));
+
+    // The error by the number of nearest photons
     let mut chart = Chart::new("photons of an estimate, k", "relative error");
     for r in rows {
         chart = chart.with(r.name, COUNTS.iter().zip(&r.errors).map(|(&k, &e)| [f64::from(k), e]).collect());
     }
     blocks.push(Block::Chart(chart));
+
+    // The summary and the numbers
     let json: Vec<Value> = rows.iter().map(row_json).collect();
     Ok(Figure {
         id: "rooms",
@@ -161,6 +168,7 @@ fn figure(
 
 /// The images of all maps, and the reference.
 fn maps_shown(judge: &Judge<'_>, size: [u32; 2], rows: &[Row; 4]) -> Result<Block, ReproduceError> {
+    // A print for each map
     let exposure = gain(&judge.reference.radiance);
     let mut list: Vec<Print<'_>> = (rows.iter().enumerate())
         .map(|(i, r)| Print {
@@ -176,6 +184,8 @@ fn maps_shown(judge: &Judge<'_>, size: [u32; 2], rows: &[Row; 4]) -> Result<Bloc
             radiance: &r.image,
         })
         .collect();
+
+    // The reference
     list.push(Print {
         name: "rooms-reference".to_owned(),
         title: "path tracing".to_owned(),
@@ -187,6 +197,7 @@ fn maps_shown(judge: &Judge<'_>, size: [u32; 2], rows: &[Row; 4]) -> Result<Bloc
 }
 
 fn summary(rows: &[Row; 4]) -> Summary {
+    // Error ratios at equal numbers of photons
     let factor = |i: usize| rows[i].error() / rows[i + 1].error().max(1e-300);
     let same_with_an_eighth = rows[1].error() <= rows[2].error();
     Summary {

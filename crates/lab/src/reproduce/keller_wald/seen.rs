@@ -47,10 +47,13 @@ pub(super) fn seen(world: &World) -> Vec<Option<Seen>> {
 }
 
 fn diffuse_at(world: &World, wo: Vec3, hit: &Hit) -> Option<Seen> {
+    // Lights count as not diffuse
     let scene = &world.scene;
     if hit.instance == Hit::NO_INSTANCE && scene.lights.light_of(hit.geometry, hit.primitive).is_some() {
         return None;
     }
+
+    // The surface and its texture context
     let ray = Ray { o: Vec3::ZERO, d: -wo, t_max: f32::INFINITY, time: 0.5 };
     let surface = scene.geometry.surface_hit_of_ray(hit.geometry, hit.primitive, hit.instance, hit.uv, &ray);
     let (uv1, color, face) = (surface.vertex.uv1, surface.vertex.color, surface.vertex.face);
@@ -63,6 +66,8 @@ fn diffuse_at(world: &World, wo: Vec3, hit: &Hit) -> Option<Seen> {
         p: surface.p.as_dvec3(),
         n: surface.n,
     };
+
+    // The material must be purely Lambertian
     let material = scene.surfaces[hit.geometry as usize].material;
     let bsdf = scene.materials.bsdf(material, &scene.textures, &surface, &context, wo)?;
     let part = bsdf.lambertian(wo).filter(|part| part.rest.is_none())?;

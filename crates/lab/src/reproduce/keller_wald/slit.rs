@@ -90,6 +90,7 @@ fn row(
     importance: Option<&Importance>,
     photons: u64,
 ) -> Result<Row, ReproduceError> {
+    // Mean luminance over seeds; the maps of the first seed are kept
     let budget = PhotonBudget::Stored { global: photons, max_paths: photons.saturating_mul(2000) };
     let pixels = seen.iter().flatten().count().max(1) as f64;
     let mut means = Welford::new();
@@ -123,6 +124,7 @@ fn figure(
     importance: &Importance,
     rows: &[Row; 3],
 ) -> Result<Figure, ReproduceError> {
+    // Point clouds from above
     let mut blocks = vec![Block::Text(format!(
         "The room on the left has the camera and no light; the one on the right has a light. From above: importons, and about the same number \
          of photons in three maps: all that arrive, by importance with probabilities of at least ε = {MIN_PROBABILITY}, and without those whose \
@@ -135,6 +137,8 @@ fn figure(
     let mut list = vec![cloud("importons", "importons", positions(importance.map()).collect())];
     list.extend(rows.iter().map(|r| cloud(r.id, r.name, r.maps.positions())));
     blocks.extend(clouds(setup, &plan(setup, job), &list)?);
+
+    // The maps shown directly
     let list: Vec<Print<'_>> = (rows.iter())
         .map(|r| Print {
             name: format!("slit-{}", r.id),
@@ -147,6 +151,7 @@ fn figure(
     blocks.push(prints(setup, gain(&rows[1].image), &list)?);
     blocks.push(Block::Table(table(rows)));
 
+    // The summary and the numbers
     Ok(Figure {
         id: "slit",
         title: "Figure 4: a room that is lit through a slit",

@@ -165,6 +165,7 @@ pub(super) fn run(setup: &Setup<'_>, time: Duration) -> Result<Figure, Reproduce
 
 /// The two images of the thesis, and the map.
 fn images(setup: &Setup<'_>, stage: &mut Stage, o: &Outcome) -> Result<Vec<Block>, ReproduceError> {
+    // One camera ray per pixel, with the first and the last M/N of the sweep
     let size = stage.size();
     let to_f32 = |p: Vec<[f64; 3]>| -> Vec<[f32; 3]> { p.iter().map(|p| p.map(|v| v as f32)).collect() };
     let exposure = gain(&to_f32(reference(&o.measured)));
@@ -180,6 +181,7 @@ fn images(setup: &Setup<'_>, stage: &mut Stage, o: &Outcome) -> Result<Vec<Block
         shown.push(Shown { file, title, caption });
     }
 
+    // Maps of the best M/N: from the measured variances, and from the pilot
     let (costs, time) = o.costs();
     let is_surface = o.classes.visibility.iter().map(|v| !v.is_nan());
     let ratios: Vec<Option<f64>> =
@@ -197,6 +199,8 @@ fn images(setup: &Setup<'_>, stage: &mut Stage, o: &Outcome) -> Result<Vec<Block
         let caption = "green: more proposals; red: more samples; black: nothing lit".to_owned();
         shown.push(Shown { file, title: title.to_owned(), caption });
     }
+
+    // Maps of both variance terms
     let [p, q]: [Vec<f64>; 2] =
         [|v: &Variances| v.proposals, |v: &Variances| v.samples].map(|f| o.terms.0.iter().map(f).collect());
     let heat = Scale::of_values(HEAT, &p);
@@ -219,10 +223,13 @@ fn ratio_of(s: &SampleCounts) -> f64 {
 }
 
 fn tables(o: &Outcome) -> Vec<Block> {
+    // Columns
     let masks = &o.classes.masks;
     let mut header = vec!["M", "N", "M/N", "time", "variance at equal time"];
     header.extend(NAMES);
     let mut table = Table::new(&header);
+
+    // Rows: the sweep, auto, and M and N per pixel
     let base = &o.measured[0];
     let auto = (o.calibration.sample_counts, o.auto());
     let rows = o.swept.iter().copied().zip(o.sweep()).chain([auto, (o.calibration.sample_counts, o.per_pixel())]);
@@ -247,6 +254,8 @@ fn tables(o: &Outcome) -> Vec<Block> {
         cells.extend(masks.iter().map(|mask| Cell::number(plus_minus(m.at_equal_time(base, Some(mask))))));
         table.row(cells);
     }
+
+    // The variance by M/N, for all pixels and for each class
     let curve = |mask: Option<&[bool]>| -> Vec<[f64; 2]> {
         let point = |(s, m): (&SampleCounts, &Measured)| [ratio_of(s), m.at_equal_time(base, mask).value];
         o.swept.iter().zip(o.sweep()).map(point).collect()
@@ -266,11 +275,14 @@ fn tables(o: &Outcome) -> Vec<Block> {
 }
 
 fn figure(o: &Outcome, size: [u32; 2], blocks: Vec<Block>) -> Figure {
+    // The excess of auto over the best of the sweep
     let base = &o.measured[0];
     let best = o.best(None);
     let min = o.measured[best].at_equal_time(base, None);
     let auto = o.auto().at_equal_time(base, None);
     let excess = auto.value / min.value.max(1e-300);
+
+    // Predicted variances with the M/N of auto and with the best M/N of every pixel
     let (costs, time) = o.costs();
     let k = ratio_of(&o.calibration.sample_counts);
     let is_surface = o.classes.visibility.iter().map(|v| !v.is_nan());
@@ -278,6 +290,8 @@ fn figure(o: &Outcome, size: [u32; 2], blocks: Vec<Block>) -> Figure {
         o.terms.ratios(costs, time).into_iter().zip(is_surface).map(|(k, is)| k.filter(|_| is)).collect();
     let of_auto = o.terms.predicted(costs, time, |_| k);
     let of_best = o.terms.predicted(costs, time, |i| ratios[i].unwrap_or(k));
+
+    // The best M/N by class
     let sample_counts = |i: usize| o.swept.get(i).copied().unwrap_or(o.calibration.sample_counts);
     let best_of: Vec<String> = NAMES
         .iter()
@@ -301,6 +315,8 @@ fn figure(o: &Outcome, size: [u32; 2], blocks: Vec<Block>) -> Figure {
             o.per_pixel().at_equal_time(o.auto(), None).value
         ),
     };
+
+    // The numbers
     let names: Vec<String> = (0..o.measured.len()).map(|i| o.name(i)).collect();
     let rows: Vec<_> = (0..names.len()).map(|i| method_json(&names[i], &o.measured, i, &o.classes)).collect();
     let numbers = json!({

@@ -16,6 +16,7 @@ use serde_json::{Value, json};
 
 /// All numbers of a method among the methods of its turns, the first of which is the baseline.
 pub(super) fn method_json(name: &str, all: &[Measured], method: usize, classes: &Classes) -> Value {
+    // By class of pixels
     let (m, base) = (&all[method], &all[0]);
     let class = |k: usize| {
         let mask = Some(&classes.masks[k][..]);
@@ -26,6 +27,8 @@ pub(super) fn method_json(name: &str, all: &[Measured], method: usize, classes: 
         })
     };
     let by_class: serde_json::Map<String, Value> = (0..3).map(|k| (NAMES[k].to_owned(), class(k))).collect();
+
+    // Over all pixels
     json!({
         "name": name,
         "estimator": <&str>::from(m.method.estimator), "samples": m.method.samples, "proposals": m.method.proposals,
@@ -40,6 +43,7 @@ pub(super) fn method_json(name: &str, all: &[Measured], method: usize, classes: 
 
 /// The section of a case.
 pub(super) fn comparison(setup: &Setup<'_>, o: &Outcome<'_>) -> Result<Figure, ReproduceError> {
+    // Facts
     let SampleCounts { samples, proposals } = o.calibration.sample_counts;
     let (triangles, lights) = o.stage_facts;
     let base = &o.measured[o.roles.base];
@@ -60,12 +64,18 @@ pub(super) fn comparison(setup: &Setup<'_>, o: &Outcome<'_>) -> Result<Figure, R
             ),
         ]),
     ];
+
+    // Images and tables
     blocks.extend(images(setup, o)?);
     blocks.extend(tables(o));
+
+    // The summary
     let (summary, also) = match o.case.kind {
         Kind::Reduction { paper, target, .. } => reductions(o, [paper, target]),
         Kind::Stratification => (stratification(o), Vec::new()),
     };
+
+    // The numbers
     let rows: Vec<Value> =
         (0..o.methods.len()).map(|i| method_json(&o.methods[i].name, &o.measured, i, &o.classes)).collect();
     let antialiased: Vec<Value> =
@@ -100,12 +110,15 @@ fn visibility(o: &Outcome<'_>) -> (f64, f64) {
 
 /// The row of resampling number `i`.
 fn reduction(o: &Outcome<'_>, i: usize, [paper, target]: [f64; 2]) -> Summary {
+    // Variances relative to the baseline at equal time
     let base = &o.measured[o.roles.base];
     let m = &o.measured[i];
     let at = |i: usize| o.measured[i].at_equal_time(base, None);
     let counts = [m.method.proposals, m.method.samples];
     let reached = reduced_by_resampling(counts, at(i), target);
     let (bound, share) = visibility(o);
+
+    // M, N, and the effect of stratification
     let mut reason = format!("M = {}, N = {}", m.method.proposals, m.method.samples);
     if m.method.proposals == m.method.samples {
         reason += ", so that nothing is resampled";
@@ -126,6 +139,8 @@ fn reduction(o: &Outcome<'_>, i: usize, [paper, target]: [f64; 2]) -> Summary {
             );
         }
     }
+
+    // The share of visibility, and its lower bound
     reason += &format!("; visibility is {:.0} % of the variance of unstratified ris", share * 100.0);
     if !reached && i == o.roles.equal_halves {
         reason += &format!(", so that no number of proposals brings it below {:+.0} %", (bound - 1.0) * 100.0);
@@ -187,10 +202,13 @@ fn stratification(o: &Outcome<'_>) -> Summary {
 }
 
 fn images(setup: &Setup<'_>, o: &Outcome<'_>) -> Result<Vec<Block>, ReproduceError> {
+    // The exposure comes from the reference
     let out = &setup.options.out;
     let id = o.case.id.replace('.', "-");
     let reference: Vec<[f32; 3]> = o.reference.iter().map(|p| p.map(|v| v as f32)).collect();
     let exposure = gain(&reference);
+
+    // Antialiased images of the baseline and the judged method
     let chosen = [o.roles.base, o.roles.judged];
     let base_seconds = o.antialiased[0].seconds[0].processor;
     let mut shown = Vec::new();
@@ -208,15 +226,21 @@ fn images(setup: &Setup<'_>, o: &Outcome<'_>) -> Result<Vec<Block>, ReproduceErr
         );
         shown.push(Shown { file, title: o.methods[i].name.clone(), caption });
     }
+
+    // Their variances, on the same scale
     let maps: Vec<Vec<f64>> = chosen.iter().map(|&i| o.measured[i].variance_map()).collect();
     let scale = Scale::of_values(HEAT, maps.iter().flatten());
     for (k, (&i, map)) in chosen.iter().zip(&maps).enumerate() {
         let file = Image::colored(o.size, map, &scale).write(out, &format!("{id}-variance-{k}"))?;
         shown.push(Shown { file, title: format!("variance: {}", o.methods[i].name), caption: String::new() });
     }
+
+    // The reference
     let file = Image::tone_mapped(o.size, &reference, exposure).write(out, &format!("{id}-mean"))?;
     let title = "mean of all turns of all methods".to_owned();
     shown.push(Shown { file, title, caption: String::new() });
+
+    // The visibility
     let grey = |&v: &f64| if v.is_nan() { [0.0, 0.0, 0.1] } else { [v.clamp(0.0, 1.0) as f32; 3] };
     let visibility: Vec<[f32; 3]> = o.classes.visibility.iter().map(grey).collect();
     let file = Image::tone_mapped(o.size, &visibility, 1.0).write(out, &format!("{id}-visibility"))?;
@@ -227,6 +251,7 @@ fn images(setup: &Setup<'_>, o: &Outcome<'_>) -> Result<Vec<Block>, ReproduceErr
 }
 
 fn tables(o: &Outcome<'_>) -> Vec<Block> {
+    // Variances and times of the methods
     let base = &o.measured[o.roles.base];
     let mut header = vec!["method", "M", "N", "variance", "time", "at equal time"];
     header.extend(NAMES);
@@ -245,6 +270,8 @@ fn tables(o: &Outcome<'_>) -> Vec<Block> {
         cells.push(Cell::number(significant(same_mean(&o.measured, i))));
         table.row(cells);
     }
+
+    // Times by stage of a rendering
     let mut times =
         Table::new(&["method", "camera rays", "materials", "T1", "select", "T2", "processor seconds of a turn"]);
     for (named, m) in o.methods.iter().zip(&o.measured) {
@@ -254,6 +281,8 @@ fn tables(o: &Outcome<'_>) -> Vec<Block> {
         let cells = values.iter().map(|&v| Cell::number(significant(v)));
         times.row(std::iter::once(Cell::text(&named.name)).chain(cells).chain([total]));
     }
+
+    // Pixels by visibility class
     let counts = o.classes.counts();
     let classes = format!(
         "Pixels by the part v of the light that arrives: {} lit (v ≥ {LIT}), {} in penumbra, {} in shadow (v ≤ {SHADOWED}).",

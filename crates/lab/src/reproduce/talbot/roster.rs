@@ -32,6 +32,7 @@ pub(super) struct Roles {
 
 /// The methods of a case, with M and N of equal halves of the time.
 pub(super) fn methods(case: &Case, sample_counts: SampleCounts) -> (Vec<Named>, Roles) {
+    // Resampling methods
     let SampleCounts { samples: n, proposals: m } = sample_counts;
     let named = |name: &str, method: Method| Named { name: name.to_owned(), method };
     let ris = Method::ris(m, n);
@@ -40,6 +41,8 @@ pub(super) fn methods(case: &Case, sample_counts: SampleCounts) -> (Vec<Named>, 
     let systematic =
         named("ris + stratified proposals + systematic samples", ris.stratified().strata(Strata::Systematic));
     let visibility = named("ris, one sample of many proposals", Method::ris(MANY, 1));
+
+    // The list of the case; roles are indices into it
     match case.kind {
         Kind::Reduction { judged, .. } => {
             let mut list = vec![

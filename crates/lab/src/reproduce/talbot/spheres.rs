@@ -72,10 +72,13 @@ fn ratio(pair: &Pair) -> f64 {
 
 /// Renders and measures all spheres.
 pub(super) fn run(setup: &Setup<'_>) -> Result<Figure, ReproduceError> {
+    // Measurements
     (setup.observer.say)("Paper, figure 5: spheres …");
     let size = setup.size.min(200);
     let spheres = spheres();
     let pairs: Vec<Pair> = spheres.iter().map(|s| study(s, size)).collect();
+
+    // Images, table rows and numbers of the spheres
     let mut blocks = vec![Block::Text(
         "Spheres under uniform light. Directions are drawn from a density that knows nothing of the BSDF: one (M = 1), or \
          one of 20 by the weight of f |cos θ| (M = 20, N = 1). The paper shows uniform proposals; the default lobes are a \
@@ -106,6 +109,7 @@ pub(super) fn run(setup: &Setup<'_>) -> Result<Figure, ReproduceError> {
 }
 
 fn figure(spheres: &[Sphere], pairs: &[Pair], blocks: Vec<Block>, numbers: Value) -> Figure {
+    // Only spheres of the paper count
     let shown: Vec<(&str, f64)> =
         spheres.iter().zip(pairs).filter(|(s, _)| s.in_paper).map(|(s, p)| (s.name, ratio(p))).collect();
     let worst = shown.iter().map(|s| s.1).fold(0.0, f64::max);
@@ -130,6 +134,7 @@ fn figure(spheres: &[Sphere], pairs: &[Pair], blocks: Vec<Block>, numbers: Value
 }
 
 fn images(setup: &Setup<'_>, sphere: &Sphere, pair: &Pair, size: u32) -> Result<Vec<Block>, ReproduceError> {
+    // Images and variances share gain and scale
     let name = sphere.name.replace([' ', ','], "-").replace("--", "-").to_lowercase();
     let rgb = |s: &SphereStudy| -> Vec<[f32; 3]> { s.pixels.iter().map(|p| p.to_array()).collect() };
     let maps = [0, 1].map(|i| -> Vec<f64> {
@@ -137,6 +142,8 @@ fn images(setup: &Setup<'_>, sphere: &Sphere, pair: &Pair, size: u32) -> Result<
     });
     let gain = gain(&rgb(&pair.variances[1]));
     let scale = Scale::of_values(HEAT, maps.iter().flatten());
+
+    // The images
     let mut shown: Vec<page::Shown> = Vec::new();
     for (i, m) in PROPOSALS.iter().enumerate() {
         let image = Image::tone_mapped([size; 2], &rgb(&pair.images[i]), gain);
@@ -144,6 +151,8 @@ fn images(setup: &Setup<'_>, sphere: &Sphere, pair: &Pair, size: u32) -> Result<
         let caption = format!("{} estimates per pixel", SPP[0]);
         shown.push(Shown { file, title: format!("{}, M = {m}", sphere.name), caption });
     }
+
+    // The variances
     for (i, m) in PROPOSALS.iter().enumerate() {
         let file = Image::colored([size; 2], &maps[i], &scale)
             .write(&setup.options.out, &format!("figure-5-{name}-m{m}-variance"))?;
