@@ -47,14 +47,16 @@ impl Bvh {
         // Trees of the groups
         let start = Instant::now();
         let flags = geometry.geometries.iter().map(|g| flags_of(g, alpha.is_some())).collect();
+        let is_triangle: Vec<bool> = geometry.geometries.iter().map(|g| matches!(g.shape, Shape::Mesh(_))).collect();
+        let build = |prims| build_tree(&geometry, &is_triangle, prims);
         let built: Vec<(Tree, u64)> =
-            geometry.groups.par_iter().map(|group| build_tree(&geometry, group_prims(&geometry, group))).collect();
+            geometry.groups.par_iter().map(|group| build(group_prims(&geometry, group))).collect();
         let group_bounds: Vec<Bounds3> = built.iter().map(|(tree, _)| tree.bounds).collect();
 
         // Tree of the root
         let mut prims = group_prims(&geometry, &geometry.root);
         prims.extend(instance_prims(&geometry, &group_bounds));
-        let (root, root_peak) = build_tree(&geometry, prims);
+        let (root, root_peak) = build(prims);
 
         // Transforms and memory
         let group_from_world: Vec<Option<Affine3A>> = geometry
@@ -107,11 +109,10 @@ fn flags_of(geometry: &Geometry, has_alpha_source: bool) -> u32 {
     geometry.visibility.0 & Visibility::ALL.0 | tested
 }
 
-/// A tree, and the peak memory of its build (bytes).
-fn build_tree(geometry: &GeometrySet, mut prims: Vec<PrimRef>) -> (Tree, u64) {
-    let is_triangle: Vec<bool> = geometry.geometries.iter().map(|g| matches!(g.shape, Shape::Mesh(_))).collect();
-    let binary = build_binary(&mut prims, &is_triangle);
-    let tree = Tree::new(geometry, &prims, binary.as_ref(), &is_triangle);
+/// A tree, and the peak memory of its build (bytes). `is_triangle` tells of each geometry whether it is a mesh.
+fn build_tree(geometry: &GeometrySet, is_triangle: &[bool], mut prims: Vec<PrimRef>) -> (Tree, u64) {
+    let binary = build_binary(&mut prims, is_triangle);
+    let tree = Tree::new(geometry, &prims, binary.as_ref(), is_triangle);
     let binary_bytes = binary.map_or(0, |root| root.bytes());
     let peak = tree.bytes() + size_of_val(&prims[..]) as u64 + binary_bytes;
     (tree, peak)

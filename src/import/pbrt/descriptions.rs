@@ -326,7 +326,7 @@ pub struct ShapeDesc {
     /// Material.
     pub material: MaterialUse,
     /// Emission.
-    pub area_light: Option<AreaLightDesc>,
+    pub area_light: Option<Arc<AreaLightDesc>>,
     /// Alpha texture.
     pub alpha: Option<u32>,
     /// Displacement of the surface.
@@ -334,5 +334,5 @@ pub struct ShapeDesc {
     /// The object that it belongs to.
     pub object: Option<usize>,
     /// The media on its sides.
-    pub media: MediumNames,
+    pub media: Arc<MediumNames>,
 }

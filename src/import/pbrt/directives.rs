@@ -9,6 +9,7 @@ use lumiris_formats::pbrt::directive::{ActiveTimes, AttributeTarget, Directive, 
 use lumiris_formats::pbrt::params::ParamSet;
 use lumiris_formats::pbrt::parser::Visitor;
 use lumiris_formats::source::{SourceMap, Span};
+use std::sync::Arc;
 
 impl Visitor for Builder<'_> {
     fn directive(&mut self, directive: Directive, _sources: &SourceMap, diagnostics: &mut Diagnostics) {
@@ -60,7 +61,7 @@ impl Visitor for Builder<'_> {
             }
             D::MediumInterface { inside, outside } => {
                 let [inside, outside] = [inside, outside].map(|name| Some(name).filter(|name| !name.text.is_empty()));
-                self.state.media = MediumNames { inside, outside };
+                self.state.media = Arc::new(MediumNames { inside, outside });
             }
             D::WorldBegin => self.world_begin(),
             D::WorldEnd => {}
@@ -84,7 +85,7 @@ impl Visitor for Builder<'_> {
             }
             D::AreaLightSource(name) => {
                 self.with_defaults(AttributeTarget::Light, &mut params);
-                self.state.area_light = self.area_light(&name, &params, diagnostics);
+                self.state.area_light = self.area_light(&name, &params, diagnostics).map(Arc::new);
             }
             D::Shape(name) => {
                 self.with_defaults(AttributeTarget::Shape, &mut params);

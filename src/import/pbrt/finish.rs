@@ -1,6 +1,6 @@
 //! The end of an import: reads all files in parallel, and assembles the scene in text order.
 
-use super::descriptions::{AreaLightDesc, ShapeDesc};
+use super::descriptions::{AreaLightDesc, InstanceDesc, ShapeDesc};
 use super::instances::{Objects, flattened, rendered};
 use super::lights::power_factor;
 use super::measured;
@@ -10,6 +10,7 @@ use super::ptex;
 use super::settings::Placed;
 use super::shapes::{Made, ShapeError};
 use super::state::Builder;
+use super::transform::Ctm;
 use crate::geometry::{Geometry, GeometryId, GeometrySet, Group, GroupId, Instance, Shape, Visibility};
 use crate::imaging::oiio::ImageError;
 use crate::import::cache::FileCache;
@@ -31,6 +32,15 @@ use std::collections::{BTreeSet, HashMap};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+/// What shapes of a group that moves have in common.
+#[derive(Clone, Copy, PartialEq)]
+struct Together {
+    object: Option<usize>,
+    motion: Ctm,
+    /// The origin of the group in its object or in the world.
+    origin: DVec3,
+}
+
 /// Geometry during assembly.
 #[derive(Default)]
 struct Assembly {
@@ -45,6 +55,8 @@ struct Assembly {
     media: MediaInUse,
     /// By object, groups that move within it or are far from its origin, with their transforms.
     moving: Vec<Vec<(GroupId, Vec<DAffine3>)>>,
+    /// The last group that moves.
+    last_moving: Option<(Together, GroupId)>,
     /// Groups far from the origin of their object, by the index of the object and their own origin.
     far: HashMap<(usize, [u64; 3]), GroupId>,
 }
@@ -102,6 +114,7 @@ impl Builder<'_> {
 
         // Read all files even after errors, so that one run reports all missing ones
         let mut shapes = std::mem::take(&mut self.shapes);
+        self.place_single_objects(&mut shapes);
         let environment_paths: Vec<PathBuf> = self.environments.iter().map(|e| e.path.clone()).collect();
         let emission_paths = self.emission_image_paths();
         // Images first: while one thread loads the image library, the others process meshes and coats
@@ -205,6 +218,30 @@ impl Builder<'_> {
         Some((scene, settings, given))
     }
 
+    /// Moves the shapes of objects that have one instance, without motion, to the place of the instance. So they need no
+    /// group, and no acceleration structure of their own.
+    fn place_single_objects(&mut self, shapes: &mut [ShapeDesc]) {
+        let mut counts = vec![0_u32; self.objects.len()];
+        let nested = self.objects.iter().flat_map(|object| &object.instances);
+        nested.chain(&self.instances).for_each(|instance| counts[instance.object] += 1);
+        let mut placements: Vec<Option<Ctm>> = vec![None; self.objects.len()];
+        for InstanceDesc { object, ctm, .. } in &self.instances {
+            let is_single = counts[*object] == 1 && self.objects[*object].instances.is_empty();
+            placements[*object] = Some(*ctm).filter(|ctm| is_single && !ctm.is_moving() && ctm.is_invertible());
+        }
+        for shape in shapes.iter().filter(|shape| !shape.can_leave_object()) {
+            shape.object.inspect(|&object| placements[object] = None);
+        }
+
+        for shape in shapes {
+            let Some(placement) = shape.object.and_then(|object| placements[object]) else { continue };
+            shape.ctm = shape.ctm.within(&placement);
+            shape.object = None;
+        }
+        self.instances.retain(|instance| placements[instance.object].is_none());
+        self.instances.shrink_to_fit();
+    }
+
     /// Adds the shapes of one description to their group, to the root, or to an instance of their own if they move.
     fn place(&self, assembly: &mut Assembly, desc: &ShapeDesc, made: Made, material: MaterialId, d: &mut Diagnostics) {
         let moving = desc.ctm.is_moving();
@@ -244,21 +281,34 @@ impl Builder<'_> {
             (Some(object), false) => assembly.in_object(object, made.origin).geometries.extend(ids),
             (None, false) => assembly.set.root.geometries.extend(ids),
             (object, true) => {
-                let group = assembly.set.groups.len() as u32;
-                assembly.set.groups.push(Group { geometries: ids });
-                let samples = desc.ctm.samples(assembly.shutter);
-                match object {
-                    Some(object) => {
-                        let placements = samples.iter().map(|m| rebased(m, DVec3::ZERO, made.origin)).collect();
-                        assembly.moving[object].push((group, placements));
-                    }
-                    None => {
-                        let world_from_group = rendered(&samples, self.origin, made.origin);
-                        assembly.set.instances.push(Instance { group, world_from_group });
-                    }
-                }
+                let together = Together { object, motion: desc.ctm.motion(), origin: made.origin };
+                let group = match assembly.last_moving {
+                    Some((last, group)) if last == together => group,
+                    _ => self.add_moving_group(assembly, together),
+                };
+                assembly.last_moving = Some((together, group));
+                assembly.set.groups[group as usize].geometries.extend(ids);
             }
         }
+    }
+
+    /// Adds a group that moves in an object or in the world.
+    fn add_moving_group(&self, assembly: &mut Assembly, together: Together) -> GroupId {
+        let Together { object, motion, origin } = together;
+        let group = assembly.set.groups.len() as GroupId;
+        assembly.set.groups.push(Group::default());
+        let samples = motion.samples(assembly.shutter);
+        match object {
+            Some(object) => {
+                let placements = samples.iter().map(|m| rebased(m, DVec3::ZERO, origin)).collect();
+                assembly.moving[object].push((group, placements));
+            }
+            None => {
+                let world_from_group = rendered(&samples, self.origin, origin);
+                assembly.set.instances.push(Instance { group, world_from_group });
+            }
+        }
+        group
     }
 
     fn add_environments(&mut self, images: Vec<LoadedImage>, d: &mut Diagnostics) {

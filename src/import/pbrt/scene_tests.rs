@@ -1,6 +1,6 @@
 //! Semantics of whole scenes: unusual orders of directives, and errors that pbrt repairs.
 
-use crate::geometry::Shape;
+use crate::geometry::{GeometrySet, Shape};
 use crate::import::cache::FileCache;
 use crate::import::{LoadOptions, Loaded, load_text};
 use crate::materials::Material;
@@ -206,12 +206,74 @@ fn names_are_defined_once_and_both_places_are_named() {
 
 #[test]
 fn objects_may_be_placed_before_they_are_defined() {
-    let loaded = load_with("", r#"Translate 1 2 3 ObjectInstance "o" ObjectBegin "o" Shape "disk" ObjectEnd"#).unwrap();
-    let [instance] = loaded.scene.geometry.instances.as_slice() else { panic!("it is placed once") };
+    let twice = r#"Translate 1 2 3 ObjectInstance "o" ObjectInstance "o" ObjectBegin "o" Shape "disk" ObjectEnd"#;
+    let loaded = load_with("", twice).unwrap();
+    let [instance, _] = loaded.scene.geometry.instances.as_slice() else { panic!("it is placed twice") };
     assert_eq!(instance.world_from_group[0].translation.to_array(), [1.0, 2.0, 3.0]);
     let nested = r#"ObjectBegin "a" ObjectInstance "b" ObjectEnd ObjectBegin "b" ObjectInstance "a" ObjectEnd"#;
     let error = load_with("", nested).unwrap_err();
     assert!(error.contains("object `b` is defined after the one that holds it"), "{error}");
+}
+
+#[test]
+fn objects_that_are_placed_once_need_no_instance() {
+    let mesh = r#"Shape "trianglemesh" "point3 P" [ 0 0 0 1 0 0 0 1 0.5 ] "integer indices" [ 0 1 2 ]"#;
+    let place = "Rotate 30 1 2 3 Scale -1.5 0.7 2 Translate 4 -5 6";
+    let geometry = |world: &str| load_with("", world).unwrap().scene.geometry;
+    let placed = |object: &str, count: usize| {
+        let instance = r#"ObjectInstance "o" "#.repeat(count);
+        geometry(&format!(r#"ObjectBegin "o" Scale 2 1 1 {object} ObjectEnd {place} {instance}"#))
+    };
+    let triangle = |geometry: &GeometrySet| match &geometry.geometries[0].shape {
+        Shape::Mesh(mesh) => (mesh.triangle(0), mesh.flip_normal),
+        other => panic!("{other:?}"),
+    };
+
+    // As the shape at the same place without an object
+    let (once, plain) = (placed(mesh, 1), geometry(&format!("{place} Scale 2 1 1 {mesh}")));
+    assert_eq!((once.instances.len(), once.root.geometries.len()), (0, 1));
+    assert_eq!(triangle(&once), triangle(&plain));
+
+    // Others stay where they are defined
+    assert_eq!(placed(mesh, 2).instances.len(), 2);
+    let curve = r#"Shape "curve" "point3 P" [ 0 0 0 1 0 0 2 0 0 3 0 1 ]"#;
+    assert_eq!(placed(&format!("{mesh} {curve}"), 1).instances.len(), 1);
+    let light = r#"AreaLightSource "diffuse""#;
+    let lit = load_with("", &format!(r#"ObjectBegin "o" {light} {mesh} ObjectEnd ObjectInstance "o""#)).unwrap();
+    assert_eq!((lit.scene.geometry.instances.len(), lit.scene.lights.lights.len()), (1, 1));
+    let turning = format!(r#"ObjectBegin "o" {mesh} ObjectEnd ActiveTransform EndTime {place} ObjectInstance "o""#);
+    assert_eq!(geometry(&turning).instances.len(), 1);
+    let nested = r#"ObjectBegin "a" ObjectInstance "o" ObjectEnd ObjectInstance "a" ObjectInstance "a""#;
+    assert_eq!(geometry(&format!(r#"ObjectBegin "o" {mesh} ObjectEnd {nested}"#)).instances.len(), 4);
+}
+
+#[test]
+fn shapes_that_move_together_are_one_instance() {
+    let moving = |motion: &str, places: [&str; 2]| {
+        let mesh = r#"Shape "trianglemesh" "point3 P" [ 0 0 0 1 0 0 0 1 0 ] "integer indices" [ 0 1 2 ]"#;
+        let shapes = places.map(|place| format!("AttributeBegin {motion} {place} {mesh} AttributeEnd")).join(" ");
+        load_with("Camera \"perspective\" \"float shutteropen\" 0.5", &shapes).unwrap().scene.geometry
+    };
+
+    // What only shifts is placed at the start
+    let shifted =
+        moving("ActiveTransform EndTime Translate 0 0 4 ActiveTransform All", ["Rotate 90 0 0 1", "Translate 0 0 0.1"]);
+    let [instance] = shifted.instances.as_slice() else { panic!("{:?}", shifted.instances) };
+    let shift = instance.world_from_group.iter().map(|m| m.translation.z);
+    assert_eq!(shift.collect::<Vec<_>>(), [2.0, 4.0]);
+    let corners = shifted.groups[0].geometries.iter().map(|&id| match &shifted.geometries[id as usize].shape {
+        Shape::Mesh(mesh) => (mesh.triangle(0)[1] * 10.0).round().to_array(),
+        other => panic!("{other:?}"),
+    });
+    assert_eq!(corners.collect::<Vec<_>>(), [[0.0, 10.0, 0.0], [10.0, 0.0, 1.0]]);
+
+    // Other motions are those of the shapes' own spaces: more samples for a larger angle
+    let turns = |degrees: u32, places| {
+        let turning = moving(&format!("ActiveTransform EndTime Rotate {degrees} 0 1 0 ActiveTransform All"), places);
+        turning.instances.iter().map(|instance| instance.world_from_group.len()).collect::<Vec<_>>()
+    };
+    assert_eq!(turns(10, ["Translate 1 0 0", "Translate 1 0 0"]), [2]);
+    assert_eq!(turns(90, ["Translate 1 0 0", "Translate 2 0 0"]), [9, 9]);
 }
 
 #[test]

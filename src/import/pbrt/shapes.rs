@@ -303,13 +303,23 @@ fn face_data<const N: usize>(p: &mut ParamSet, d: &mut Diagnostics) -> Option<Fa
 }
 
 impl ShapeDesc {
-    /// The transform from coordinates relative to `origin` to the group: the current transform, unless an instance
-    /// moves the shape.
+    /// True if it is the same where the instance of its object is. In objects, lights are dark, and media stay where they
+    /// are defined; the width of curves and the mesh of displaced surfaces depend on the space of the object.
+    pub fn can_leave_object(&self) -> bool {
+        let is_curve = matches!(self.source, ShapeSource::Curves(_));
+        !is_curve
+            && !self.ctm.is_moving()
+            && self.area_light.is_none()
+            && self.displacement.is_none()
+            && !self.media.differ()
+    }
+
+    /// The transform from coordinates relative to `origin` to the group: the current transform at the start, unless an
+    /// instance does more than shift the shape.
     fn placement(&self, origin: DVec3) -> Placement {
-        let is_moving = self.ctm.is_moving();
-        let m = if is_moving { DAffine3::IDENTITY } else { affine(&self.ctm.start) };
-        let is_still = self.object.is_none() && !is_moving;
-        let group_origin = if is_still { self.origin } else { near_origin(m.transform_point3(origin)) };
+        let m = if self.ctm.only_shifts() { affine(&self.ctm.start) } else { DAffine3::IDENTITY };
+        let is_in_world = self.object.is_none() && self.ctm.only_shifts();
+        let group_origin = if is_in_world { self.origin } else { near_origin(m.transform_point3(origin)) };
         // pbrt flips the orientation if the transform of the shape reflects, moving or not.
         let flip = self.reverse_orientation ^ swaps_handedness(&affine(&self.ctm.start).as_affine3a());
         Placement {

@@ -38,11 +38,11 @@ pub struct GraphicsState {
     /// Current material.
     pub material: MaterialUse,
     /// Current area light.
-    pub area_light: Option<AreaLightDesc>,
+    pub area_light: Option<Arc<AreaLightDesc>>,
     /// Colour space of `rgb` parameters.
     pub color_space: ColorSpace,
     /// Media on the sides of shapes; the camera is in the outside one.
-    pub media: MediumNames,
+    pub media: Arc<MediumNames>,
     /// Default parameters by `Attribute`.
     pub(super) defaults: Defaults,
 }
@@ -166,7 +166,7 @@ impl<'a> Builder<'a> {
                 material: MaterialUse::Id(default_material),
                 area_light: None,
                 color_space: ColorSpace::Srgb,
-                media: MediumNames::default(),
+                media: Arc::default(),
                 defaults: Defaults::default(),
             },
             stack: Vec::new(),
