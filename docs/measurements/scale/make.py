@@ -2,8 +2,8 @@
 """Writes large scenes into a folder, and measures what they take.
 
 make.py FOLDER              the scenes: 10 million triangles with and without normals and texture coordinates, ten
-                            instances of them, a million instances of 100 triangles, 2 million triangles as text and as
-                            lights
+                            instances of them, a million instances of 100 triangles, a million objects, moving shapes and
+                            moving instances, 2 million triangles as text and as lights
 make.py FOLDER LUMIRIS [SCENE [OPTION...]]...
                             then the peak that `lumiris info` predicts and what `lumiris render` takes, of these scenes and
                             of others, each as one argument: "scenes/demo/gallery.pbrt --resolution 960x540 --spp 16"
@@ -77,10 +77,30 @@ def write_scenes(folder):
                 f"AttributeBegin\nTranslate {x:.5f} {y:.5f} {z:.5f}\nRotate {angle:.1f} 0 0 1\nScale .002 .002 .002\n"
                 'ObjectInstance "m"\nAttributeEnd\n'
             )
+    write_small(folder)
     u, v, height, triangles = grid(1001)
     text = inline(np.stack([u - 0.5, v - 0.5, height], -1), triangles)
     (folder / "text.pbrt").write_text(HEAD + text)
     (folder / "lights.pbrt").write_text(f'{HEAD}AreaLightSource "diffuse" "rgb L" [1 1 1]\n{text}')
+
+
+def write_small(folder):
+    """A million tetrahedra: each an object of its own, a shape that shifts, or an instance that turns by 10 degrees."""
+    corners = "0 0 0  .002 0 0  0 .002 0  0 0 .002"
+    shape = f'Shape "trianglemesh" "integer indices" [ 0 1 2 0 1 3 1 2 3 2 0 3 ] "point3 P" [ {corners} ]\n'
+    moving = "ActiveTransform EndTime\n{}\nActiveTransform All\n"
+    kinds = {
+        "objects": ("", 'ObjectBegin "o{0}"\n' + shape + "ObjectEnd\n", "", 'ObjectInstance "o{0}"\n'),
+        "shifts": ("", "", moving.format("Translate .01 0 0"), shape),
+        "turns": (f'ObjectBegin "o"\n{shape}ObjectEnd\n', "", moving.format("Rotate 10 0 0 1"), 'ObjectInstance "o"\n'),
+    }
+    places = np.random.default_rng(3).uniform([-0.5, -0.5, 0], [0.5, 0.5, 0.1], (1_000_000, 3))
+    for name, (first, before, motion, what) in kinds.items():
+        with open(folder / f"{name}.pbrt", "w", encoding="ascii") as out:
+            out.write(HEAD + first)
+            for i, (x, y, z) in enumerate(places):
+                place = f"AttributeBegin\n{motion}Translate {x:.5f} {y:.5f} {z:.5f}\n"
+                out.write(f"{before.format(i)}{place}{what.format(i)}AttributeEnd\n")
 
 
 def inline(positions, triangles):
@@ -108,7 +128,7 @@ def main():
         write_scenes(folder)
     if len(sys.argv) < 3:
         return
-    scenes = [f"{folder}/{name}.pbrt" for name in ("bare", "full", "ten", "million", "text", "lights")]
+    scenes = [f"{folder}/{name}.pbrt" for name in ("bare", "full", "ten", "million", "objects", "shifts", "turns", "text", "lights")]
     print("| scene | geometry | Embree | predicted | peak | by | s |\n|---|---|---|---|---|---|---|")
     for row in [*scenes, *sys.argv[3:]]:
         scene, *options = row.split()
