@@ -5,7 +5,7 @@
 
 use lumiris::import::{LoadOptions, load};
 use lumiris::photons::{
-    GatherScratch, ImportanceSettings, Origin, Photon, PhotonBudget, PhotonMap, Place, Search, Tracing,
+    GatherPoint, GatherScratch, ImportanceSettings, Origin, Photon, PhotonBudget, PhotonMap, Search, Tracing,
     trace_importons, trace_photons,
 };
 use lumiris::scene::AccelKind;
@@ -41,7 +41,8 @@ fn maps() {
         let start = Instant::now();
         let map = PhotonMap::new(copy);
         let build = start.elapsed().as_secs_f64();
-        let places: Vec<Place> = (0..QUERIES).map(|i| &photons[i * 19]).map(|p| Place::flat(p.p(), p.n())).collect();
+        let places: Vec<GatherPoint> =
+            (0..QUERIES).map(|i| &photons[i * 19]).map(|p| GatherPoint::flat(p.p(), p.n())).collect();
         println!("10⁶ photons on {name}: built in {:.0} ms, {:.1} bytes each", build * 1e3, map.bytes() as f64 / 1e6);
 
         // Query

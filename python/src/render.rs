@@ -285,7 +285,7 @@ impl Request {
         // Render
         let mut settings = self.render_settings(&asked, &job);
         settings.time_limit = settings.time_limit.map(|limit| limit.saturating_sub(start.elapsed()));
-        let (mut film_file, told) = self.film_file(&asked, (&job, &files), &mut settings, stored)?;
+        let (mut film_file, told) = self.film_file(&asked, &job, &files, &mut settings, stored)?;
         let continuation = film_file.as_mut().map_or_else(Continuation::default, FilmFile::continuation);
         let rendering =
             observed((&job, &settings), (stop, latest), events, continuation).map_err(|error| other(&error))?;
@@ -323,7 +323,8 @@ impl Request {
     fn film_file(
         &self,
         asked: &Asked,
-        job: (&RenderJob, &SceneFiles),
+        job: &RenderJob,
+        files: &SceneFiles,
         settings: &mut RenderSettings,
         stored: Option<Stored>,
     ) -> Result<(Option<FilmFile>, Receiver<String>), Failure> {
@@ -338,7 +339,7 @@ impl Request {
         let storage = Storage { checkpoint: checkpoint.clone(), keeps_sums: file.is_some(), stored, plan: None };
         // Nobody receives after the rendering has ended: that is no error
         let warn = move |text: &str| drop(warn.send(text.to_owned()));
-        let film_file = FilmFile::new(asked, job, (settings, spp), storage, warn).map_err(Failure::Part)?;
+        let film_file = FilmFile::new(asked, job, files, settings, spp, storage, warn).map_err(Failure::Part)?;
         Ok((Some(film_file), told))
     }
 

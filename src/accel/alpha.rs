@@ -1,6 +1,6 @@
 //! Alpha masks: decides whether a hit on a geometry with an alpha texture stops a ray. Used by both ray tracers.
 
-use super::Hit;
+use super::ray_tracer::Hit;
 use crate::geometry::{AlphaSource, GeometrySet};
 use lumiris_numbers::math::Ray;
 use lumiris_numbers::math::hash::{hash_floats, pcg4d, unit_f32};

@@ -13,8 +13,10 @@
 
 use super::coat_table::{CoatTable, Hemispherical};
 use super::dielectric::Dielectric;
+use super::fresnel::to_upper;
 use super::kernel::{evaluate, of_drawn};
-use super::{BsdfSample, TrowbridgeReitz};
+use super::lobe::BsdfSample;
+use super::microfacet::TrowbridgeReitz;
 use lumiris_lanes::kernels::BsdfKernel;
 use lumiris_lanes::kernels::coated::{self, flip, rough_direction, rough_value};
 use lumiris_lanes::kernels::{Coated, Drawn, Kernel, SmoothCoated, lobe};
@@ -135,7 +137,7 @@ impl<'a> CoatedDiffuse<'a> {
         match self.kernel() {
             Some(Kernel::SmoothCoated) => evaluate::<SmoothCoated>(&p, &[], wo, wi),
             Some(_) => evaluate::<Coated>(&p, self.tables(), wo, wi),
-            None => super::to_upper(wo, wi).map_or((Rgb::BLACK, 0.0), |(wo, wi)| {
+            None => to_upper(wo, wi).map_or((Rgb::BLACK, 0.0), |(wo, wi)| {
                 let value = rough_value(&p, (wo.into(), wi.into()), self.directional(wo), self.directional(wi)[0]);
                 let value = value.kept(true);
                 (Rgb::from_array(value.f_cos), value.pdf)
@@ -150,7 +152,7 @@ impl<'a> CoatedDiffuse<'a> {
 
     /// Density of sampling the interface, including its probability, see [`super::Bsdf::pdf_first_lobe`].
     pub(super) fn pdf_first_lobe(&self, wo: Vec3, wi: Vec3) -> f32 {
-        let Some((wo, wi)) = super::to_upper(wo, wi) else { return 0.0 };
+        let Some((wo, wi)) = to_upper(wo, wi) else { return 0.0 };
         if self.interface.is_specular() {
             return 0.0;
         }

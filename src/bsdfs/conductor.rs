@@ -1,6 +1,7 @@
 //! Reflection by a metal, see [`kernels::conductor`].
 
-use super::{KernelBsdf, TrowbridgeReitz};
+use super::kernel::KernelBsdf;
+use super::microfacet::TrowbridgeReitz;
 use lumiris_lanes::kernels;
 use lumiris_numbers::math::Rgb;
 

@@ -25,8 +25,9 @@
 //!
 //! A Lambertian BSDF, which a pure cosine density would match, has a relative variance of 0.34 to 0.69.
 
-use super::fresnel::reflect;
-use super::{Lobe, TrowbridgeReitz};
+use super::fresnel::{reflect, to_upper};
+use super::lobe::Lobe;
+use super::microfacet::TrowbridgeReitz;
 use lumiris_numbers::math::{Vec3, warp};
 use strum::{EnumIter, EnumString, IntoStaticStr, VariantNames};
 
@@ -75,7 +76,7 @@ impl ProposalDensity {
 
     /// Density of the cosine lobe, including its probability, see [`super::Bsdf::pdf_first_lobe`].
     pub(super) fn pdf_first_lobe(self, wo: Vec3, wi: Vec3) -> f32 {
-        match (self, super::to_upper(wo, wi)) {
+        match (self, to_upper(wo, wi)) {
             (_, None) => 0.0,
             (ProposalDensity::Lobes, Some((_, wi))) => COSINE_WEIGHT * warp::pdf_cosine_hemisphere(wi),
             (ProposalDensity::Uniform, Some((_, wi))) => warp::pdf_uniform_hemisphere(wi),
@@ -85,7 +86,7 @@ impl ProposalDensity {
     /// Density of [`Self::sample`] per steradian.
     #[inline]
     pub fn pdf(self, wo: Vec3, wi: Vec3) -> f32 {
-        let Some((wo, wi)) = super::to_upper(wo, wi) else { return 0.0 };
+        let Some((wo, wi)) = to_upper(wo, wi) else { return 0.0 };
         match self {
             ProposalDensity::Lobes => pdf_lobes(wo, wi),
             ProposalDensity::Uniform => warp::pdf_uniform_hemisphere(wi),

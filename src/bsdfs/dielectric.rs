@@ -1,7 +1,8 @@
 //! Reflection and refraction at a dielectric interface, see [`kernels::dielectric`].
 
-use super::kernel::of_drawn;
-use super::{BsdfSample, KernelBsdf, TrowbridgeReitz};
+use super::kernel::{KernelBsdf, of_drawn};
+use super::lobe::BsdfSample;
+use super::microfacet::TrowbridgeReitz;
 use lumiris_lanes::kernels;
 use lumiris_lanes::kernels::dielectric::Interface;
 pub use lumiris_lanes::kernels::dielectric::{Select, Transport};

@@ -1,6 +1,6 @@
 //! Lambertian reflection, see [`kernels::diffuse`].
 
-use super::KernelBsdf;
+use super::kernel::KernelBsdf;
 use lumiris_lanes::kernels;
 use lumiris_numbers::math::Rgb;
 

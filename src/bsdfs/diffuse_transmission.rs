@@ -1,6 +1,6 @@
 //! Lambertian reflection and transmission, see [`kernels::diffuse_transmission`].
 
-use super::KernelBsdf;
+use super::kernel::KernelBsdf;
 use lumiris_lanes::kernels;
 use lumiris_numbers::math::Rgb;
 

@@ -3,7 +3,9 @@
 //! Sampling and density are those of [`ProposalDensity`] and exact, so that MIS with light sampling is possible. The
 //! density fits badly. [`super::resample()`] samples f |cos θi| itself in the limit of many proposals.
 
-use super::{BsdfSample, Model, ProposalDensity};
+use super::default_lobes::ProposalDensity;
+use super::lobe::BsdfSample;
+use super::models::Model;
 use lumiris_numbers::math::{Rgb, Vec3};
 
 /// A reflectance model with the density that proposes directions for it.

@@ -27,6 +27,19 @@ pub fn fr_conductor(cos_i: f32, eta: Rgb, k: Rgb) -> Rgb {
     Rgb::new(fr_complex(cos_i, eta.r, k.r), fr_complex(cos_i, eta.g, k.g), fr_complex(cos_i, eta.b, k.b))
 }
 
+/// Both directions mirrored to the upper hemisphere, by the symmetry of the surface; `None` if they are on different
+/// sides.
+#[inline]
+pub(super) fn to_upper(wo: Vec3, wi: Vec3) -> Option<(Vec3, Vec3)> {
+    if wo.z * wi.z <= 0.0 {
+        None
+    } else if wo.z < 0.0 {
+        Some((-wo, -wi))
+    } else {
+        Some((wo, wi))
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -12,7 +12,7 @@
 //! one side.
 
 use super::fresnel::fr_dielectric;
-use super::{BsdfSample, Lobe};
+use super::lobe::{BsdfSample, Lobe};
 use lumiris_numbers::math::{Rgb, Vec3, safe_sqrt, sqr};
 use std::f32::consts::{FRAC_1_PI, LN_2, PI, TAU};
 

@@ -1,6 +1,6 @@
 //! BSDFs whose formulas are kernels of `lumiris_lanes::kernels`, here for single directions.
 
-use super::{Bsdf, BsdfSample, Lobe};
+use super::lobe::{BsdfSample, Lobe};
 use lumiris_lanes::kernels::{BsdfKernel, Drawn, Value};
 pub use lumiris_lanes::kernels::{Kernel, MAX_PARAMS};
 use lumiris_numbers::math::{Rgb, Vec3};
@@ -68,49 +68,4 @@ pub(super) fn of_drawn(drawn: Drawn<f32>) -> Option<BsdfSample> {
     let f = without_cos(Rgb::from_array(drawn.f_cos), wi);
     let lobe = Lobe::of_flags(drawn.lobe as u8);
     (drawn.pdf > 0.0).then_some(BsdfSample { f, wi, pdf: drawn.pdf, lobe, eta: drawn.eta })
-}
-
-/// The parameters, followed by zeros.
-fn padded(params: &[f32]) -> [f32; MAX_PARAMS] {
-    let mut all = [0.0; MAX_PARAMS];
-    all[..params.len()].copy_from_slice(params);
-    all
-}
-
-impl Bsdf<'_> {
-    /// The [`Kernel::params`] parameters of its kernel.
-    pub fn params(&self) -> [f32; MAX_PARAMS] {
-        match self {
-            Bsdf::Diffuse(b) => padded(&b.params()),
-            Bsdf::DiffuseTransmission(b) => padded(&b.params()),
-            Bsdf::Conductor(b) => padded(&b.params()),
-            Bsdf::Dielectric(b) => padded(&b.params()),
-            Bsdf::Exit(b) => padded(&b.params()),
-            Bsdf::ThinDielectric(b) => padded(&b.params()),
-            Bsdf::CoatedDiffuse(b) => padded(&b.params()),
-            Bsdf::Principled(b) => padded(&b.params()),
-            Bsdf::Layered(_) | Bsdf::Hair(_) | Bsdf::Measured(_) | Bsdf::Evaluated(_) | Bsdf::Phase(_) => padded(&[]),
-        }
-    }
-
-    /// The kernel that evaluates it; `None` without one.
-    #[inline]
-    pub fn kernel(&self) -> Option<Kernel> {
-        match self {
-            Bsdf::Diffuse(_) => Some(Kernel::Diffuse),
-            Bsdf::DiffuseTransmission(_) => Some(Kernel::DiffuseTransmission),
-            Bsdf::Conductor(_) => Some(Kernel::Conductor),
-            Bsdf::Dielectric(_) => Some(Kernel::Dielectric),
-            Bsdf::Exit(_) => Some(Kernel::Exit),
-            Bsdf::ThinDielectric(_) => Some(Kernel::ThinDielectric),
-            Bsdf::CoatedDiffuse(b) => b.kernel(),
-            Bsdf::Principled(_) => Some(Kernel::Principled),
-            Bsdf::Layered(_) | Bsdf::Hair(_) | Bsdf::Measured(_) | Bsdf::Evaluated(_) | Bsdf::Phase(_) => None,
-        }
-    }
-
-    /// The tables of its kernel; the coats of a scene share them.
-    pub fn tables(&self) -> &[f32] {
-        if let Bsdf::CoatedDiffuse(b) = self { b.tables() } else { &[] }
-    }
 }

@@ -13,9 +13,13 @@
 //! grazing ones, where f is evaluated but not where it is sampled (pbrt-v4 issue 187 is a consequence). pbrt-v4 also
 //! omits the mirror reflections after the last scattering event if interface and base are both smooth.
 
+use super::conductor::Conductor;
 use super::dielectric::{Dielectric, Select, Transport};
-use super::fresnel::{fr_conductor, fr_dielectric, reflect};
-use super::{BsdfSample, Conductor, Diffuse, KernelBsdf as _, Lobe, TrowbridgeReitz};
+use super::diffuse::Diffuse;
+use super::fresnel::{fr_conductor, fr_dielectric, reflect, to_upper};
+use super::kernel::KernelBsdf as _;
+use super::lobe::{BsdfSample, Lobe};
+use super::microfacet::TrowbridgeReitz;
 use lumiris_numbers::estimators::mis::{Heuristic, Technique};
 use lumiris_numbers::math::hash::{HashStream, hash_floats};
 use lumiris_numbers::math::{Frame, Rgb, Vec3, safe_sqrt, sqr, warp};
@@ -113,7 +117,7 @@ impl Layered {
 
     /// Value without cosine (1/sr), without mirror reflection: the mean of `samples` walks.
     pub fn f(&self, wo: Vec3, wi: Vec3) -> Rgb {
-        let Some((wo, wi)) = super::to_upper(wo, wi) else { return Rgb::BLACK };
+        let Some((wo, wi)) = to_upper(wo, wi) else { return Rgb::BLACK };
         let mut stream = HashStream::new([hash_floats(&wo.to_array()), hash_floats(&wi.to_array()), 0x6c61_7965]);
         let mut sum = Rgb::BLACK;
         if self.has_non_specular() {
@@ -234,13 +238,13 @@ impl Layered {
 
     /// Density of these lobes, including their probabilities, see [`super::Bsdf::pdf_first_lobe`].
     pub(super) fn pdf_first_lobe(&self, wo: Vec3, wi: Vec3) -> f32 {
-        let Some((wo, wi)) = super::to_upper(wo, wi) else { return 0.0 };
+        let Some((wo, wi)) = to_upper(wo, wi) else { return 0.0 };
         self.pdf_upper(wo, wi, &Lobes { cosine: 0.0, ..self.lobes(wo) })
     }
 
     /// Density of the non-specular part of [`Self::sample`] per steradian.
     pub fn pdf(&self, wo: Vec3, wi: Vec3) -> f32 {
-        let Some((wo, wi)) = super::to_upper(wo, wi) else { return 0.0 };
+        let Some((wo, wi)) = to_upper(wo, wi) else { return 0.0 };
         self.pdf_upper(wo, wi, &self.lobes(wo))
     }
 

@@ -11,8 +11,8 @@
 //! sample of R and varies slowly with u. Samples draw u by the luminance of s. With p(u) and p(m) the densities over
 //! the square, the density of wi per steradian is p(u) p(m)/(2π² √(2θm/π) sin θm · 4 (wo·m)).
 
-use super::fresnel::reflect;
-use super::{BsdfSample, Lobe, to_upper};
+use super::fresnel::{reflect, to_upper};
+use super::lobe::{BsdfSample, Lobe};
 use lumiris_formats::bsdf_file::MeasuredBsdf;
 use lumiris_numbers::math::{BilinearTables, Blend, ParameterGrid, PiecewiseBilinear2D, Rgb, Vec2, Vec3};
 use std::f32::consts::{FRAC_PI_2, PI, TAU};

@@ -12,7 +12,7 @@
 //! All models conserve energy except Oren-Nayar. Its albedo at grazing angles is ρ (A + B/2), up to 1.5 % above ρ near
 //! σ = 11°, as in the source.
 
-use super::fresnel::fr_dielectric;
+use super::fresnel::{fr_dielectric, to_upper};
 use lumiris_numbers::math::{Rgb, Vec3, sqr};
 use std::f32::consts::{FRAC_1_PI, PI};
 
@@ -189,7 +189,7 @@ impl Model {
     /// Value without cosine (1/sr) on the side of `wo`; both sides of the surface are equal.
     #[inline]
     pub fn f(&self, wo: Vec3, wi: Vec3) -> Rgb {
-        let Some((wo, wi)) = super::to_upper(wo, wi) else { return Rgb::BLACK };
+        let Some((wo, wi)) = to_upper(wo, wi) else { return Rgb::BLACK };
         match self {
             Model::Diffuse(reflectance) => *reflectance * FRAC_1_PI,
             Model::OrenNayar(m) => m.f(wo, wi),

@@ -4,7 +4,7 @@
 //! point: unscattered light has cos θ = −1. p is a density over the sphere, so the weight of a sample is 1. There is no
 //! cosine: [`crate::materials::SurfaceBsdf::cos`] is 1.
 
-use super::{BsdfSample, Lobe};
+use super::lobe::{BsdfSample, Lobe};
 use lumiris_numbers::math::{Frame, Rgb, Vec3, safe_sqrt};
 use std::f32::consts::{PI, TAU};
 

@@ -1,8 +1,8 @@
 //! Metal, glossy diffuse or glass under a coat, see [`lumiris_lanes::kernels::principled`].
 
-use super::microfacet::SMOOTH_ALPHA;
+use super::kernel::KernelBsdf;
+use super::microfacet::{SMOOTH_ALPHA, TrowbridgeReitz};
 use super::sheen::Sheen;
-use super::{KernelBsdf, TrowbridgeReitz};
 use lumiris_lanes::kernels;
 use lumiris_lanes::kernels::principled::{Choice, PARAMS, Params};
 use lumiris_numbers::math::{Rgb, Vec3};

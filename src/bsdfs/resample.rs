@@ -11,7 +11,8 @@
 //! This works for any BSDF model. Specular lobes take part with probabilities in place of p, since f is relative to the
 //! same measure. So do stochastic values (layered BSDFs), where f is the value returned with the sample.
 
-use super::{Bsdf, Lobe};
+use super::bsdf::Bsdf;
+use super::lobe::Lobe;
 use lumiris_numbers::estimators::ris::Reservoir;
 use lumiris_numbers::math::{Rgb, Vec3};
 

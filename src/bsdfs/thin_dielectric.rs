@@ -1,6 +1,6 @@
 //! A thin dielectric sheet without refraction, see [`kernels::thin_dielectric`].
 
-use super::KernelBsdf;
+use super::kernel::KernelBsdf;
 use lumiris_lanes::kernels;
 
 /// Thin sheet: mirror reflection and straight transmission.

@@ -1,6 +1,6 @@
 //! Camera matrices for compositing programs: the standard attributes of OpenEXR.
 
-use super::Camera;
+use super::camera::Camera;
 use lumiris_numbers::math::{Mat4, Vec4};
 
 impl Camera {

@@ -1,7 +1,7 @@
 //! T1 by BSDF sampling, one sample at a time: a direction, and the emitter in that direction.
 
 use super::candidates::{Candidate, Drawn, SampleAllocation};
-use super::point::ShadingPoint;
+use super::point::{LightPoint, ShadingPoint};
 use crate::accel::Hit;
 use crate::lights::{LightCtx, LightHit, LightId};
 use crate::scene::{EmitterHit, RenderJob};
@@ -22,7 +22,8 @@ pub(super) struct PendingBsdf {
 
 /// Draws a BSDF sample without its emitter; `None` if its value is zero.
 pub(super) fn draw(
-    (index, point): (u32, &ShadingPoint<'_>),
+    index: u32,
+    point: &ShadingPoint<'_>,
     allocation: SampleAllocation,
     [uc, u0, u1]: [f32; 3],
     lobe: usize,
@@ -38,10 +39,11 @@ pub(super) fn bsdf_candidate(
     job: &RenderJob,
     point: &ShadingPoint<'_>,
     pending: &PendingBsdf,
-    (hit, found): (Option<&EmitterHit>, Option<EmitterInDirection>),
+    hit: Option<&EmitterHit>,
+    emitter: Option<EmitterInDirection>,
 ) -> Option<Candidate> {
     let lights = &job.lights;
-    let found = found?;
+    let emitter = emitter?;
     let light = match hit {
         Some(hit) => hit.light,
         None => {
@@ -50,21 +52,21 @@ pub(super) fn bsdf_candidate(
             lights.infinite.iter().find(has_group).or(lights.infinite.first()).copied()
         }
     };
-    let f = pending.f_cos * found.li;
+    let f = pending.f_cos * emitter.li;
     let light = light.filter(|_| !f.is_black())?;
     Some(Candidate {
         point: pending.point,
         drawn: if pending.specular { Drawn::DeltaBsdf } else { Drawn::Bsdf },
         f,
-        li: found.li,
+        li: emitter.li,
         light,
-        p_light: if pending.specular { 0.0 } else { found.p_light },
+        p_light: if pending.specular { 0.0 } else { emitter.p_light },
         p_bsdf: pending.pdf,
         n_light: pending.allocation.n_light,
         n_bsdf: pending.allocation.n_bsdf,
         p_lobe: 0.0,
         group: lights.groups.group_of(light).unwrap_or(0) as u8,
-        segment: point.segment(pending.wi, found.end),
+        segment: point.segment(pending.wi, emitter.end),
     })
 }
 
@@ -75,8 +77,8 @@ pub(super) struct EmitterInDirection {
     pub(super) li: Rgb,
     /// Density of light sampling (1/sr).
     pub(super) p_light: f32,
-    /// Point on the light, bound of its rounding error, and normal; `None` for infinite lights.
-    pub(super) end: Option<(Vec3, Vec3, Vec3)>,
+    /// Point on the light; `None` for infinite lights.
+    pub(super) end: Option<LightPoint>,
 }
 
 /// The emitters of pending samples, whose rays have the emitter hits `hits`; `None` if an emitter is dark. `pmf` is the
@@ -84,7 +86,8 @@ pub(super) struct EmitterInDirection {
 pub(super) fn find_emitters(
     job: &RenderJob,
     points: &[ShadingPoint<'_>],
-    (pending, hits): (&[PendingBsdf], &[Option<EmitterHit>]),
+    pending: &[PendingBsdf],
+    hits: &[Option<EmitterHit>],
     pmf: impl Fn(u32, &LightCtx, LightId) -> f32,
     far: &mut Vec<u32>,
     out: &mut Vec<Option<EmitterInDirection>>,
@@ -131,6 +134,10 @@ pub(super) fn emitter_at(
     (!li.is_black()).then(|| {
         let pdf = lights.lights[light as usize].pdf_li(ctx, wi, &light_hit);
         let p_light = if pdf > 0.0 { pdf * pmf(ctx, light) } else { 0.0 };
-        EmitterInDirection { li, p_light, end: Some((surface.p, surface.p_error, surface.n)) }
+        EmitterInDirection {
+            li,
+            p_light,
+            end: Some(LightPoint { p: surface.p, p_error: surface.p_error, n: surface.n }),
+        }
     })
 }

@@ -31,12 +31,12 @@ impl Components {
     pub(super) fn propose(
         &mut self,
         t1: &mut T1<'_>,
-        draw: impl Fn(&RenderJob, (u32, &ShadingPoint<'_>), &SampleAllocation, &mut Vec<Candidate>) -> Mixture,
+        draw: impl Fn(&RenderJob, u32, &ShadingPoint<'_>, &SampleAllocation, &mut Vec<Candidate>) -> Mixture,
         allocate: impl Fn(&ShadingPoint<'_>) -> SampleAllocation,
     ) {
         self.mixtures.clear();
-        t1.draw_lights(&allocate, |job, at, allocation, records| {
-            self.mixtures.push(draw(job, at, allocation, records));
+        t1.draw_lights(&allocate, |job, index, point, allocation, records| {
+            self.mixtures.push(draw(job, index, point, allocation, records));
             allocation.light_draws
         });
         t1.draw_bsdf(allocate, &mut self.mixtures, choice_by_sampler(t1.job));

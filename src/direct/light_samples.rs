@@ -9,7 +9,8 @@ use crate::scene::RenderJob;
 /// Draws the light samples of a point, with lights chosen by the light sampler. Returns the number of samples.
 pub(super) fn draw(
     job: &RenderJob,
-    (index, point): (u32, &ShadingPoint<'_>),
+    index: u32,
+    point: &ShadingPoint<'_>,
     allocation: &SampleAllocation,
     records: &mut Vec<Candidate>,
 ) -> u32 {
@@ -17,46 +18,47 @@ pub(super) fn draw(
     for i in 0..n {
         let [u_choice, u0, u1] = point.stream.split(domain::LIGHT, n, i).draw::<3>();
         let drawn = job.lights.sample(&point.light_ctx(), u_choice, [u0, u1]);
-        records.extend(drawn.and_then(|drawn| light_candidate(job, (index, point), allocation, drawn)));
+        records.extend(drawn.and_then(|(light, sample)| light_candidate(job, index, point, allocation, light, sample)));
     }
     n
 }
 
 /// A light sample. If the light is infinite, the radiance is the sum of all infinite lights, and the density the sum of
 /// their densities.
-pub(super) fn with_infinite(
-    job: &RenderJob,
-    ctx: &LightCtx,
-    (light, mut sample): (LightId, LightSample),
-) -> (LightId, LightSample) {
+pub(super) fn with_infinite(job: &RenderJob, ctx: &LightCtx, light: LightId, mut sample: LightSample) -> LightSample {
     let lights = &job.lights;
     if lights.infinite.len() > 1 && lights.infinite.contains(&light) {
         (sample.li, sample.pdf) = lights.infinite_in_direction(ctx, sample.wi);
     }
-    (light, sample)
+    sample
 }
 
 /// The candidate of a light sample, whose density includes the choice of the light; `None` if its integrand is zero.
 pub(super) fn light_candidate(
     job: &RenderJob,
-    (index, point): (u32, &ShadingPoint<'_>),
+    index: u32,
+    point: &ShadingPoint<'_>,
     allocation: &SampleAllocation,
-    drawn: (LightId, LightSample),
+    light: LightId,
+    sample: LightSample,
 ) -> Option<Candidate> {
     // Nearby, no other technique would sample the emission of media: it is left to the next segment of the path
-    if job.lights.medium_of(drawn.0).is_some() {
+    if job.lights.medium_of(light).is_some() {
         return None;
     }
     // Infinite lights overlap: all of them contribute to a direction
-    unshadowed_candidate((index, point), allocation, with_infinite(job, &point.light_ctx(), drawn))
+    let sample = with_infinite(job, &point.light_ctx(), light, sample);
+    unshadowed_candidate(index, point, allocation, light, sample)
 }
 
 /// The candidate of a light sample without other infinite lights. Its density includes the choice of the light. `None`
 /// if its integrand is zero.
 pub(super) fn unshadowed_candidate(
-    (index, point): (u32, &ShadingPoint<'_>),
+    index: u32,
+    point: &ShadingPoint<'_>,
     allocation: &SampleAllocation,
-    (light, sample): (LightId, LightSample),
+    light: LightId,
+    sample: LightSample,
 ) -> Option<Candidate> {
     // Unshadowed integrand
     let f_cos = point.bsdf.f(point.wo, sample.wi) * point.bsdf.cos(sample.wi);

@@ -86,14 +86,15 @@ impl Mixture {
     fn candidate(
         &mut self,
         job: &RenderJob,
-        at: (u32, &ShadingPoint<'_>),
+        index: u32,
+        point: &ShadingPoint<'_>,
         allocation: &SampleAllocation,
         group: usize,
         drawn: Option<(LightId, LightSample)>,
     ) -> Option<Candidate> {
         let candidate = drawn.and_then(|(light, sample)| {
-            let c = light_candidate(job, at, allocation, (light, sample))?;
-            Some(Candidate { group: group as u8, p_lobe: self.p_lobe(at.1, sample.wi, c.p_bsdf), ..c })
+            let c = light_candidate(job, index, point, allocation, light, sample)?;
+            Some(Candidate { group: group as u8, p_lobe: self.p_lobe(point, sample.wi, c.p_bsdf), ..c })
         });
         if candidate.is_none() {
             self.zero_valued[self.component(group)] += 1;
@@ -131,7 +132,8 @@ impl Mixture {
 /// the point.
 pub(super) fn draw_together(
     job: &RenderJob,
-    (index, point): (u32, &ShadingPoint<'_>),
+    index: u32,
+    point: &ShadingPoint<'_>,
     allocation: &SampleAllocation,
     records: &mut Vec<Candidate>,
 ) -> Mixture {
@@ -151,7 +153,7 @@ pub(super) fn draw_together(
             continue;
         };
         let drawn = lights.sample_choice(&ctx, choice, [u0, u1]);
-        records.extend(mixture.candidate(job, (index, point), allocation, group, drawn));
+        records.extend(mixture.candidate(job, index, point, allocation, group, drawn));
     }
     mixture
 }
@@ -160,7 +162,8 @@ pub(super) fn draw_together(
 /// one random number for all groups. Returns the mixture at the point.
 pub(super) fn draw_groups(
     job: &RenderJob,
-    (index, point): (u32, &ShadingPoint<'_>),
+    index: u32,
+    point: &ShadingPoint<'_>,
     allocation: &SampleAllocation,
     records: &mut Vec<Candidate>,
 ) -> Mixture {
@@ -183,7 +186,7 @@ pub(super) fn draw_groups(
             let stream = point.stream.split(domain::GROUP + group as u32, count, i);
             let [u0, u1, u_choice] = stream.draw::<3>();
             let drawn = lights.sample_group(&ctx, (group, pmf), u_choice, [u0, u1]);
-            records.extend(mixture.candidate(job, (index, point), allocation, group, drawn));
+            records.extend(mixture.candidate(job, index, point, allocation, group, drawn));
         }
         first = end;
     }

@@ -8,6 +8,15 @@ use lumiris_numbers::math::ray::{SEGMENT_END, offset_origin};
 use lumiris_numbers::math::{Ray, Vec3};
 use lumiris_numbers::samplers::SampleStream;
 
+/// A point on a light.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct LightPoint {
+    pub(super) p: Vec3,
+    /// Bound of its rounding error.
+    pub(super) p_error: Vec3,
+    pub(super) n: Vec3,
+}
+
 /// A point at which direct light is estimated.
 #[derive(Clone, Copy, Debug)]
 pub struct ShadingPoint<'a> {
@@ -80,12 +89,12 @@ impl ShadingPoint<'_> {
         Ray { o: self.origin(w), d: w, t_max: f32::INFINITY, time: self.time }
     }
 
-    /// The segment to a point on a light `(p, p_error, n)`, or to infinity.
-    pub(super) fn segment(&self, wi: Vec3, end: Option<(Vec3, Vec3, Vec3)>) -> Ray {
+    /// The segment to a point on a light, or to infinity.
+    pub(super) fn segment(&self, wi: Vec3, end: Option<LightPoint>) -> Ray {
         let ray = self.ray(wi);
         match end {
             None => ray,
-            Some((p, p_error, n)) => {
+            Some(LightPoint { p, p_error, n }) => {
                 let end = offset_origin(p, p_error, n, ray.o - p);
                 Ray { d: end - ray.o, t_max: SEGMENT_END, ..ray }
             }
@@ -94,7 +103,7 @@ impl ShadingPoint<'_> {
 
     /// The segment to a point on a light, or to infinity.
     pub(super) fn light_segment(&self, sample: &LightSample) -> Ray {
-        let end = sample.t.is_finite().then_some((sample.p, sample.p_error, sample.n));
-        self.segment(sample.wi, end)
+        let end = LightPoint { p: sample.p, p_error: sample.p_error, n: sample.n };
+        self.segment(sample.wi, sample.t.is_finite().then_some(end))
     }
 }

@@ -18,7 +18,7 @@ use lumiris_lanes::columns::{Column, Columns3, padded};
 use lumiris_lanes::lane::LANES;
 use lumiris_lanes::{combine, curve};
 use lumiris_numbers::estimators::mis::Heuristic;
-use lumiris_numbers::estimators::ris::control::{Known, doubt};
+use lumiris_numbers::estimators::ris::control::{ControlSum, doubt};
 use lumiris_numbers::estimators::ris::weight;
 use lumiris_numbers::math::Rgb;
 use lumiris_numbers::math::hash::pcg4d;
@@ -99,18 +99,18 @@ impl ProposalColumns {
     }
 
     /// Σ c·V̂ over the proposals of a point; `bsdf_samples` are its BSDF samples.
-    pub fn known(&self, range: PointProposals, bsdf_samples: &[Candidate]) -> Known {
+    pub fn control(&self, range: PointProposals, bsdf_samples: &[Candidate]) -> ControlSum {
         let PointProposals { start, bsdf_start, end } = range;
-        let mut known = Known::default();
+        let mut control = ControlSum::default();
         // A proposal without weight is never drawn, and has no part in either sum
         for i in (start..bsdf_start).filter(|&i| self.weight[i] > 0.0) {
             let f_cos = self.f_cos.each_ref().map(|a| a[i]);
-            known.propose(Rgb::from_array(f_cos) * self.samples.li.rgb(i) * self.r[i], self.visibility[i]);
+            control.propose(Rgb::from_array(f_cos) * self.samples.li.rgb(i) * self.r[i], self.visibility[i]);
         }
         for (i, c) in (bsdf_start..end).zip(bsdf_samples).filter(|(i, _)| self.weight[*i] > 0.0) {
-            known.propose(c.f * self.r[i], self.visibility[i]);
+            control.propose(c.f * self.r[i], self.visibility[i]);
         }
-        known
+        control
     }
 
     /// Reserves memory for `len` proposals, keeping existing ones.
@@ -231,30 +231,16 @@ impl ProposalColumns {
         start: usize,
         end: usize,
     ) {
-        // Failed samples keep a direction that can be evaluated
-        let LightSamples { wi, li, pdf, is_delta, .. } = &self.samples;
-        let [wi, li] = [wi, li].map(|c| c.get(end).map(|c| &c[start..]));
-        let f_cos = self.f_cos.each_mut().map(|a| &mut a[start..end]);
-        match techniques.target {
-            Target::Fgl | Target::Visibility | Target::VisibilityControl => {
-                point.bsdf.eval_lanes(point.wo, wi, f_cos, &mut self.p_bsdf[start..end])
-            }
-            Target::Gv | Target::Gvl => {
-                for i in start..end {
-                    let wi = self.samples.wi.vec3(i);
-                    self.p_bsdf[i] = point.bsdf.pdf(point.wo, wi);
-                    self.f_cos.iter_mut().for_each(|a| a[i] = point.bsdf.cos(wi));
-                }
-            }
-        }
+        self.evaluate_bsdf(point, techniques.target, start, end);
 
         // Weights, by targets without visibility
+        let LightSamples { li, pdf, is_delta, .. } = &self.samples;
         for (p_bsdf, is_delta) in self.p_bsdf[start..end].iter_mut().zip(&is_delta[start..end]) {
             *p_bsdf = if *is_delta { 0.0 } else { *p_bsdf };
         }
         let proposals = combine::Proposals {
             f_cos: self.f_cos.each_ref().map(|a| &a[start..end]),
-            li,
+            li: li.get(end).map(|c| &c[start..]),
             p: &pdf[start..end],
             p_other: &self.p_bsdf[start..end],
             m: techniques.n_light,
@@ -267,9 +253,31 @@ impl ProposalColumns {
             w: &mut self.weight[start..end],
         };
         combine::combine(lumiris_lanes::level(), &proposals, &mut out);
+        self.adapt_weights(job, point, techniques.target, start, end);
+    }
 
-        // Adapt them to the target
-        match techniques.target {
+    /// Computes values and densities of the BSDF for light samples; targets without the BSDF use its cosine only.
+    fn evaluate_bsdf(&mut self, point: &ShadingPoint<'_>, target: Target, start: usize, end: usize) {
+        // Failed samples keep a direction that can be evaluated
+        let wi = self.samples.wi.get(end).map(|c| &c[start..]);
+        let f_cos = self.f_cos.each_mut().map(|a| &mut a[start..end]);
+        match target {
+            Target::Fgl | Target::Visibility | Target::VisibilityControl => {
+                point.bsdf.eval_lanes(point.wo, wi, f_cos, &mut self.p_bsdf[start..end])
+            }
+            Target::Gv | Target::Gvl => {
+                for i in start..end {
+                    let wi = self.samples.wi.vec3(i);
+                    self.p_bsdf[i] = point.bsdf.pdf(point.wo, wi);
+                    self.f_cos.iter_mut().for_each(|a| a[i] = point.bsdf.cos(wi));
+                }
+            }
+        }
+    }
+
+    /// Adapts the weights of light samples to the target.
+    fn adapt_weights(&mut self, job: &RenderJob, point: &ShadingPoint<'_>, target: Target, start: usize, end: usize) {
+        match target {
             Target::Fgl | Target::Gvl => {}
             Target::Gv => {
                 for i in start..end {
@@ -285,7 +293,7 @@ impl ProposalColumns {
                     let light = self.chosen[i].0;
                     if of.0 != light {
                         let v = job.lights.visibility(&ctx, &contributing, light);
-                        of = (light, v, factor(techniques.target, v));
+                        of = (light, v, factor(target, v));
                     }
                     self.visibility[i] = of.1;
                     self.p_hat[i] *= of.2;

@@ -38,7 +38,7 @@ impl Segments {
     }
 
     /// Adds a segment from a point to a light, with its unshadowed contribution.
-    pub fn push(&mut self, segment: &Ray, (point, light): (u32, LightId), contribution: Rgb) {
+    pub fn push(&mut self, segment: &Ray, point: u32, light: LightId, contribution: Rgb) {
         self.rays.push(segment);
         self.contributions.push(contribution);
         self.points.push(point);
@@ -51,7 +51,7 @@ impl Segments {
         self.clear();
         for (candidate, &contribution) in candidates.records.iter().zip(&candidates.contributions) {
             if is_traced(&contribution) {
-                self.push(&candidate.segment, (candidate.point, candidate.light), contribution);
+                self.push(&candidate.segment, candidate.point, candidate.light, contribution);
             }
         }
     }

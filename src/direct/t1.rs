@@ -26,7 +26,7 @@ pub(super) struct BsdfBuffers {
     hits: EmitterScratch,
     emitter_hits: Vec<Option<EmitterHit>>,
     far: Vec<u32>,
-    found: Vec<Option<EmitterInDirection>>,
+    emitters: Vec<Option<EmitterInDirection>>,
 }
 
 /// The probability with which the light sampler chooses a light.
@@ -39,7 +39,7 @@ impl T1<'_> {
     pub(super) fn propose(
         &mut self,
         allocate: impl Fn(&ShadingPoint<'_>) -> SampleAllocation,
-        draw: impl FnMut(&RenderJob, (u32, &ShadingPoint<'_>), &SampleAllocation, &mut Vec<Candidate>) -> u32,
+        draw: impl FnMut(&RenderJob, u32, &ShadingPoint<'_>, &SampleAllocation, &mut Vec<Candidate>) -> u32,
     ) {
         self.draw_lights(&allocate, draw);
         self.draw_bsdf(allocate, &mut [], choice_by_sampler(self.job));
@@ -50,13 +50,13 @@ impl T1<'_> {
     pub(super) fn draw_lights(
         &mut self,
         allocate: impl Fn(&ShadingPoint<'_>) -> SampleAllocation,
-        mut draw: impl FnMut(&RenderJob, (u32, &ShadingPoint<'_>), &SampleAllocation, &mut Vec<Candidate>) -> u32,
+        mut draw: impl FnMut(&RenderJob, u32, &ShadingPoint<'_>, &SampleAllocation, &mut Vec<Candidate>) -> u32,
     ) {
         let Candidates { records, stats, .. } = &mut *self.candidates;
         let start = Instant::now();
         for (index, point) in (0..).zip(self.points) {
             let allocation = allocate(point);
-            let drawn = draw(self.job, (index, point), &allocation, records);
+            let drawn = draw(self.job, index, point, &allocation, records);
             stats.proposals += u64::from(drawn + allocation.bsdf_draws);
             stats.light_proposals += u64::from(drawn);
         }
@@ -73,7 +73,7 @@ impl T1<'_> {
         pmf: impl Fn(u32, &LightCtx, LightId) -> f32,
     ) {
         // Directions
-        let BsdfBuffers { pending, rays, hits, emitter_hits, far, found } = &mut *self.bsdf;
+        let BsdfBuffers { pending, rays, hits, emitter_hits, far, emitters } = &mut *self.bsdf;
         pending.clear();
         rays.clear();
         for (index, point) in self.points.iter().enumerate() {
@@ -82,7 +82,7 @@ impl T1<'_> {
             for i in 0..allocation.bsdf_draws {
                 let u = point.stream.split(domain::BSDF, allocation.bsdf_draws, i).draw::<3>();
                 let lobe = mixture.as_ref().map_or(0, |mixture| mixture.lobe(u[0]));
-                if let Some(sample) = bsdf_samples::draw((index as u32, point), allocation, u, lobe) {
+                if let Some(sample) = bsdf_samples::draw(index as u32, point, allocation, u, lobe) {
                     rays.push(&point.ray(sample.wi));
                     pending.push(sample);
                 } else if let Some(mixture) = &mut mixture {
@@ -94,10 +94,10 @@ impl T1<'_> {
         // Emitters in these directions
         self.candidates.stats.emitter_rays += rays.len() as u64;
         self.job.world.intersect_emitters(rays, hits, emitter_hits);
-        find_emitters(self.job, self.points, (pending, emitter_hits), pmf, far, found);
-        for ((pending, hit), found) in pending.iter().zip(emitter_hits).zip(found) {
+        find_emitters(self.job, self.points, pending, emitter_hits, pmf, far, emitters);
+        for ((pending, hit), emitter) in pending.iter().zip(emitter_hits).zip(emitters) {
             let point = &self.points[pending.point as usize];
-            let mut candidate = bsdf_candidate(self.job, point, pending, (hit.as_ref(), *found));
+            let mut candidate = bsdf_candidate(self.job, point, pending, hit.as_ref(), *emitter);
             if let Some(mixture) = mixtures.get_mut(pending.point as usize) {
                 match &mut candidate {
                     Some(c) if pending.specular => c.p_lobe = if pending.lobe == 0 { c.p_bsdf } else { 0.0 },

@@ -128,7 +128,7 @@ impl Crossed {
                 return false;
             }
             Some(hit) => {
-                let interaction = SurfaceInteraction::new(job, &self.ray, (0.0, 0.0), hit);
+                let interaction = SurfaceInteraction::new(job, &self.ray, 0.0, 0.0, hit);
                 if interaction.scatter(job).is_some() {
                     self.transmittance = Rgb::BLACK;
                     return false;

@@ -1,8 +1,8 @@
 //! Exact sums over the samples of a pixel. They do not depend, bit for bit, on the order of the samples and their
-//! division over passes, processes and machines. [`super::PixelSums`] has their values as floating-point numbers.
+//! division over passes, processes and machines. [`PixelSums`] has their values as floating-point numbers.
 
 use super::exact::{FixedSum, LIMIT, SquareSum, UnitSum};
-use super::{PixelSample, PixelSums};
+use super::pixel::{PixelSample, PixelSums};
 use lumiris_lanes::level;
 use lumiris_lanes::sums::{self, Sums, TERM, Term};
 use lumiris_numbers::math::Rgb;

@@ -6,6 +6,7 @@
 
 use super::accumulator::{PixelAccumulator, RadianceAccumulator};
 use super::exact::{FixedSum, SquareSum, UnitSum};
+use super::layers::LightSums;
 use super::replicas::ReplicaAccumulator;
 
 /// Appends numbers to a byte vector.
@@ -76,6 +77,15 @@ impl Encoder {
         self.count(sums.records);
     }
 
+    /// The pixels of a layer that have light, in order.
+    pub fn light(&mut self, pixels: &[(u32, LightSums)]) {
+        self.count(pixels.len() as u32);
+        for (pixel, sums) in pixels {
+            self.count(*pixel);
+            sums.iter().for_each(|sum| self.fixed(sum));
+        }
+    }
+
     /// The sums of a replica.
     pub fn replica(&mut self, replica: &ReplicaAccumulator) {
         self.count(replica.pixel);
@@ -136,6 +146,15 @@ impl<'a> Decoder<'a> {
     pub fn fixed(&mut self) -> Option<FixedSum> {
         let doubled = u128::from_le_bytes(self.number()?);
         Some(FixedSum::from_bits((doubled >> 1) as i128 ^ -((doubled & 1) as i128)))
+    }
+
+    /// The pixels of a layer that have light, in order; a tile has `area` pixels.
+    pub fn light(&mut self, area: usize) -> Option<Vec<(u32, LightSums)>> {
+        let count = self.count().filter(|&count| count as usize <= area)?;
+        let mut pixel = || Some((self.count()?, [self.fixed()?, self.fixed()?, self.fixed()?]));
+        let pixels = (0..count).map(|_| pixel()).collect::<Option<Vec<_>>>()?;
+        let is_in_order = pixels.windows(2).all(|pair| pair[0].0 < pair[1].0);
+        (is_in_order && pixels.last().is_none_or(|(last, _)| (*last as usize) < area)).then_some(pixels)
     }
 
     fn unit(&mut self) -> Option<UnitSum> {

@@ -3,7 +3,8 @@
 //! The noise of a block of [`BLOCK`] × [`BLOCK`] pixels is σ/(|m| + 0.01), where m is the mean luminance of its pixels,
 //! and σ² the mean of their variances.
 
-use super::{PixelBounds, PixelSums};
+use super::pixel::PixelSums;
+use super::pixel_bounds::PixelBounds;
 use crate::imaging::metrics::difference::DEFAULT_EPSILON;
 use lumiris_numbers::math::luminance;
 

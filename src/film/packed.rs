@@ -12,7 +12,7 @@ use super::exact::{FixedSum, SquareSum, UnitSum};
 use std::ops::Range;
 
 /// Padding after the last column (bytes), since values are read eight or sixteen bytes at a time.
-const PADDING: usize = 16;
+pub(super) const PADDING: usize = 16;
 /// Granularity of allocations (bytes), so that data can grow a little in place.
 const GRANULE: usize = 256;
 /// Maximum number of binary digits of squares without common zeros. Larger squares are stored in full.
@@ -81,7 +81,7 @@ impl PackedSums {
 }
 
 /// Replaces stored bytes, without much excess capacity.
-fn replace(bytes: &mut Vec<u8>, new: &[u8]) {
+pub(super) fn replace(bytes: &mut Vec<u8>, new: &[u8]) {
     if bytes.capacity() < new.len() || bytes.capacity() > new.len() + 2 * GRANULE {
         // Free the old memory first, so that it can be reused
         *bytes = Vec::new();
@@ -184,7 +184,7 @@ fn unpack(reader: &mut Reader<'_>, out: &mut [PixelAccumulator]) {
 macro_rules! packer {
     ($name:ident, $number:ty, $unsigned:ty) => {
         #[inline(always)]
-        fn $name<T>(sums: &[T], value: impl Fn(&T) -> $number, out: &mut Vec<u8>) {
+        pub(super) fn $name<T>(sums: &[T], value: impl Fn(&T) -> $number, out: &mut Vec<u8>) {
             let (mut least, mut greatest, mut digits) = (<$number>::MAX, <$number>::MIN, 0);
             for v in sums.iter().map(&value) {
                 (least, greatest, digits) = (least.min(v), greatest.max(v), digits | v);
@@ -277,13 +277,13 @@ fn bytes_of(v: u128) -> usize {
 }
 
 /// Reads consecutive columns.
-struct Reader<'a> {
-    bytes: &'a [u8],
+pub(super) struct Reader<'a> {
+    pub(super) bytes: &'a [u8],
     /// Number of values of a column.
-    len: usize,
+    pub(super) len: usize,
     /// Range of values to read.
-    pixels: Range<usize>,
-    at: usize,
+    pub(super) pixels: Range<usize>,
+    pub(super) at: usize,
 }
 
 impl Reader<'_> {
@@ -318,7 +318,7 @@ impl Reader<'_> {
 
     /// Passes the values of a column of 128-bit numbers to `set`.
     #[inline(always)]
-    fn column(&mut self, mut set: impl FnMut(usize, i128)) {
+    pub(super) fn column(&mut self, mut set: impl FnMut(usize, i128)) {
         let (zeros, width, least, start) = self.head();
         let count = self.pixels.len();
         let value = |rest: u128| least.wrapping_add((rest << zeros) as i128);

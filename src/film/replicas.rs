@@ -8,10 +8,10 @@
 //! a random sign in the mean of the replica, which stands for the difference ([`PixelSample::offset`]), and no sign in
 //! the spread of its samples.
 
-use super::PixelSample;
 use super::accumulator::RadianceAccumulator;
 use super::exact::{LIMIT, SquareSum};
-use super::{PixelBounds, PixelSums};
+use super::pixel::{PixelSample, PixelSums};
+use super::pixel_bounds::PixelBounds;
 use lumiris_numbers::math::hash::pcg4d;
 
 /// With fewer replicas, the squares are smaller than 8 × 8 pixels. Images with fewer than four times this number of
@@ -37,8 +37,8 @@ impl ReplicaChoice {
     pub fn of_tile(&self, image: &PixelBounds, tile: &PixelBounds) -> Vec<ReplicaAccumulator> {
         let square = ((image.area() as f64 / WANTED).sqrt() as u32).clamp(1, MAX_SQUARE);
         let is_chosen = |i: &u32| {
-            let x = (tile.x0 + i % tile.width() - image.x0) / self.edge;
-            let y = (tile.y0 + i / tile.width() - image.y0) / self.edge;
+            let [x, y] = tile.pixel_at(*i);
+            let [x, y] = [(x - image.x0) / self.edge, (y - image.y0) / self.edge];
             let [dx, dy, ..] = pcg4d([x / square, y / square, CHOICE, self.seed]);
             [x % square, y % square] == [dx % square, dy % square]
         };
@@ -113,8 +113,7 @@ mod tests {
     const IMAGE: PixelBounds = PixelBounds { x0: 10, x1: 810, y0: 7, y1: 607 };
 
     fn positions(image: &PixelBounds, tile: &PixelBounds, choice: ReplicaChoice) -> Vec<[u32; 2]> {
-        let position = |r: ReplicaAccumulator| [tile.x0 + r.pixel % tile.width(), tile.y0 + r.pixel / tile.width()];
-        choice.of_tile(image, tile).into_iter().map(position).collect()
+        choice.of_tile(image, tile).into_iter().map(|r| tile.pixel_at(r.pixel)).collect()
     }
 
     #[test]

@@ -15,85 +15,19 @@
 //! over 3 × 3 pixels to reduce noise. A set is split at the middle of its longest dimension as long as both parts have
 //! enough replicas.
 
-use super::{Film, PixelSums};
+use super::pixel::PixelSums;
+use super::tiles::Film;
+use super::variance_scale::{Position, ReplicaVariance, VarianceScale};
 use rayon::prelude::*;
 use std::ops::Range;
 
-/// Sets with less than twice this number of replicas are not split. The relative standard error of f is then about
-/// √(2/16) = 35 %, if means are normally distributed.
-const MIN_MEMBERS: usize = 16;
 /// Factor of s²/N, as a power of two, that is weighted like the extent of the image.
 const LEVELS: f64 = 3.0;
-/// The extent of a set excludes 1/[`BEYOND`] of the replicas at either end, to be robust against outliers.
-const BEYOND: usize = 10;
-
-/// Level and scaled position of a pixel.
-type Place = [f64; 3];
-
-/// The variances estimated at a replica.
-#[derive(Clone, Copy)]
-struct ReplicaVariance {
-    place: Place,
-    /// (s_A² + s_B²)/2N.
-    independent: f64,
-    /// (A − B)²/2.
-    measured: f64,
-}
-
-/// The factor f of the variance of independent samples: of a set of replicas, or of its two parts.
-#[derive(Clone, Debug)]
-pub(super) enum VarianceScale {
-    One(f64),
-    /// Coordinates below `at` in the dimension belong to the first part.
-    Two {
-        dimension: usize,
-        at: f64,
-        parts: Box<[VarianceScale; 2]>,
-    },
-}
-
-impl VarianceScale {
-    fn of(replicas: Vec<ReplicaVariance>) -> Self {
-        if let Some((dimension, at)) = middle(&replicas) {
-            let (below, above): (Vec<_>, Vec<_>) = replicas.iter().copied().partition(|r| r.place[dimension] < at);
-            if below.len().min(above.len()) >= MIN_MEMBERS / 2 {
-                let parts = Box::new([below, above].map(VarianceScale::of));
-                return VarianceScale::Two { dimension, at, parts };
-            }
-        }
-        let sum = |value: fn(&ReplicaVariance) -> f64| replicas.iter().map(value).sum::<f64>();
-        let independent = sum(|r| r.independent);
-        VarianceScale::One(if independent > 0.0 { sum(|r| r.measured) / independent } else { 1.0 })
-    }
-
-    fn factor(&self, place: &Place) -> f64 {
-        match self {
-            VarianceScale::One(factor) => *factor,
-            VarianceScale::Two { dimension, at, parts } => parts[usize::from(place[*dimension] >= *at)].factor(place),
-        }
-    }
-}
 
 /// log₂ with an error of at most 0.09 and an additive constant, identical on every machine. Tiny variances are clamped.
 fn level(variance: f64) -> f64 {
     // Exponent and mantissa as a fixed-point number
     variance.max(1e-30).to_bits() as f64 / (1_u64 << 52) as f64
-}
-
-/// The longest dimension of a set of replicas, and its middle; `None` if the set is not to be split.
-fn middle(replicas: &[ReplicaVariance]) -> Option<(usize, f64)> {
-    if replicas.len() < 2 * MIN_MEMBERS {
-        return None;
-    }
-    let extent = |dimension: usize| {
-        let mut values: Vec<f64> = replicas.iter().map(|r| r.place[dimension]).collect();
-        let last = values.len() - 1;
-        [last / BEYOND, last - last / BEYOND].map(|k| *values.select_nth_unstable_by(k, f64::total_cmp).1)
-    };
-    let extents = [0, 1, 2].map(extent);
-    let length = |dimension: &usize| extents[*dimension][1] - extents[*dimension][0];
-    let longest = (0..3).max_by(|a, b| length(a).total_cmp(&length(b))).filter(|d| length(d) > 0.0)?;
-    Some((longest, 0.5 * (extents[longest][0] + extents[longest][1])))
 }
 
 impl Film {
@@ -120,7 +54,7 @@ impl Film {
 
         // Variances
         for (i, pixel) in pixels.iter().enumerate() {
-            let factor = scale.factor(&surroundings.place(surroundings.before + i));
+            let factor = scale.factor(&surroundings.position(surroundings.before + i));
             variances.push(pixel.variance_of_mean().map(|v| v * factor));
         }
     }
@@ -154,9 +88,9 @@ impl Film {
         let surroundings = self.read_surroundings(&rows, pixels);
         let measured = replicas.iter().filter_map(|replica| {
             let i = surroundings.before + replica.pixel as usize - first;
-            let (pixel, place) = (&pixels[i], surroundings.place(i));
+            let (pixel, position) = (&pixels[i], surroundings.position(i));
             let independent = 0.5 * (surroundings.values[i] + replica.independent);
-            let variance = ReplicaVariance { place, independent, measured: replica.half_square(pixel) };
+            let variance = ReplicaVariance { position, independent, measured: replica.half_square(pixel) };
             (pixel.count == replica.count && pixel.count > 1).then_some(variance)
         });
         measured.collect()
@@ -187,7 +121,7 @@ struct Surroundings {
 }
 
 impl Surroundings {
-    fn place(&self, i: usize) -> Place {
+    fn position(&self, i: usize) -> Position {
         let (x, y) = ((i % self.width) as f64, self.top + (i / self.width) as f64);
         [level(self.mean(i)), x * self.unit, y * self.unit]
     }
@@ -234,7 +168,7 @@ mod tests {
             sums
         };
         let pixels: Vec<PixelAccumulator> = (0..4096).map(&mut pixel).collect();
-        let tile = FilmTile { bounds, sums: Arc::new(PackedSums::of(&pixels)) };
+        let tile = FilmTile { bounds, sums: Arc::new(PackedSums::of(&pixels)), layers: Arc::default() };
         Film::new([64, 64], bounds, vec![tile], replicas)
     }
 
@@ -244,7 +178,7 @@ mod tests {
         let mean = film.variances().iter().map(|v| v[1]).sum::<f64>() / 4096.0;
         // (A − B)²/2 is 0 or 2σ²: its mean over 4096 replicas has the standard error σ²/64.
         assert!((mean / 0.01 - 1.0).abs() < 4.0 / 64.0, "{mean}");
-        let film = Film::new(film.resolution, film.bounds, film.tiles, Vec::new());
+        let film = Film::new(film.resolution, film.bounds, film.tiles().to_vec(), Vec::new());
         assert!(film.variances().iter().all(|v| (v[1] - 0.05).abs() < 1e-6), "as if independent");
     }
 
@@ -285,7 +219,7 @@ mod tests {
         let mut replicas = quiet.replicas.clone();
         replicas[1234].radiance = [2.0 * 1000.0; 3];
         replicas[1234].independent = 3.0 * 1e6;
-        let film = Film::new(quiet.resolution, quiet.bounds, quiet.tiles, replicas);
+        let film = Film::new(quiet.resolution, quiet.bounds, quiet.tiles().to_vec(), replicas);
         assert!((sum(&film) / expected - 1.0).abs() < 0.02, "{} {expected}", sum(&film));
     }
 }

@@ -3,7 +3,7 @@
 //! The mesh is stored as links: a face (v, a, b) gives v the link a → b. The links of a vertex form its ring of
 //! neighbours, counter-clockwise if faces are. A manifold vertex has exactly one chain, closed or open.
 
-use super::TriangleMesh;
+use super::mesh::TriangleMesh;
 use lumiris_numbers::math::Vec3;
 use std::f32::consts::{PI, TAU};
 

@@ -3,7 +3,8 @@
 //! A [`GeometrySet`] has a root group of geometries in world space, and instances of other groups. Instances do not
 //! nest.
 
-use super::{Shape, SurfaceHit};
+use super::hit::SurfaceHit;
+use super::shape::Shape;
 use lumiris_numbers::math::transform::placement_at;
 use lumiris_numbers::math::{Affine3A, Bounds3, Ray, Vec3};
 use rayon::prelude::*;

@@ -59,11 +59,21 @@ enum DirectNumbers {
     Blocks,
 }
 
+/// Some samples of a pixel.
+#[derive(Clone, Debug)]
+pub struct PixelSampleRange {
+    /// The pixel among those whose control variates are summed; counted row by row in a tile.
+    pub fit: u32,
+    /// Coordinates of the pixel.
+    pub pixel: [u32; 2],
+    /// Indices of the samples.
+    pub samples: Range<u32>,
+}
+
 /// Buffers for many samples.
 #[derive(Debug, Default)]
 pub struct Scratch {
-    /// Fit index, pixel, and range of sample indices.
-    pixels: Vec<(u32, [u32; 2], Range<u32>)>,
+    pixels: Vec<PixelSampleRange>,
     streams: Vec<SampleStream>,
     /// Net points whose coordinates are the film positions.
     points: Vec<NetPoint>,
@@ -74,6 +84,11 @@ pub struct Scratch {
 }
 
 impl<'a> CameraSampler<'a> {
+    /// The job of the image.
+    pub(crate) fn job(&self) -> &'a RenderJob {
+        self.job
+    }
+
     /// A sampler for an image whose first sample has the index `first_sample`.
     pub fn new(job: &'a RenderJob, first_sample: u32) -> Self {
         let scene = &job.world.scene;
@@ -111,36 +126,43 @@ impl<'a> CameraSampler<'a> {
         }
     }
 
-    /// Appends the samples of some pixels, each given by fit index, pixel, and range of sample indices.
+    /// Appends the samples of some pixels.
     pub fn samples(
         &self,
-        pixels: impl Iterator<Item = (u32, [u32; 2], Range<u32>)>,
+        pixels: impl Iterator<Item = PixelSampleRange>,
         seed: u32,
         scratch: &mut Scratch,
         out: &mut Vec<CameraSample>,
     ) {
         let Some((pinhole, o)) = &self.pinhole else {
-            for (fit, pixel, samples) in pixels {
+            for PixelSampleRange { fit, pixel, samples } in pixels {
                 out.extend(samples.map(|sample| CameraSample { fit, ..self.sample(pixel, sample, seed) }));
             }
             return;
         };
 
-        // Random numbers
+        self.draw_numbers(pixels, seed, scratch);
+        self.find_film_positions(scratch);
+        let len = padded(scratch.streams.len());
+        let Scratch { u: [x, y], d, spread, .. } = &mut *scratch;
+        let mut rays = PinholeRays { d: d.get_mut(len), spread: &mut spread[..len] };
+        pinhole.rays(level(), [&x[..len], &y[..len]], &mut rays);
+        self.append(*o, seed, scratch, out);
+    }
+
+    /// Draws the random numbers of the film positions.
+    fn draw_numbers(&self, pixels: impl Iterator<Item = PixelSampleRange>, seed: u32, scratch: &mut Scratch) {
         let Scratch { pixels: of_pixels, streams, points, u: [x, y], weight, d, spread } = scratch;
         let kind = self.job.settings().sampling.sampler;
         of_pixels.clear();
         streams.clear();
         points.clear();
-        for (fit, pixel, samples) in pixels {
-            let key = domain::FILM_AND_LENS;
-            SampleStream::append((kind, pixel, seed), samples.clone(), key, (streams, points));
-            of_pixels.push((fit, pixel, samples));
+        for range in pixels {
+            let (pixel, samples) = (range.pixel, range.samples.clone());
+            SampleStream::append((kind, pixel, seed), samples, domain::FILM_AND_LENS, (streams, points));
+            of_pixels.push(range);
         }
-
-        // Film positions
-        let n = streams.len();
-        let len = padded(n);
+        let (n, len) = (streams.len(), padded(streams.len()));
         reserve(&mut [x, y, weight, spread], len);
         d.reserve(len);
         if points.len() == n {
@@ -150,39 +172,36 @@ impl<'a> CameraSampler<'a> {
                 [*x, *y] = stream.domain(domain::FILM_AND_LENS).draw();
             }
         }
+    }
+
+    /// Turns random numbers into film positions and filter weights.
+    fn find_film_positions(&self, scratch: &mut Scratch) {
+        let Scratch { pixels, u: [x, y], weight, .. } = scratch;
         let mut first = 0;
-        for (_, pixel, samples) in &*of_pixels {
+        for PixelSampleRange { pixel, samples, .. } in pixels {
             let (of_pixel, center) = (first..first + samples.len(), center(*pixel));
             first = of_pixel.end;
-            let places = x[of_pixel.clone()].iter_mut().zip(&mut y[of_pixel.clone()]);
-            for ((x, y), weight) in places.zip(&mut weight[of_pixel]) {
+            let positions = x[of_pixel.clone()].iter_mut().zip(&mut y[of_pixel.clone()]);
+            for ((x, y), weight) in positions.zip(&mut weight[of_pixel]) {
                 let filter = self.filter.sample([*x, *y]);
                 let film = center + filter.offset;
                 (*x, *y, *weight) = (film.x, film.y, filter.weight);
             }
         }
-        let mut rays = PinholeRays { d: d.get_mut(len), spread: &mut spread[..len] };
-        pinhole.rays(level(), [&x[..len], &y[..len]], &mut rays);
+    }
 
-        // Fill the samples in place: common fields per pixel, then the fields of each sample. Copies of samples would
-        // dominate the time
+    /// Appends the samples whose rays start at `o`. Fills them in place: common fields per pixel, then the fields of
+    /// each sample. Copies of samples would dominate the time.
+    fn append(&self, o: Vec3, seed: u32, scratch: &Scratch, out: &mut Vec<CameraSample>) {
+        let Scratch { pixels, streams, weight, d, spread, .. } = scratch;
         let scene = &self.job.world.scene;
-        let ray = Ray { o: *o, d: Vec3::ZERO, t_max: f32::INFINITY, time: scene.camera.time(0.0) };
-        let (mut first, [dx, dy, dz]) = (0, d.get(len));
-        for &(fit, pixel, ref samples) in &*of_pixels {
+        let ray = Ray { o, d: Vec3::ZERO, t_max: f32::INFINITY, time: scene.camera.time(0.0) };
+        let ray = CameraRay { ray, spread: 0.0, width0: 0.0, weight: 1.0 };
+        let (mut first, [dx, dy, dz]) = (0, d.get(padded(streams.len())));
+        for &PixelSampleRange { fit, pixel, ref samples } in pixels {
             let begin = out.len();
             let Some(&stream) = streams.get(first) else { break };
-            let common = CameraSample {
-                ray: CameraRay { ray, spread: 0.0, width0: 0.0, weight: 1.0 },
-                weight: 0.0,
-                stream,
-                direct: stream,
-                sample_counts: self.sample_counts,
-                turn: 0,
-                fit,
-                pixel,
-                is_replica: false,
-            };
+            let common = CameraSample { fit, pixel, ..CameraSample::of_ray(ray, 0.0, stream, self.sample_counts) };
             out.resize(begin + samples.len(), common);
             for ((of_pixel, sample), i) in out[begin..].iter_mut().zip(samples.clone()).zip(first..) {
                 of_pixel.ray.ray.d = Vec3::new(dx[i], dy[i], dz[i]);
@@ -190,14 +209,14 @@ impl<'a> CameraSampler<'a> {
                 of_pixel.weight = weight[i] * scene.film.scale;
                 of_pixel.stream = streams[i];
                 of_pixel.direct = streams[i];
-                of_pixel.turn = sample;
+                of_pixel.share_group = sample;
             }
             first += samples.len();
             if !self.are_plain {
                 for (of_pixel, sample) in out[begin..].iter_mut().zip(samples.clone()) {
                     of_pixel.direct = self.direct_stream(pixel, sample, seed).unwrap_or(of_pixel.stream);
                     of_pixel.sample_counts = self.counts(pixel, &of_pixel.stream);
-                    of_pixel.turn = self.turn(pixel, sample);
+                    of_pixel.share_group = self.share_group(pixel, sample);
                 }
             }
         }
@@ -217,25 +236,16 @@ impl<'a> CameraSampler<'a> {
         let [u_time] = if self.has_motion { stream.domain(domain::TIME).draw::<1>() } else { [0.0] };
         let filter = self.filter.sample([fx, fy]);
         let ray = scene.camera.ray(center(pixel) + filter.offset, [lx, ly], u_time);
-        CameraSample {
-            ray,
-            weight: filter.weight * ray.weight * scene.film.scale,
-            stream,
-            direct: stream,
-            sample_counts: self.counts(pixel, &stream),
-            turn: self.turn(pixel, sample),
-            fit: 0,
-            pixel,
-            is_replica: false,
-        }
+        let weight = filter.weight * ray.weight * scene.film.scale;
+        let of_ray = CameraSample::of_ray(ray, weight, stream, self.counts(pixel, &stream));
+        CameraSample { share_group: self.share_group(pixel, sample), pixel, ..of_ray }
     }
 
-    /// Sample step ([`PixelSamples::turn`]). Samples of neighbouring pixels with the same step may share paths, and use
-    /// the same light paths.
+    /// See [`PixelSamples::share_group`].
     #[inline]
-    fn turn(&self, pixel: [u32; 2], sample: u32) -> u32 {
+    fn share_group(&self, pixel: [u32; 2], sample: u32) -> u32 {
         self.shared.map_or(sample, |of_pixels| {
-            self.first_sample.wrapping_add(of_pixels.turn(pixel, sample.wrapping_sub(self.first_sample)))
+            self.first_sample.wrapping_add(of_pixels.share_group(pixel, sample.wrapping_sub(self.first_sample)))
         })
     }
 

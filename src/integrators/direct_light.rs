@@ -42,8 +42,8 @@ impl PathTracer {
         let mut visible = |row: usize, light: Option<_>, wi, contribution| {
             let (path, p) = (path(row), vertices.surface.p.vec3(row));
             match light {
-                Some(light) => layers.add(&job.lights, path.sample, (light, p, wi), path.beta * contribution),
-                None => layers.add_infinite(&job.lights, path.sample, (p, wi), path.beta * contribution),
+                Some(light) => layers.add(&job.lights, path.sample, light, p, wi, path.beta * contribution),
+                None => layers.add_infinite(&job.lights, path.sample, p, wi, path.beta * contribution),
             }
         };
 
@@ -102,7 +102,7 @@ impl PathTracer {
         if self.search.layers.are_kept() {
             for (point, (light, wi), contribution) in self.direct.visible() {
                 let (path, p) = (path(point as usize), points[point as usize].light_ctx().p);
-                self.search.layers.add(&job.lights, path.sample, (light, p, wi), path.beta * contribution);
+                self.search.layers.add(&job.lights, path.sample, light, p, wi, path.beta * contribution);
             }
         }
     }

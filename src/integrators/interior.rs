@@ -44,7 +44,8 @@ impl VertexSearch {
         &mut self,
         at: &Stage<'_, '_>,
         medium: &Medium,
-        (index, path): (u32, &mut PathState),
+        index: u32,
+        path: &mut PathState,
         hit: Option<&Hit>,
     ) -> Flown {
         let scale = path.ray.d.length();
@@ -63,7 +64,7 @@ impl VertexSearch {
         // After the last vertex, the walk cannot reach another one
         if at.vertex < at.depth
             && path.passed < MAX_EVENTS
-            && let Some(next) = self.scatter_inside(at, path, (d, t, weight), medium)
+            && let Some(next) = self.scatter_inside(at, path, d, t, weight, medium)
         {
             *path = next;
             self.passing.push(index);
@@ -77,7 +78,9 @@ impl VertexSearch {
         &self,
         at: &Stage<'_, '_>,
         path: &PathState,
-        (d, t, weight): (Vec3, f32, Rgb),
+        d: Vec3,
+        t: f32,
+        weight: Rgb,
         medium: &Medium,
     ) -> Option<PathState> {
         let [u_survival, u0, u1] = self.walk_numbers(at, path);
@@ -87,19 +90,21 @@ impl VertexSearch {
         Some(go_on(next, path.ray.o + d * t, sample.wi, beta))
     }
 
-    /// The BSDF and the throughput of a path at a surface. Returns `None` if the boundary reflects a path back into its
-    /// interior; the path is then queued for the next trace.
+    /// The BSDF of a path at a surface; the throughput is divided by the probability of the choice. Returns `None` if the
+    /// boundary reflects a path back into its interior; the path is then queued for the next trace.
     pub(super) fn leave<'w>(
         &mut self,
         at: &Stage<'_, '_>,
-        (index, path, beta): (u32, &mut PathState, Rgb),
+        index: u32,
+        path: &mut PathState,
         interaction: &SurfaceInteraction,
-        (bsdf, sides): (SurfaceBsdf<'w>, Sides),
-    ) -> Option<(SurfaceBsdf<'w>, Rgb)> {
-        let Bsdf::Dielectric(interface) = bsdf.bsdf else { return Some((bsdf, beta)) };
+        bsdf: SurfaceBsdf<'w>,
+        sides: Sides,
+    ) -> Option<SurfaceBsdf<'w>> {
+        let Bsdf::Dielectric(interface) = bsdf.bsdf else { return Some(bsdf) };
         let is_boundary = sides.differ() && sides.towards(interaction.surface.n.dot(interaction.wo)) == path.medium;
         if !is_boundary || !self.walks(at.job, path) {
-            return Some((bsdf, beta));
+            return Some(bsdf);
         }
 
         // Leave: only refraction remains for the vertex
@@ -107,12 +112,13 @@ impl VertexSearch {
         let p_stay = chance_to_stay(&interface, wo);
         let [u_stay, u0, u1] = self.walk_numbers(at, path);
         if u_stay >= p_stay {
-            return Some((SurfaceBsdf { bsdf: Bsdf::Exit(interface), ..bsdf }, beta / (1.0 - p_stay)));
+            path.beta = path.beta / (1.0 - p_stay);
+            return Some(SurfaceBsdf { bsdf: Bsdf::Exit(interface), ..bsdf });
         }
 
         // Stay: reflect the path back into the interior
         let s = interface.sample_select(wo, 0.0, [u0, u1], Transport::Radiance, Select::Reflection)?;
-        let beta = beta * s.f * (s.wi.z.abs() / (s.pdf * p_stay));
+        let beta = path.beta * s.f * (s.wi.z.abs() / (s.pdf * p_stay));
         if beta.is_black() || !beta.is_finite() {
             return None;
         }

@@ -21,20 +21,40 @@ pub fn count(job: &RenderJob) -> usize {
     names(job).len()
 }
 
-/// Per-group sums of the samples of a batch.
+/// Per-group sums of the samples of a batch. Only samples and layers with light have an entry.
 #[derive(Debug, Default)]
-pub(super) struct LayerSums {
+pub struct LayerSums {
     /// Number of layers; 0 if disabled.
-    pub(super) layers: usize,
-    /// By sample, then by layer.
-    sums: Vec<Rgb>,
+    layers: usize,
+    entries: Vec<LayerSum>,
+    /// Index of the entry by sample, then by layer. Valid if that entry has this sample and layer, so that a batch
+    /// begins without clearing all indices.
+    indices: Vec<u32>,
+}
+
+/// Sum of the radiance of a light-group layer in a sample.
+#[derive(Clone, Copy, Debug)]
+pub struct LayerSum {
+    /// Index of the sample in the batch.
+    pub sample: u32,
+    /// The layer.
+    pub layer: u32,
+    /// The sum.
+    pub radiance: Rgb,
 }
 
 impl LayerSums {
+    /// Sums for `layers` layers from the next batch on.
+    pub(super) fn keep(&mut self, layers: usize) {
+        *self = LayerSums { layers, ..LayerSums::default() };
+    }
+
     /// Begins a batch of `samples` camera samples.
     pub(super) fn begin(&mut self, samples: usize) {
-        self.sums.clear();
-        self.sums.resize(samples * self.layers, Rgb::BLACK);
+        self.entries.clear();
+        if self.indices.len() < samples * self.layers {
+            self.indices.resize(samples * self.layers, 0);
+        }
     }
 
     /// True if layers are enabled.
@@ -43,27 +63,47 @@ impl LayerSums {
         self.layers > 0
     }
 
-    /// By sample, then by layer.
-    pub(super) fn sums(&mut self) -> &mut [Rgb] {
-        &mut self.sums
+    /// The sums of the last batch that are not known to be black, in any order, each layer of a sample once.
+    pub fn entries(&self) -> &[LayerSum] {
+        &self.entries
+    }
+
+    /// The index of a sum, and the sum unless it is black.
+    #[inline]
+    fn find(&self, sample: u32, layer: u32) -> (usize, Option<usize>) {
+        let at = sample as usize * self.layers + layer as usize;
+        let index = self.indices[at] as usize;
+        let is_here = self.entries.get(index).is_some_and(|entry| (entry.sample, entry.layer) == (sample, layer));
+        (at, is_here.then_some(index))
+    }
+
+    /// The sum of a layer in a sample.
+    pub fn of(&self, sample: u32, layer: u32) -> Rgb {
+        self.find(sample, layer).1.map_or(Rgb::BLACK, |index| self.entries[index].radiance)
+    }
+
+    /// The sum of a layer in a sample, to be changed.
+    #[inline]
+    pub fn at(&mut self, sample: u32, layer: u32) -> &mut Rgb {
+        let (at, index) = self.find(sample, layer);
+        let index = index.unwrap_or_else(|| {
+            self.indices[at] = self.entries.len() as u32;
+            self.entries.push(LayerSum { sample, layer, radiance: Rgb::BLACK });
+            self.entries.len() - 1
+        });
+        &mut self.entries[index].radiance
     }
 
     /// Adds the contribution `value` of a light to a sample, at the point `p`. `wi` is the unit direction to the light.
     #[inline]
-    pub(super) fn add(
-        &mut self,
-        lights: &LightSampling,
-        sample: u32,
-        (light, p, wi): (LightId, Vec3, Vec3),
-        value: Rgb,
-    ) {
-        if !self.are_kept() {
+    pub(super) fn add(&mut self, lights: &LightSampling, sample: u32, light: LightId, p: Vec3, wi: Vec3, value: Rgb) {
+        if !self.are_kept() || value.is_black() {
             return;
         }
         if lights.infinite.len() > 1 && lights.infinite.contains(&light) {
-            return self.add_infinite(lights, sample, (p, wi), value);
+            return self.add_infinite(lights, sample, p, wi, value);
         }
-        self.sums[sample as usize * self.layers + lights.layers.of(light)] += value;
+        *self.at(sample, lights.layers.of(light)) += value;
     }
 
     /// Adds surface emission that a path has hit.
@@ -73,26 +113,46 @@ impl LayerSums {
             return;
         }
         if let Some(light) = job.lights.light_of(hit.geometry, hit.primitive) {
-            self.sums[sample as usize * self.layers + job.lights.layers.of(light)] += value;
+            *self.at(sample, job.lights.layers.of(light)) += value;
         }
     }
 
     /// Adds the sum of all infinite lights at `p` from the direction `wi`, divided among their layers.
     #[inline]
-    pub(super) fn add_infinite(&mut self, lights: &LightSampling, sample: u32, (p, wi): (Vec3, Vec3), value: Rgb) {
-        if !self.are_kept() {
+    pub(super) fn add_infinite(&mut self, lights: &LightSampling, sample: u32, p: Vec3, wi: Vec3, value: Rgb) {
+        if !self.are_kept() || value.is_black() {
             return;
         }
-        let of_sample = &mut self.sums[sample as usize * self.layers..][..self.layers];
         if let [light] = lights.infinite[..] {
-            of_sample[lights.layers.of(light)] += value;
+            *self.at(sample, lights.layers.of(light)) += value;
             return;
         }
         let whole = lights.le(p, wi);
         for &light in &lights.infinite {
             let le = lights.lights[light as usize].le(p, wi);
             let share = |c: usize| if whole[c] == 0.0 { 0.0 } else { value[c] * (le[c] / whole[c]) };
-            of_sample[lights.layers.of(light)] += Rgb::new(share(0), share(1), share(2));
+            *self.at(sample, lights.layers.of(light)) += Rgb::new(share(0), share(1), share(2));
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_batch_forgets_the_sums_of_the_last_one() {
+        let mut sums = LayerSums::default();
+        sums.keep(3);
+        sums.begin(4);
+        for (sample, layer) in [(0, 2), (3, 1), (0, 2), (2, 0)] {
+            *sums.at(sample, layer) += Rgb::splat(0.5);
+        }
+        assert_eq!(sums.entries().len(), 3);
+        assert_eq!([(0, 2), (3, 1), (1, 2)].map(|(sample, layer)| sums.of(sample, layer).r), [1.0, 0.5, 0.0]);
+        sums.begin(2);
+        *sums.at(1, 1) += Rgb::splat(0.25);
+        assert_eq!([(0, 2), (1, 1)].map(|(sample, layer)| sums.of(sample, layer).r), [0.0, 0.25]);
+        assert_eq!(sums.entries().len(), 1);
     }
 }

@@ -34,7 +34,7 @@ use crate::film::{FeatureSet, PixelSample};
 use crate::photons::PhotonError;
 use crate::scene::RenderJob;
 use crate::settings::IntegratorKind;
-use lumiris_numbers::math::Rgb;
+use light_layers::LayerSums;
 use std::sync::atomic::AtomicBool;
 
 /// A light transport algorithm; shared by all threads.
@@ -66,9 +66,9 @@ pub trait Tracer: Send {
     /// Sums the light of `count` light-group layers from now on, if supported; see [`light_layers`].
     fn keep_light_layers(&mut self, _count: usize) {}
 
-    /// Light-group layers of the last batch: by sample, then by layer. Empty if layers are disabled.
-    fn light_layers(&mut self) -> &mut [Rgb] {
-        &mut []
+    /// Light-group layers of the last batch, if supported.
+    fn light_layers(&mut self) -> Option<&mut LayerSums> {
+        None
     }
 
     /// Counts and times since the last call.

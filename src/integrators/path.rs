@@ -11,9 +11,10 @@
 //!
 //! All integrators use this path loop. [`AtVertices`] is the hook for their own work at vertices.
 
-use super::cells::Groups;
+use super::cells::Blocks;
+use super::light_layers::LayerSums;
 use super::light_paths::{LightImage, LightPilot};
-use super::reuse::{self, Place, Reuse};
+use super::reuse::{self, LambertianVertex, Reuse};
 use super::scatter::{Continuation, Scatter};
 pub use super::segment::{CameraSample, PathStats};
 use super::segment::{LastVertices, PathState};
@@ -34,16 +35,16 @@ use std::time::Instant;
 /// Path tracing. Only light paths, if enabled, are prepared.
 pub struct PathIntegrator<'a> {
     job: &'a RenderJob,
-    /// Grouping of the samples for path sharing.
-    groups: Groups,
+    /// Blocks of pixels that share paths.
+    blocks: Blocks,
     light: Option<LightImage>,
 }
 
 impl<'a> PathIntegrator<'a> {
     /// The integrator of an image that is rendered in whole cells.
     pub(super) fn new(job: &'a RenderJob) -> Self {
-        let groups = if reuse::edge(job) > 1 { Groups::Cells } else { Groups::None };
-        PathIntegrator { job, groups, light: LightImage::new(job) }
+        let blocks = if reuse::edge(job) > 1 { Blocks::Cells } else { Blocks::None };
+        PathIntegrator { job, blocks, light: LightImage::new(job) }
     }
 }
 
@@ -53,7 +54,7 @@ impl Integrator for PathIntegrator<'_> {
     }
 
     fn tracer(&self, features: FeatureSet) -> Box<dyn Tracer + '_> {
-        let mut paths = PathTracer::sharing(self.groups, features);
+        let mut paths = PathTracer::sharing(self.blocks, features);
         let Some(light) = &self.light else { return Box::new(paths) };
         paths.search.guide = Some(Arc::clone(&light.guide));
         Box::new(WithLightPaths { paths, light })
@@ -73,7 +74,7 @@ struct WithLightPaths<'a> {
 impl Tracer for WithLightPaths<'_> {
     fn trace(&mut self, job: &RenderJob, samples: &[CameraSample], fits: &mut Fits, out: &mut Vec<PixelSample>) {
         Tracer::trace(&mut self.paths, job, samples, fits, out);
-        self.light.add(samples.iter().map(|s| (s.pixel, s.turn, s.is_replica)), out);
+        self.light.add(samples.iter().map(|s| (s.pixel, s.share_group, s.is_replica)), out);
     }
 
     fn take_stats(&mut self) -> PathStats {
@@ -181,8 +182,8 @@ impl PathTracer {
     }
 
     /// The same, with path sharing if the settings enable it.
-    pub fn sharing(groups: Groups, features: FeatureSet) -> Self {
-        PathTracer { reuse: Reuse::of(groups), ..PathTracer::new(features) }
+    pub fn sharing(blocks: Blocks, features: FeatureSet) -> Self {
+        PathTracer { reuse: Reuse::of(blocks), ..PathTracer::new(features) }
     }
 
     /// Leaves to light paths their share of the light from now on. `light` gives the pilot and the number of light
@@ -215,13 +216,14 @@ impl PathTracer {
         out: &mut Vec<PixelSample>,
     ) {
         self.search.start(job, samples, out);
-        self.follow((job, settings), None, samples, fits, out);
+        self.follow(job, settings, None, samples, fits, out);
     }
 
     /// The path loop, vertex by vertex: L = Σ β (L_e·w + L_d). `own` is the integrator's own work at vertices.
     pub(super) fn follow(
         &mut self,
-        (job, settings): (&RenderJob, &IntegratorSettings),
+        job: &RenderJob,
+        settings: &IntegratorSettings,
         mut own: Option<&mut AtVertices<'_>>,
         samples: &[CameraSample],
         fits: &mut Fits,
@@ -242,12 +244,12 @@ impl PathTracer {
             // Trace to the vertices, and add β·L_e·w of the emitters that are hit
             let from = LastVertices { vertices: &left, techniques: drawn };
             self.search.find(Stage { job, vertex, depth, samples, left: from, out, vertices: &mut vertices });
-            let step = self.step((job, settings), vertex, samples, own.is_some());
+            let step = self.step(job, settings, vertex, samples, own.is_some());
 
             // The integrator's own work, and path sharing
             let (lit, next) = match &mut own {
                 Some(own) => {
-                    self.leave_to_integrator(*own, (job, vertex), &vertices, [&mut lit, &mut next], out);
+                    self.leave_to_integrator(*own, job, vertex, &vertices, [&mut lit, &mut next], out);
                     (&lit, &next)
                 }
                 None => (&vertices, &vertices),
@@ -271,7 +273,8 @@ impl PathTracer {
     /// The direct-light estimator at vertices of this index, and the continuation of paths.
     fn step<'s>(
         &self,
-        (job, settings): (&'s RenderJob, &'s IntegratorSettings),
+        job: &'s RenderJob,
+        settings: &'s IntegratorSettings,
         vertex: u32,
         samples: &'s [CameraSample],
         has_own: bool,
@@ -290,7 +293,8 @@ impl PathTracer {
     fn leave_to_integrator<'w>(
         &self,
         own: &mut AtVertices<'_>,
-        (job, vertex): (&'w RenderJob, u32),
+        job: &'w RenderJob,
+        vertex: u32,
         vertices: &Vertices<'w>,
         rest: [&mut Vertices<'w>; 2],
         out: &mut [PixelSample],
@@ -331,11 +335,9 @@ impl PathTracer {
         let surface = &vertices.surface;
         for i in vertices.bsdfs.len()..vertices.len() {
             let path = &mut self.search.active[vertices.path[i] as usize];
-            let point = (surface.p.vec3(i), surface.p_error.vec3(i));
-            let at = Place::new(point, (surface.n.vec3(i), surface.ns.vec3(i)), surface.wo.vec3(i));
-            let radiance = &mut out[path.sample as usize].radiance;
-            let arrival = (path.sample, vertex, path.passed == 0);
-            path.beta = reuse.arrive(arrival, at, (path.beta, surface.rho.rgb(i)), radiance);
+            let [p, p_error] = [&surface.p, &surface.p_error].map(|column| column.vec3(i));
+            let at = LambertianVertex::new(p, p_error, surface.n.vec3(i), surface.ns.vec3(i), surface.wo.vec3(i));
+            reuse.add(path, vertex, at, surface.rho.rgb(i), &mut out[path.sample as usize].radiance);
         }
         self.search.stats.shade_time += start.elapsed();
     }
@@ -347,11 +349,11 @@ impl Tracer for PathTracer {
     }
 
     fn keep_light_layers(&mut self, count: usize) {
-        self.search.layers.layers = count;
+        self.search.layers.keep(count);
     }
 
-    fn light_layers(&mut self) -> &mut [Rgb] {
-        self.search.layers.sums()
+    fn light_layers(&mut self) -> Option<&mut LayerSums> {
+        Some(&mut self.search.layers)
     }
 
     fn take_stats(&mut self) -> PathStats {

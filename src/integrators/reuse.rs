@@ -12,15 +12,14 @@
 //! since the participation of x_i does not depend on its sampled direction. Light from non-Lambertian surfaces, from
 //! beyond non-scattering surfaces, and of emitters is not shared.
 //!
-//! The samples of one step ([`crate::scene::PixelSamples::turn`]) in a block of pixels are a group. Blocks depend on
-//! the step, so that the noise of two pixels is never the same for all samples. Blocks are within
-//! [cells](super::cells), which are always rendered together. If sample counts vary between pixels, the samples of one
-//! step belong to the same part of the image. The counts are independent of the samples, and so is the membership of
-//! groups.
+//! Paths are shared by samples of one [share group](crate::scene::PixelSamples::share_group) in a block of pixels.
+//! Blocks depend on the share group, so that the noise of two pixels is never the same for all samples. Blocks are
+//! within [cells](super::cells), which are always rendered together. The sample counts of pixels are independent of the
+//! samples, and so are share groups and blocks.
 
-use super::cells::Groups;
+use super::cells::Blocks;
 use super::features::{self, Feature};
-use super::segment::CameraSample;
+use super::segment::{CameraSample, PathState};
 use crate::accel::{Coherence, RayBatch};
 use crate::film::PixelSample;
 use crate::scene::RenderJob;
@@ -43,27 +42,27 @@ pub fn edge(job: &RenderJob) -> u32 {
 /// A Lambertian vertex: point, bound of its rounding error, and geometric and shading normals on the side of the
 /// viewer.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Place {
+pub(super) struct LambertianVertex {
     pub(super) p: Vec3,
     pub(super) p_error: Vec3,
     pub(super) n: Vec3,
     pub(super) ns: Vec3,
 }
 
-impl Place {
+impl LambertianVertex {
     /// A vertex given by its point with the error bound, the geometric and the shading normal, and the direction to the
     /// viewer.
     #[inline]
-    pub(super) fn new((p, p_error): (Vec3, Vec3), (n, ns): (Vec3, Vec3), wo: Vec3) -> Self {
+    pub(super) fn new(p: Vec3, p_error: Vec3, n: Vec3, ns: Vec3, wo: Vec3) -> Self {
         let facing = |n: Vec3| if n.dot(wo) < 0.0 { -n } else { n };
-        Place { p, p_error, n: facing(n), ns: facing(ns) }
+        LambertianVertex { p, p_error, n: facing(n), ns: facing(ns) }
     }
 }
 
 /// The first Lambertian vertex of a path.
 #[derive(Clone, Copy, Debug)]
 struct First {
-    at: Place,
+    at: LambertianVertex,
     /// Index along the path.
     vertex: u32,
     /// Throughput beyond it.
@@ -73,7 +72,7 @@ struct First {
 /// The vertex after it. The light beyond is shared.
 #[derive(Clone, Copy, Debug)]
 struct Second {
-    at: Place,
+    at: LambertianVertex,
     /// Radiance of the sample up to this vertex.
     before: Rgb,
 }
@@ -118,7 +117,7 @@ struct Shares {
 /// Path sharing within a batch.
 #[derive(Debug, Default)]
 pub(super) struct Reuse {
-    groups: Groups,
+    blocks: Blocks,
     /// Edge of the blocks; 1 or 0 if nothing is shared.
     edge: u32,
     /// Group and index of each sample, sorted: the index in the lower 32 bits.
@@ -138,10 +137,10 @@ pub(super) struct Reuse {
 struct Group {
     /// Index of its first member.
     begin: usize,
-    first: Places,
+    first: VertexColumns,
     /// Members with second vertices, up to [`TOGETHER`].
-    found: Vec<u32>,
-    second: Places,
+    connecting: Vec<u32>,
+    second: VertexColumns,
     g: Column,
     o: Columns3,
     d: Columns3,
@@ -151,7 +150,7 @@ struct Group {
 
 /// Vertices in columns.
 #[derive(Debug, Default)]
-struct Places {
+struct VertexColumns {
     p: Columns3,
     p_error: Columns3,
     n: Columns3,
@@ -159,13 +158,13 @@ struct Places {
 }
 
 impl Reuse {
-    pub(super) fn of(groups: Groups) -> Self {
-        Reuse { groups, ..Reuse::default() }
+    pub(super) fn of(blocks: Blocks) -> Self {
+        Reuse { blocks, ..Reuse::default() }
     }
 
     /// Begins a batch of `count` samples, which share paths in blocks of the given edge; `None`: nothing is shared.
     pub(super) fn begin(&mut self, edge: Option<u32>, count: usize) {
-        self.edge = edge.filter(|_| self.groups != Groups::None).unwrap_or(1);
+        self.edge = edge.filter(|_| self.blocks != Blocks::None).unwrap_or(1);
         let count = if self.edge > 1 { count } else { 0 };
         self.first.clear();
         self.first.resize(count, None);
@@ -180,31 +179,33 @@ impl Reuse {
         (self.edge > 1).then_some(self)
     }
 
-    /// Registers a Lambertian vertex with the reflectance `rho`. `is_next` is true if the path has passed no surface
-    /// since its last vertex. Returns the throughput to continue with. If the light beyond is shared, this is 1 but for
-    /// the roulette since the first vertex, and the radiance of the sample restarts at 0.
+    /// Registers a Lambertian vertex of a path, with its index along the path and the reflectance `rho`. If the light
+    /// beyond is shared, the throughput becomes 1 but for the roulette since the first vertex, and the radiance of the
+    /// sample restarts at 0.
     #[inline]
-    pub(super) fn arrive(
+    pub(super) fn add(
         &mut self,
-        (sample, vertex, is_next): (u32, u32, bool),
-        at: Place,
-        (beta, rho): (Rgb, Rgb),
+        path: &mut PathState,
+        vertex: u32,
+        at: LambertianVertex,
+        rho: Rgb,
         radiance: &mut Rgb,
-    ) -> Rgb {
-        let (first, second) = (&mut self.first[sample as usize], &mut self.second[sample as usize]);
+    ) {
+        let sample = path.sample as usize;
+        let (first, second) = (&mut self.first[sample], &mut self.second[sample]);
         match first {
             None => {
                 // Without throughput the path ends here
-                let beyond = beta * rho;
+                let beyond = path.beta * rho;
                 *first = (!beyond.is_black() && beyond.is_finite()).then_some(First { at, vertex, beta: beyond });
-                beta
             }
-            Some(first) if first.vertex + 1 == vertex && is_next && second.is_none() => {
+            Some(first) if first.vertex + 1 == vertex && path.passed == 0 && second.is_none() => {
                 *second = Some(Second { at, before: std::mem::replace(radiance, Rgb::BLACK) });
                 self.count += 1;
-                Rgb::splat(beta.map(f32::abs).max_component() / first.beta.map(f32::abs).max_component())
+                let [beta, of_first] = [path.beta, first.beta].map(|beta| beta.map(f32::abs).max_component());
+                path.beta = Rgb::splat(beta / of_first);
             }
-            Some(_) => beta,
+            Some(_) => {}
         }
     }
 
@@ -215,10 +216,10 @@ impl Reuse {
         }
 
         // Sort the samples by group
-        let (origin, groups, edge) = (job.world.scene.film.bounds, self.groups, self.edge);
-        let rule = (edge, job.settings().sampling.seed);
+        let (origin, blocks, edge) = (job.world.scene.film.bounds, self.blocks, self.edge);
+        let seed = job.settings().sampling.seed;
         let pixel = |s: &CameraSample| [s.pixel[0] - origin.x0, s.pixel[1] - origin.y0];
-        let group = |s: &CameraSample| groups.of(rule, pixel(s), (s.turn, s.is_replica));
+        let group = |s: &CameraSample| blocks.of(edge, seed, pixel(s), s.share_group, s.is_replica);
         self.order.clear();
         self.order.extend(samples.iter().zip(0_u128..).map(|(s, i)| u128::from(group(s)) << 32 | i));
         self.order.sort_unstable();
@@ -259,9 +260,9 @@ impl Reuse {
             for i in group.begin..shares.members.len() {
                 let sample = shares.members[i].sample as usize;
                 let Some(second) = second[sample].as_ref().filter(|_| !tails[sample].is_black()) else { continue };
-                group.second.set(group.found.len(), &second.at);
-                group.found.push(i as u32);
-                if group.found.len() == TOGETHER {
+                group.second.set(group.connecting.len(), &second.at);
+                group.connecting.push(i as u32);
+                if group.connecting.len() == TOGETHER {
                     group.connect(shares);
                 }
             }
@@ -276,7 +277,7 @@ impl Reuse {
 impl Group {
     /// Connects all members to the pending second vertices.
     fn connect(&mut self, shares: &mut Shares) {
-        let (len, count) = (padded(shares.members.len() - self.begin), self.found.len());
+        let (len, count) = (padded(shares.members.len() - self.begin), self.connecting.len());
         self.first.reserve(len);
         [&mut self.o, &mut self.d].into_iter().for_each(|columns| columns.reserve(len * count));
         reserve(&mut [&mut self.g], len * count);
@@ -287,13 +288,13 @@ impl Group {
         for k in 0..count {
             self.share(k, len, shares);
         }
-        self.found.clear();
+        self.connecting.clear();
     }
 
     /// Appends the members with a non-zero g for the pending second vertex `k`. The columns have `len` first vertices
     /// for each second vertex.
     fn share(&mut self, k: usize, len: usize, shares: &mut Shares) {
-        let member = self.found[k];
+        let member = self.connecting[k];
         let (own, vertex) = (member as usize - self.begin, shares.members[member as usize].vertex);
         let g = &self.g[k * len..][..len];
         let mut count = 0;
@@ -361,14 +362,14 @@ fn sum_of(values: &[f32]) -> f32 {
     sums.iter().chain(rest).sum()
 }
 
-impl Places {
+impl VertexColumns {
     fn reserve(&mut self, len: usize) {
-        let Places { p, p_error, n, ns } = self;
+        let VertexColumns { p, p_error, n, ns } = self;
         [p, p_error, n, ns].into_iter().for_each(|columns| columns.reserve(len));
     }
 
     /// Sets vertex `i`: the last one, or the one after it.
-    fn set(&mut self, i: usize, at: &Place) {
+    fn set(&mut self, i: usize, at: &LambertianVertex) {
         self.reserve(padded(i + 1));
         self.p.set(i, at.p);
         self.p_error.set(i, at.p_error);
@@ -377,7 +378,7 @@ impl Places {
     }
 
     fn vertices(&self, len: usize) -> Vertices<'_> {
-        let Places { p, p_error, n, ns } = self;
+        let VertexColumns { p, p_error, n, ns } = self;
         Vertices { ends: Ends { p: p.get(len), p_error: p_error.get(len), n: n.get(len) }, ns: ns.get(len) }
     }
 }

@@ -13,6 +13,7 @@ use crate::settings::{IntegratorSettings, SampleCounts};
 use lumiris_numbers::estimators::mis::Technique;
 use lumiris_numbers::math::{Ray, Rgb};
 use lumiris_numbers::samplers::SampleStream;
+use std::iter::Sum;
 use std::time::Duration;
 
 /// Random-number domains of a path vertex.
@@ -96,6 +97,15 @@ impl PathStats {
     }
 }
 
+impl Sum for PathStats {
+    fn sum<I: Iterator<Item = PathStats>>(all: I) -> Self {
+        all.fold(PathStats::default(), |mut sum, stats| {
+            sum.merge(&stats);
+            sum
+        })
+    }
+}
+
 /// A camera sample to be traced.
 #[derive(Clone, Copy, Debug)]
 pub struct CameraSample {
@@ -110,15 +120,24 @@ pub struct CameraSample {
     pub direct: SampleStream,
     /// Sample counts at its first vertex.
     pub sample_counts: SampleCounts,
-    /// Sample step ([`crate::scene::PixelSamples::turn`]). Samples of neighbouring pixels with the same step may share
-    /// paths, and use the same light paths. Equals the sample index if all pixels have the same number of samples.
-    pub turn: u32,
+    /// Share group ([`crate::scene::PixelSamples::share_group`]). Samples with the same group may share paths, and use the
+    /// same light paths.
+    pub share_group: u32,
     /// Index of the fit of its pixel.
     pub fit: u32,
     /// Its pixel; arbitrary for rays that belong to no pixel.
     pub pixel: [u32; 2],
     /// True if the sample belongs to a replica: a second estimate of its pixel, used to estimate the variance.
     pub is_replica: bool,
+}
+
+impl CameraSample {
+    /// The sample of a ray that belongs to no pixel.
+    #[inline]
+    pub fn of_ray(ray: CameraRay, weight: f32, stream: SampleStream, sample_counts: SampleCounts) -> Self {
+        let (share_group, fit, pixel, is_replica) = (0, 0, [0; 2], false);
+        CameraSample { ray, weight, stream, direct: stream, sample_counts, share_group, fit, pixel, is_replica }
+    }
 }
 
 /// The state of a path.
@@ -204,7 +223,8 @@ impl PathState {
         job: &RenderJob,
         interaction: &SurfaceInteraction,
         bsdf: &SurfaceBsdf<'_>,
-        (features, stream): (FeatureSet, &SampleStream),
+        features: FeatureSet,
+        stream: &SampleStream,
     ) -> Features {
         let z = bsdf.frame.z;
         Features {

@@ -136,7 +136,7 @@ impl VertexSearch {
             let (mut paths, hits, traced) =
                 (std::mem::take(&mut self.active), std::mem::take(&mut self.hits), std::mem::take(&mut self.traced));
             for (&index, hit) in traced.iter().zip(&hits) {
-                self.arrive(&mut at, &mut paths, index, hit.as_ref());
+                self.process_hit(&mut at, &mut paths, index, hit.as_ref());
             }
             (self.active, self.hits, self.traced) = (paths, hits, traced);
 
@@ -159,12 +159,12 @@ impl VertexSearch {
 
     /// Processes a traced path: flight through its medium, emission, and vertex or continuation.
     #[inline]
-    fn arrive(&mut self, at: &mut Stage<'_, '_>, paths: &mut Vec<PathState>, index: u32, hit: Option<&Hit>) {
+    fn process_hit(&mut self, at: &mut Stage<'_, '_>, paths: &mut Vec<PathState>, index: u32, hit: Option<&Hit>) {
         let mut index = index;
 
         // Medium
         if paths[index as usize].medium.is_some() {
-            match self.fly(at, (index, &mut paths[index as usize]), hit) {
+            match self.fly(at, index, &mut paths[index as usize], hit) {
                 Flown::Through => {}
                 Flown::Ended => return,
                 Flown::Ghost(ghost) => {
@@ -177,9 +177,9 @@ impl VertexSearch {
         // Surface or environment
         let path = &mut paths[index as usize];
         match hit {
-            Some(hit) if self.take_plain(at, (index, path), hit) => {}
-            Some(hit) => self.take(at, (index, path), hit),
-            None if self.looks_for_emitters(at.vertex, path) => self.escaped.push(index),
+            Some(hit) if self.take_plain(at, index, path, hit) => {}
+            Some(hit) => self.take(at, index, path, hit),
+            None if self.adds_emission(at.vertex, path) => self.escaped.push(index),
             None => {}
         }
     }
@@ -211,14 +211,14 @@ impl VertexSearch {
     }
 
     #[inline]
-    fn looks_for_emitters(&self, vertex: u32, path: &PathState) -> bool {
+    fn adds_emission(&self, vertex: u32, path: &PathState) -> bool {
         !path.is_ghost && (path.technique.is_some() || vertex == 0 && !self.only_reflected)
     }
 
     /// Handles the hit of a mesh with a constant Lambertian reflectance, whose points are computed together with
     /// others. Returns false for all other hits.
     #[inline]
-    fn take_plain(&mut self, at: &mut Stage<'_, '_>, (index, path): (u32, &mut PathState), hit: &Hit) -> bool {
+    fn take_plain(&mut self, at: &mut Stage<'_, '_>, index: u32, path: &mut PathState, hit: &Hit) -> bool {
         let is_last = at.vertex >= at.depth;
         let Some(rho) = at.job.plain_reflectance(hit) else { return false };
         if path.medium.is_some() || path.is_ghost || is_last && at.vertex == 0 {
@@ -242,18 +242,18 @@ impl VertexSearch {
         } else {
             Chain::NONE
         };
-        at.vertices.push_plain(index, (mesh, hit.primitive, hit.uv), path.ray.d, rho);
+        at.vertices.push_plain(index, mesh, hit.primitive, hit.uv, path.ray.d, rho);
         true
     }
 
     /// Handles any other hit, and adds its vertex if the path continues.
     #[inline]
-    fn take(&mut self, at: &mut Stage<'_, '_>, (index, path): (u32, &mut PathState), hit: &Hit) {
-        let interaction = SurfaceInteraction::new(at.job, &path.ray, (path.width, path.spread), hit);
+    fn take(&mut self, at: &mut Stage<'_, '_>, index: u32, path: &mut PathState, hit: &Hit) {
+        let interaction = SurfaceInteraction::new(at.job, &path.ray, path.width, path.spread, hit);
         let (sample, out) = (&at.samples[path.sample as usize], &mut at.out[path.sample as usize]);
 
         // Emission
-        if self.looks_for_emitters(at.vertex, path) {
+        if self.adds_emission(at.vertex, path) {
             let emission = path.emission(at.job, &at.left, &interaction, self.guide.as_deref());
             out.radiance += emission;
             self.layers.add_emission(at.job, path.sample, &interaction.hit, emission);
@@ -276,7 +276,7 @@ impl VertexSearch {
                     Features { depth: path.depth(&interaction), ..Features::default() }
                 } else {
                     let stream = sample.stream.domain(domain::VERTEX);
-                    path.features(at.job, &interaction, &bsdf, (self.features, &stream))
+                    path.features(at.job, &interaction, &bsdf, self.features, &stream)
                 }
             });
         }
@@ -294,10 +294,11 @@ impl VertexSearch {
 
         // The vertex, unless the path stays in an interior
         let media = interaction.sides(at.job, path.medium);
-        let Some((bsdf, beta)) = self.leave(at, (index, path, beta), &interaction, (bsdf, media)) else { return };
+        path.beta = beta;
+        let Some(bsdf) = self.leave(at, index, path, &interaction, bsdf, media) else { return };
         let SurfaceInteraction { surface, wo, width, .. } = interaction;
         path.chain = self.chain(at, path, &interaction, &bsdf);
-        (path.beta, path.width) = (beta, width);
+        path.width = width;
         at.vertices.push(Single { path: index, p: surface.p, p_error: surface.p_error, wo, bsdf, media });
     }
 
@@ -334,11 +335,11 @@ impl VertexSearch {
     }
 
     /// Samples the free flight of a path through its medium, and adds the emission of the medium.
-    fn fly(&mut self, at: &mut Stage<'_, '_>, (index, path): (u32, &mut PathState), hit: Option<&Hit>) -> Flown {
+    fn fly(&mut self, at: &mut Stage<'_, '_>, index: u32, path: &mut PathState, hit: Option<&Hit>) -> Flown {
         let Some(id) = path.medium.filter(|_| !path.is_ghost) else { return Flown::Through };
         let medium = &at.job.world.scene.media.media[id as usize];
         if medium.is_interior() {
-            return self.walk(at, medium, (index, path), hit);
+            return self.walk(at, medium, index, path, hit);
         }
 
         // Segment and random numbers
@@ -399,7 +400,7 @@ impl VertexSearch {
                 let weight = if l.is_black() { 1.0 } else { left.weight(path, |_| p_light) };
                 out[path.sample as usize].radiance += l * weight;
                 if layers.are_kept() {
-                    layers.add_infinite(lights, path.sample, (left.ctx(path).p, path.ray.d), l * weight);
+                    layers.add_infinite(lights, path.sample, left.ctx(path).p, path.ray.d, l * weight);
                 }
             },
         );

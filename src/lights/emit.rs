@@ -9,7 +9,7 @@
 //! | point | its position | uniform on the sphere | 4π·I, constant |
 //! | spot | its position | by its falloff | I times the solid angle of the falloff, constant |
 //! | goniometric, projection | its position | by its image | I/p_ω |
-//! | area | by area, see [`area`](super::area) | cosine about the normal, of one side or of either | π·Le/p_A |
+//! | area | by area, see [`area`](super::kinds::area) | cosine about the normal, of one side or of either | π·Le/p_A |
 //! | distant | disk | its own | π·R²·E, constant |
 //! | portal | uniform over it, moved back by the scene's size | by the part of its image that passes | A·Le·cos θ/p_ω |
 //! | environment | disk | by its image, or uniform | π·R²·Le/p_ω |
@@ -17,54 +17,15 @@
 //! The disk has the radius R of the scene's bounding sphere, is perpendicular to the direction and touches that sphere
 //! on the side the light comes from [Pharr et al. 2023, §12.2, §12.5]. Flux that misses the scene is included.
 
-use super::{AreaLight, Light, spot};
+use super::kinds::area::AreaLight;
+use super::kinds::spot;
+use super::light::Light;
+use super::light_sample::{EmissionSample, EmittingPoint};
 use lumiris_numbers::math::warp::{
     direction, pdf_uniform_sphere, sample_cosine_hemisphere, sample_uniform_disk_concentric, sample_uniform_sphere,
 };
 use lumiris_numbers::math::{Frame, ONE_MINUS_EPSILON, Rgb, Vec3};
 use std::f32::consts::{PI, TAU};
-
-/// A photon leaving a light.
-#[derive(Clone, Copy, Debug)]
-pub struct EmissionSample {
-    /// Origin.
-    pub p: Vec3,
-    /// Bound of the rounding error of `p` per axis; zero without a surface.
-    pub p_error: Vec3,
-    /// Normal of the surface there, on the emitting side; zero without a surface.
-    pub n: Vec3,
-    /// Unit direction, away from the light.
-    pub d: Vec3,
-    /// Its power (W): Le·|cos θ| divided by the densities of position and direction. Its mean is the emitted flux.
-    pub power: Rgb,
-}
-
-/// A point of a surface, and the radiance that leaves it in a direction.
-#[derive(Clone, Copy, Debug)]
-pub struct EmittingPoint {
-    /// The point.
-    pub p: Vec3,
-    /// Bound of its rounding error per axis.
-    pub p_error: Vec3,
-    /// Normal on the side of the direction.
-    pub n: Vec3,
-    /// Density of the point (1/m²).
-    pub pdf_area: f32,
-    /// Radiance that leaves the point; black on a side that does not emit.
-    pub radiance: Rgb,
-}
-
-impl EmissionSample {
-    /// A photon of a light without a surface.
-    pub(super) fn in_space(p: Vec3, d: Vec3, power: Rgb) -> Option<Self> {
-        EmissionSample { p, p_error: Vec3::ZERO, n: Vec3::ZERO, d, power }.if_lit()
-    }
-
-    /// `None` if it carries no power or is not finite.
-    fn if_lit(self) -> Option<Self> {
-        (!self.power.is_black() && self.power.is_finite() && self.p.is_finite() && self.d.is_finite()).then_some(self)
-    }
-}
 
 impl Light {
     /// Samples light that leaves this source into a scene with a bounding sphere of the given centre and radius (m).

@@ -13,8 +13,10 @@
 //! E is not available for other lights, for flat lights at grazing angles, or for surfaces with alpha masks, whose
 //! extent differs from the shape. These count as black, in E and in L̄.
 
-use super::area::{AreaLight, AreaShape};
-use super::{Light, LightId, LightSet};
+use super::choice::set::LightSet;
+use super::kinds::area::{AreaLight, AreaShape};
+use super::light::Light;
+use super::light_sample::LightId;
 use crate::geometry::GeometryId;
 use glam::DVec3;
 use lumiris_numbers::math::{Rgb, Vec3, sqr};

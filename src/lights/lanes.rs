@@ -1,7 +1,7 @@
-//! Vectorised sampling of one infinite light, as a structure of arrays. [`super::many`] has the kernels for area
-//! lights, where the points differ.
+//! Vectorised sampling of one infinite light, as a structure of arrays. [`super::choice::many`] has the kernels for
+//! area lights, where the points differ.
 
-use super::Light;
+use super::light::Light;
 
 pub use lumiris_lanes::LightLanes;
 

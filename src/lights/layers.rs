@@ -1,6 +1,6 @@
 //! Light groups: sets of lights with their own layer in the image.
 
-use super::LightId;
+use super::light_sample::LightId;
 use std::collections::HashMap;
 use std::sync::Arc;
 
@@ -41,8 +41,8 @@ impl LightLayers {
 
     /// The layer of a light. Layers must exist.
     #[inline]
-    pub fn of(&self, light: LightId) -> usize {
-        self.of_light[light as usize] as usize
+    pub fn of(&self, light: LightId) -> u32 {
+        self.of_light[light as usize]
     }
 }
 

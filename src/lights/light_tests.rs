@@ -1,7 +1,6 @@
 //! The sampling routine of every area light compared with its pdf, and with irradiances in closed form.
 
-use super::area::AreaShape;
-use super::{AreaLight, Emission, Light, LightCtx, LightHit, area_lights_of};
+use super::{AreaLight, AreaShape, Emission, Light, LightCtx, LightHit, area_lights_of};
 use crate::geometry::{BilinearMesh, Quadric, QuadricKind, Shape, TriangleMesh};
 use lumiris_numbers::math::warp::{invert_uniform_triangle, sample_uniform_triangle};
 use lumiris_numbers::math::{Affine3A, Mat3, Quat, Rgb, Vec2, Vec3};

@@ -1,6 +1,6 @@
 //! Shading frames, optionally perturbed by a normal map or a displacement texture [Blinn 1978].
 
-use super::{Material, MaterialEntry, NormalMap};
+use super::material::{Material, MaterialEntry, NormalMap};
 use crate::geometry::SurfaceHit;
 use crate::textures::{FloatTextureId, TextureContext, TextureSet};
 use lumiris_numbers::math::{Frame, Vec2, Vec3};

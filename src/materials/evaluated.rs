@@ -1,6 +1,6 @@
 //! Materials whose BSDF can only be evaluated, see [`crate::bsdfs::models`].
 
-use super::Textures;
+use super::parameters::Textures;
 use crate::bsdfs::Model;
 use crate::bsdfs::models::{AshikhminShirley, CookTorrance, CosineLobe, LobeAxis, OrenNayar};
 use crate::textures::{FloatTextureId, RgbTextureId};

@@ -1,6 +1,6 @@
 //! The material `hair`: textures at a hit → a fibre.
 
-use super::{Textures, valid_eta};
+use super::parameters::{Textures, valid_eta};
 use crate::bsdfs::Hair;
 use crate::bsdfs::hair::HairLobes;
 use crate::textures::{FloatTextureId, RgbTextureId};

@@ -1,6 +1,6 @@
 //! The material of [`crate::bsdfs::principled`].
 
-use super::{Textures, distribution_of};
+use super::parameters::{Textures, distribution_of};
 use crate::bsdfs::Principled;
 use crate::bsdfs::principled::{Interior, rough};
 use crate::bsdfs::sheen::{LEAST_ALPHA, Sheen};

@@ -3,7 +3,7 @@
 //! As in pbrt-v4, sample i of n of a dense grid lies at (i + ½)/n, and the samples beyond the outermost ones are zero.
 //! A sparse grid has a map from its indices to positions.
 
-use super::Coefficients;
+use super::coefficients::Coefficients;
 use super::sparse::SparseSamples;
 use lumiris_numbers::math::{Rgb, Vec3};
 use std::ops::{Add, Mul};

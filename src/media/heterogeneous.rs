@@ -14,9 +14,11 @@
 //! This is unbiased for any σ̄ > 0, also where σ_t exceeds σ̄ and σ_n is negative. The estimated bounds of clouds rely
 //! on this.
 
+use super::cloud::Cloud;
+use super::coefficients::Coefficients;
+use super::grid::{RgbGrid, Scalars, UniformGrid};
 use super::majorants::{MajorantGrid, Pieces};
 use super::track::{End, Flight, Glimpse, Numbers, Segment};
-use super::{Cloud, Coefficients, RgbGrid, Scalars, UniformGrid};
 use lumiris_numbers::math::{Affine3A, Bounds3, DAffine3, DVec3, Rgb, Vec3};
 
 /// The spatially varying field.

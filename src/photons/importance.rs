@@ -8,7 +8,7 @@
 //! expectation of every map, or photons with p < ε are dropped, which loses their light.
 
 use super::error::PhotonError;
-use super::map::{GatherScratch, PhotonMap, Place, Search};
+use super::map::{GatherPoint, GatherScratch, PhotonMap, Search};
 use super::path::{BATCH, domain, path_stream};
 use super::photon::{Origin, Photon};
 use super::walk::{Particle, WalkSettings, Walker};
@@ -110,7 +110,7 @@ impl Importance {
 
 /// Importance per area (1/m²).
 fn density(map: &PhotonMap, p: Vec3, n: Vec3, search: Search, scratch: &mut GatherScratch) -> f32 {
-    map.irradiance(&Place::flat(p, n), search, scratch).average()
+    map.irradiance(&GatherPoint::flat(p, n), search, scratch).average()
 }
 
 /// Traces importons on all threads of the current pool.
@@ -146,7 +146,7 @@ pub fn importons(job: &RenderJob, seed: u32, paths: u64, max_depth: u32) -> Vec<
     trace(job, seed ^ SEEDS[0], paths, max_depth, false).0
 }
 
-/// Importons at their arrivals, and the number of rays. If `only_first`, only the first arrival of each path.
+/// Importons at their arrivals, and the number of rays. If `only_first`, only the first hit of each path.
 fn trace(job: &RenderJob, seed: u32, count: u64, max_depth: u32, only_first: bool) -> (Vec<Photon>, u64) {
     let settings = WalkSettings { transport: Transport::Radiance, max_depth };
     let power = Rgb::splat((1.0 / count as f64) as f32);
@@ -160,14 +160,14 @@ fn trace(job: &RenderJob, seed: u32, count: u64, max_depth: u32, only_first: boo
             walker.active.clear();
             walker.active.extend((0..).zip(paths).map(|(i, t)| emit(job, seed, i, t, power)));
             let mut importons: Vec<(u32, Photon)> = Vec::new();
-            walker.walk(job, &settings, |arrival| {
-                let (wi, n, particle) = (arrival.wi, arrival.n, arrival.particle);
-                let importon = |wi, n| (particle.index, Photon::new(arrival.p, wi, n, particle.power, particle.origin));
-                if !arrival.part.reflectance.is_black() {
+            walker.walk(job, &settings, |hit| {
+                let (wi, n, particle) = (hit.wi, hit.n, hit.particle);
+                let importon = |wi, n| (particle.index, Photon::new(hit.p, wi, n, particle.power, particle.origin));
+                if !hit.part.reflectance.is_black() {
                     importons.push(importon(wi, n));
                 }
                 // Light on the other side matters as well
-                if !arrival.part.transmittance.is_black() {
+                if !hit.part.transmittance.is_black() {
                     importons.push(importon(wi - n * (2.0 * wi.dot(n)), -n));
                 }
             });

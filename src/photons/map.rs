@@ -30,7 +30,7 @@ const MIN_COS: f32 = 0.01;
 
 /// A point on a surface, on one side.
 #[derive(Clone, Copy, Debug)]
-pub struct Place {
+pub struct GatherPoint {
     /// The point.
     pub p: Vec3,
     /// Geometric normal on the illuminated side, unit.
@@ -39,10 +39,10 @@ pub struct Place {
     pub ns: Vec3,
 }
 
-impl Place {
+impl GatherPoint {
     /// A point whose shading normal is the geometric normal.
     pub fn flat(p: Vec3, n: Vec3) -> Self {
-        Place { p, n, ns: n }
+        GatherPoint { p, n, ns: n }
     }
 }
 
@@ -127,7 +127,7 @@ impl PhotonMap {
     /// of the kernel (m), which is 0 without photons.
     pub fn gather(
         &self,
-        at: &Place,
+        at: &GatherPoint,
         search: Search,
         scratch: &mut GatherScratch,
         mut f: impl FnMut(&Photon, f32),
@@ -172,14 +172,14 @@ impl PhotonMap {
     }
 
     /// Irradiance about the shading normal (W/m²).
-    pub fn irradiance(&self, at: &Place, search: Search, scratch: &mut GatherScratch) -> Rgb {
+    pub fn irradiance(&self, at: &GatherPoint, search: Search, scratch: &mut GatherScratch) -> Rgb {
         let mut sum = Rgb::BLACK;
         self.gather(at, search, scratch, |photon, weight| sum += photon.power() * weight);
         sum
     }
 }
 
-impl Place {
+impl GatherPoint {
     /// The squared distance of a photon at offset `d`, of squared length `d2`; `None` if it does not count.
     #[inline]
     fn distance_squared(&self, photon: &Photon, d: Vec3, d2: f32, bound: f32) -> Option<f32> {
@@ -222,7 +222,7 @@ impl Kernel {
 
 /// All photons within a radius.
 struct Within<'a, F> {
-    at: &'a Place,
+    at: &'a GatherPoint,
     kernel: Kernel,
     f: &'a mut F,
 }
@@ -246,7 +246,7 @@ impl<F: FnMut(&Photon, f32)> Visit for Within<'_, F> {
 
 /// The nearest photons so far.
 struct Nearest<'a> {
-    at: &'a Place,
+    at: &'a GatherPoint,
     count: usize,
     /// Squared distance of the farthest photon, once there are k.
     bound: f32,

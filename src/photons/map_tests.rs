@@ -1,4 +1,4 @@
-use super::{GatherScratch, Origin, Photon, PhotonMap, Place, Search};
+use super::{GatherPoint, GatherScratch, Origin, Photon, PhotonMap, Search};
 use lumiris_numbers::estimators::stats::{Welford, t_test};
 use lumiris_numbers::math::warp::{sample_cosine_hemisphere, sample_uniform_sphere};
 use lumiris_numbers::math::{Frame, Rgb, Vec3};
@@ -41,7 +41,7 @@ fn the_irradiance_of_even_photons_is_exact_on_average() {
         let mut estimates = Welford::default();
         for _ in 0..3000 {
             let map = PhotonMap::new(plane(400.0, 0.0, Vec3::Y, &mut stream));
-            let at = Place::flat(Vec3::new(0.1, 0.0, -0.05), Vec3::Y);
+            let at = GatherPoint::flat(Vec3::new(0.1, 0.0, -0.05), Vec3::Y);
             estimates.add(f64::from(map.irradiance(&at, search, &mut GatherScratch::default()).g));
         }
         let test = t_test(&estimates, 1.0);
@@ -58,10 +58,10 @@ fn a_thin_wall_that_is_lit_on_one_side_is_black_on_the_other() {
     let mut scratch = GatherScratch::default();
     for search in searches() {
         for depth in [0.0, 1e-5, 1e-3, 0.02] {
-            let behind = Place::flat(Vec3::new(0.0, -depth, 0.0), -Vec3::Y);
+            let behind = GatherPoint::flat(Vec3::new(0.0, -depth, 0.0), -Vec3::Y);
             assert_eq!(map.irradiance(&behind, search, &mut scratch), Rgb::BLACK, "{search:?}");
         }
-        let lit = Place::flat(Vec3::ZERO, Vec3::Y);
+        let lit = GatherPoint::flat(Vec3::ZERO, Vec3::Y);
         assert!(map.irradiance(&lit, search, &mut scratch).g > 0.05);
     }
 }
@@ -77,7 +77,7 @@ fn photons_off_the_tangent_plane_and_of_other_normals_do_not_count() {
         (Vec3::new(0.1, 0.0, 0.0), Vec3::new(0.2, 0.5, 0.0).normalize(), true),
     ] {
         let map = PhotonMap::new(vec![Photon::new(p, n, n, Rgb::WHITE, Origin::Diffuse)]);
-        let at = Place::flat(Vec3::ZERO, Vec3::Y);
+        let at = GatherPoint::flat(Vec3::ZERO, Vec3::Y);
         let e = map.irradiance(&at, Search::Radius(1.0), &mut scratch).g;
         assert_eq!(e > 0.0, counts, "{p} {n}");
     }
@@ -85,7 +85,7 @@ fn photons_off_the_tangent_plane_and_of_other_normals_do_not_count() {
     let n = Vec3::new(0.5, 1.0, 0.0).normalize();
     let photon = Photon::new(Vec3::ZERO, Vec3::new(1.0, -0.1, 0.0).normalize(), n, Rgb::WHITE, Origin::Diffuse);
     let map = PhotonMap::new(vec![photon]);
-    assert_eq!(map.irradiance(&Place::flat(Vec3::ZERO, Vec3::Y), Search::Radius(1.0), &mut scratch), Rgb::BLACK);
+    assert_eq!(map.irradiance(&GatherPoint::flat(Vec3::ZERO, Vec3::Y), Search::Radius(1.0), &mut scratch), Rgb::BLACK);
 }
 
 #[test]
@@ -94,7 +94,7 @@ fn irradiance_is_about_the_shading_normal() {
     let mut stream = pcg32([1, 4, 79]);
     let map = PhotonMap::new(plane(400_000.0, 0.0, Vec3::Y, &mut stream));
     let ns = Vec3::new(0.6, 0.8, 0.0);
-    let at = Place { p: Vec3::ZERO, n: Vec3::Y, ns };
+    let at = GatherPoint { p: Vec3::ZERO, n: Vec3::Y, ns };
     let e = map.irradiance(&at, Search::Radius(0.8), &mut GatherScratch::default()).g;
     // About 2·10⁵ photons, weighted by the kernel and the ratio of cosines
     assert!((e - 0.9).abs() < 0.015, "{e}");
@@ -115,7 +115,7 @@ fn searches_find_what_a_scan_finds() {
     let mut scratch = GatherScratch::default();
     for i in 0..200 {
         let q = photons[i * 13].p() + sample_uniform_sphere(stream.random::<[f32; 2]>()) * (0.01 * (i % 3) as f32);
-        let at = Place::flat(q, Vec3::Y);
+        let at = GatherPoint::flat(q, Vec3::Y);
         let mut distances: Vec<f32> =
             photons.iter().map(|p| (p.p() - q).length_squared().max(16.0 * (p.p() - q).y.powi(2))).collect();
         distances.sort_by(f32::total_cmp);
@@ -135,7 +135,7 @@ fn nearest_photons_and_a_radius_agree() {
     let map = PhotonMap::new(plane(200_000.0, 0.0, Vec3::Y, &mut stream));
     let mut scratch = GatherScratch::default();
     for i in 0..20 {
-        let at = Place::flat(Vec3::new(0.03 * i as f32, 0.0, -0.2), Vec3::Y);
+        let at = GatherPoint::flat(Vec3::new(0.03 * i as f32, 0.0, -0.2), Vec3::Y);
         let near = map.irradiance(&at, Search::Nearest { count: 5000, max_radius: 1.0 }, &mut scratch).g;
         let mut radius = 0.0;
         radius += map.gather(&at, Search::Nearest { count: 5000, max_radius: 1.0 }, &mut scratch, |_, _| ());
@@ -155,7 +155,7 @@ fn a_million_photons_on_a_plane_are_sorted_fast_and_found() {
     assert!(map.bytes() < 31 * map.len() as u64);
     let mut scratch = GatherScratch::default();
     let search = Search::Nearest { count: 1000, max_radius: 0.5 };
-    let e = map.irradiance(&Place::flat(Vec3::new(0.3, 0.0, 0.4), Vec3::Y), search, &mut scratch).g;
+    let e = map.irradiance(&GatherPoint::flat(Vec3::new(0.3, 0.0, 0.4), Vec3::Y), search, &mut scratch).g;
     // σ is about √(4/3/1000) = 0.037
     assert!((e - 1.0).abs() < 0.2, "{e}");
 }
@@ -163,7 +163,7 @@ fn a_million_photons_on_a_plane_are_sorted_fast_and_found() {
 #[test]
 fn photons_at_one_point_and_no_photons_do_no_harm() {
     let mut scratch = GatherScratch::default();
-    let at = Place::flat(Vec3::ZERO, Vec3::Y);
+    let at = GatherPoint::flat(Vec3::ZERO, Vec3::Y);
     let empty = PhotonMap::new(Vec::new());
     assert!(empty.is_empty() && empty.bytes() == 0);
     let one_point = PhotonMap::new(vec![Photon::new(Vec3::ZERO, Vec3::Y, Vec3::Y, Rgb::WHITE, Origin::Diffuse); 1000]);

@@ -27,6 +27,6 @@ mod walk;
 pub use error::PhotonError;
 pub use importance::{Importance, ImportanceSettings, LowImportance, importons, trace_importons};
 pub use light_distribution::LightDistribution;
-pub use map::{GatherScratch, PhotonMap, Place, Search};
+pub use map::{GatherPoint, GatherScratch, PhotonMap, Search};
 pub use photon::{Origin, Photon};
 pub use trace::{PhotonBudget, Traced, Tracing, path_count, trace_photons};

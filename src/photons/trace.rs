@@ -15,7 +15,7 @@ use super::light_distribution::LightDistribution;
 use super::map::GatherScratch;
 use super::path::{BATCH, domain, path_stream};
 use super::photon::{Origin, Photon};
-use super::walk::{Arrival, Particle, WalkSettings, Walker};
+use super::walk::{Particle, ParticleHit, WalkSettings, Walker};
 use crate::bsdfs::dielectric::Transport;
 use crate::lights::LightSet;
 use crate::scene::RenderJob;
@@ -295,13 +295,13 @@ impl<'a> Run<'a> {
         walker.active.extend((0_u32..).zip(paths.clone()).filter_map(|(i, t)| self.emit(i, t)));
         let settings = WalkSettings { transport: Transport::Importance, max_depth: self.tracing.max_depth };
         let mut batch = Batch::default();
-        walker.walk(self.job, &settings, |arrival| {
-            if arrival.part.reflectance.is_black() && arrival.part.transmittance.is_black() {
+        walker.walk(self.job, &settings, |hit| {
+            if hit.part.reflectance.is_black() && hit.part.transmittance.is_black() {
                 return;
             }
             batch.arrivals += 1;
-            let path = paths.start + u64::from(arrival.particle.index);
-            self.deposit(&mut batch, arrival, path, path < global, scratch);
+            let path = paths.start + u64::from(hit.particle.index);
+            self.deposit(&mut batch, hit, path, path < global, scratch);
         });
         batch.rays = walker.traced;
         // Stable sort from the order of vertices to the order of photon paths
@@ -324,29 +324,29 @@ impl<'a> Run<'a> {
         Some(Particle::new(index, ray, s.power / pmf, Origin::Primary(light), stream))
     }
 
-    /// Decides whether an arrival is stored, and stores it.
+    /// Decides whether a hit is stored, and stores it.
     fn deposit(
         &self,
         batch: &mut Batch,
-        arrival: &Arrival<'_>,
+        hit: &ParticleHit<'_>,
         path: u64,
         fills_global: bool,
         scratch: &mut GatherScratch,
     ) {
-        let particle = arrival.particle;
+        let particle = hit.particle;
         let deposits = match particle.origin {
             Origin::Caustic => &mut batch.caustic,
             Origin::Primary(_) | Origin::Diffuse
-                if !fills_global || arrival.scatterings > self.tracing.max_global_depth =>
+                if !fills_global || hit.scatterings > self.tracing.max_global_depth =>
             {
                 return;
             }
             Origin::Primary(_) | Origin::Diffuse => &mut batch.global,
         };
-        let p = self.importance.map_or(1.0, |importance| importance.probability(arrival.p, arrival.n, scratch));
-        if arrival.xi() < p {
+        let p = self.importance.map_or(1.0, |importance| importance.probability(hit.p, hit.n, scratch));
+        if hit.xi() < p {
             let power = particle.power * (1.0 / p);
-            deposits.push((path, Photon::new(arrival.p, arrival.wi, arrival.n, power, particle.origin)));
+            deposits.push((path, Photon::new(hit.p, hit.wi, hit.n, power, particle.origin)));
         }
     }
 }

@@ -61,7 +61,7 @@ impl Particle {
 }
 
 /// A particle at a surface that has a Lambertian part.
-pub(super) struct Arrival<'a> {
+pub(super) struct ParticleHit<'a> {
     pub(super) particle: &'a Particle,
     pub(super) p: Vec3,
     /// Unit direction towards the particle's origin.
@@ -74,7 +74,7 @@ pub(super) struct Arrival<'a> {
     stream: SampleStream,
 }
 
-impl Arrival<'_> {
+impl ParticleHit<'_> {
     /// The number that decides whether it is stored.
     pub(super) fn xi(&self) -> f32 {
         self.stream.domain(domain::DEPOSIT).draw_random(0)
@@ -85,7 +85,7 @@ impl Arrival<'_> {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct WalkSettings {
     pub(super) transport: Transport,
-    /// Maximum number of scattering events before an arrival.
+    /// Maximum number of scattering events before a hit.
     pub(super) max_depth: u32,
 }
 
@@ -105,13 +105,13 @@ pub(super) struct Walker {
 impl Walker {
     /// Traces the active particles until all have ended, and reports their arrivals at Lambertian surfaces in the order
     /// of vertices.
-    pub(super) fn walk(&mut self, job: &RenderJob, settings: &WalkSettings, mut arrive: impl FnMut(&Arrival<'_>)) {
+    pub(super) fn walk(&mut self, job: &RenderJob, settings: &WalkSettings, mut on_hit: impl FnMut(&ParticleHit<'_>)) {
         self.sort(job);
         let mut coherence = Coherence::Packets;
         for vertex in 0..=settings.max_depth {
             self.next.clear();
             while !self.active.is_empty() {
-                self.step(job, settings, (vertex, coherence), &mut arrive);
+                self.step(job, settings, (vertex, coherence), &mut on_hit);
                 coherence = Coherence::Incoherent;
             }
             std::mem::swap(&mut self.active, &mut self.next);
@@ -139,7 +139,7 @@ impl Walker {
         job: &RenderJob,
         settings: &WalkSettings,
         (vertex, coherence): (u32, Coherence),
-        arrive: &mut impl FnMut(&Arrival<'_>),
+        on_hit: &mut impl FnMut(&ParticleHit<'_>),
     ) {
         self.rays.clear();
         self.active.iter().for_each(|particle| self.rays.push(&particle.ray));
@@ -150,7 +150,7 @@ impl Walker {
         self.passing.clear();
         for (particle, hit) in self.active.iter().zip(&self.hits) {
             let Some(hit) = hit else { continue };
-            let interaction = SurfaceInteraction::new(job, &particle.ray, (0.0, 0.0), hit);
+            let interaction = SurfaceInteraction::new(job, &particle.ray, 0.0, 0.0, hit);
             let Some(bsdf) = interaction.scatter(job) else {
                 if particle.passed < MAX_PASSED {
                     let ray = Ray { o: interaction.origin(particle.ray.d), ..particle.ray };
@@ -159,12 +159,12 @@ impl Walker {
                 continue;
             };
 
-            // Report the arrival
+            // Report the hit
             let stream = particle.stream.domain(domain::VERTEX + vertex);
             let part = bsdf.lambertian(interaction.wo);
             if let Some(part) = &part {
                 let n = if bsdf.n.dot(interaction.wo) < 0.0 { -bsdf.n } else { bsdf.n };
-                arrive(&Arrival {
+                on_hit(&ParticleHit {
                     particle,
                     p: interaction.surface.p,
                     wi: interaction.wo,

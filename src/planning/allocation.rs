@@ -8,8 +8,8 @@
 //!
 //! The variance of visible emission is concentrated in few pixels, at the edges of lights. It is measured by more
 //! samples than the rest: emission rays, which cost little. The variance of the rest is averaged over neighbours. In
-//! the image, too, samples may have several emission rays (`render::looks`). Their number follows from their own
-//! variance and cost as if they were independent. Low-discrepancy samples need fewer for the relative error, which
+//! the image, too, samples may have several emission rays (`render::emission_rays`). Their number follows from their
+//! own variance and cost as if they were independent. Low-discrepancy samples need fewer for the relative error, which
 //! would fall by 5 %, but the absolute error would triple.
 //!
 //! The gain is estimated from the pilot, too: on one half of the pixels, with counts computed from the other half.
@@ -19,8 +19,8 @@
 
 use super::allocation_counts::{ALONE, Pixel, Rules, SHARED, Share, counts};
 use super::constants::{
-    COST_TILE, EDGE_RATIO, FEW_PIXELS, LOOK_COST, MAX_SPP_FOR_NOISE, PILOT_SPP, SIGHT_OF_EDGES, SIGHT_PART,
-    SIGHT_RADIUS, SIGHT_SPP, TILES_AT_ONCE,
+    COST_TILE, EDGE_FACTOR, EDGE_RATIO, EMISSION_DIVISOR, EMISSION_RADIUS, EMISSION_RAY_COST, EMISSION_SPP, FEW_PIXELS,
+    MAX_SPP_FOR_NOISE, PILOT_SPP, TILES_AT_ONCE,
 };
 use super::noise::counts_for;
 use super::preparation::{PlanError, Preparation, Stage};
@@ -55,10 +55,10 @@ pub(super) fn allocate(job: &RenderJob, how: &Preparation<'_>) -> Result<Option<
     let mut pilot = Pilot::new(job, how);
     let spp = settings.sampling.spp;
     pilot.measure();
-    let (counts, looks) = counts(&pilot.known(|_| true, &[0, 1]), (&pilot.rules, spp));
+    let (counts, emission_rays) = counts(&pilot.estimates(|_| true, &[0, 1]), &pilot.rules, spp);
     let is_better = pilot.gain(spp) >= pilot.rules.min_gain;
     how.goes_on()?;
-    Ok(is_better.then_some(PixelSamples { bounds: pilot.bounds, spp, counts, looks }))
+    Ok(is_better.then_some(PixelSamples { bounds: pilot.bounds, spp, counts, emission_rays }))
 }
 
 /// Completes settings with a target noise: sets the maximum number of samples per pixel unless `has_spp`. `Err` names
@@ -97,12 +97,12 @@ struct Measured {
     /// Variance of these; 0 for fewer than two samples.
     variance: [f32; 3],
     /// Mean visible emission.
-    sight: [f32; 3],
+    emission: [f32; 3],
     /// Variance of the visible emission, from each of two sets of emission rays.
-    sight_variance: [[f32; 3]; 2],
+    emission_variance: [[f32; 3]; 2],
     /// Cost of a sample, and of an emission ray; 0 if nothing was measured.
     cost: f32,
-    look: f32,
+    ray_cost: f32,
     /// Material of the first surface, or [`NO_MATERIAL`].
     material: u32,
 }
@@ -111,26 +111,27 @@ struct Measured {
 const NO_MATERIAL: u32 = u32::MAX;
 
 impl Measured {
-    fn of(samples: &PixelAccumulator, sight: &Sight, [cost, look]: [f64; 2]) -> Self {
+    fn of(samples: &PixelAccumulator, emission: &EmissionSums, [cost, ray_cost]: [f64; 2]) -> Self {
         let sums = samples.sums();
-        let [a, b] = sight.sets.each_ref().map(PixelAccumulator::sums);
+        let [a, b] = emission.sets.each_ref().map(PixelAccumulator::sums);
         Measured {
             count: sums.count as u32,
             radiance: sums.radiance.map(|x| x as f32),
             variance: variance(&sums).map(|v| v as f32),
-            sight: std::array::from_fn(|c| {
+            emission: std::array::from_fn(|c| {
                 ((a.radiance[c] + b.radiance[c]) / (a.count + b.count).max(1) as f64) as f32
             }),
-            sight_variance: [a, b].map(|sums| variance(&sums).map(|v| v as f32)),
+            emission_variance: [a, b].map(|sums| variance(&sums).map(|v| v as f32)),
             cost: cost as f32,
-            look: look as f32,
-            material: sight.material,
+            ray_cost: ray_cost as f32,
+            material: emission.material,
         }
     }
 
     /// Variance of the visible emission, averaged over the given sets.
-    fn mean_sight_variance(&self, sets: &[usize]) -> [f64; 3] {
-        let of = |c: usize| sets.iter().map(|&k| f64::from(self.sight_variance[k][c])).sum::<f64>() / sets.len() as f64;
+    fn mean_emission_variance(&self, sets: &[usize]) -> [f64; 3] {
+        let of =
+            |c: usize| sets.iter().map(|&k| f64::from(self.emission_variance[k][c])).sum::<f64>() / sets.len() as f64;
         [0, 1, 2].map(of)
     }
 }
@@ -141,7 +142,7 @@ fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
 }
 
 /// Two sets of emission rays of a pixel, and the material of the first surface.
-struct Sight {
+struct EmissionSums {
     sets: [PixelAccumulator; 2],
     material: u32,
 }
@@ -174,7 +175,7 @@ struct PilotSampling {
     /// Edge of the blocks of pixels that are sampled together and share paths (pixels).
     edge: u32,
     /// Emission rays per pixel in each of the two sets.
-    sight: u32,
+    emission: u32,
 }
 
 impl<'a> Pilot<'a> {
@@ -189,7 +190,7 @@ impl<'a> Pilot<'a> {
             fraction: (wanted / f64::from(spp)) as f32,
             seed: pcg4d([sampling.seed, PILOT_SEED, 0, 0])[0],
             edge,
-            sight: (sampling.pilot_spp() / SIGHT_PART).clamp(SIGHT_SPP[0], SIGHT_SPP[1]),
+            emission: (sampling.pilot_spp() / EMISSION_DIVISOR).clamp(EMISSION_SPP[0], EMISSION_SPP[1]),
         };
         let bounds = job.world.scene.film.bounds;
         let pixels = vec![Measured::default(); bounds.area()];
@@ -214,9 +215,8 @@ impl<'a> Pilot<'a> {
         for tiles in tiles.chunks(TILES_AT_ONCE) {
             let measured: Vec<_> = tiles.par_iter().map_init(probe, of_tile).collect();
             for (tile, measured) in tiles.iter().zip(measured) {
-                for ([x, y], measured) in tile.pixels().zip(measured) {
-                    let row = (y - self.bounds.y0) as usize * self.bounds.width() as usize;
-                    self.pixels[row + (x - self.bounds.x0) as usize] = measured;
+                for (pixel, measured) in tile.pixels().zip(measured) {
+                    self.pixels[self.bounds.index_of(pixel)] = measured;
                 }
             }
         }
@@ -224,23 +224,23 @@ impl<'a> Pilot<'a> {
 
     /// Pixels at most `radius` from pixel `i` in both directions.
     fn around(&self, i: usize, radius: usize) -> impl Iterator<Item = usize> + use<> {
-        around(i, (self.bounds.width() as usize, self.bounds.height() as usize), radius)
+        around(i, [self.bounds.width() as usize, self.bounds.height() as usize], radius)
     }
 
     /// 1/(m² + ε) per channel. m is the visible emission of the pixel plus the mean of the rest over its neighbours.
     fn relative_to(&self, i: usize) -> [f64; 3] {
-        self.relative_beside(i, self.pixels[i].sight.map(f64::from))
+        self.relative_beside(i, self.pixels[i].emission.map(f64::from))
     }
 
     /// The same for the given visible emission.
-    fn relative_beside(&self, i: usize, sight: [f64; 3]) -> [f64; 3] {
+    fn relative_beside(&self, i: usize, emission: [f64; 3]) -> [f64; 3] {
         let (mut sum, mut count) = ([0.0; 3], 0);
         for q in self.around(i, self.rules.mean_radius).map(|q| &self.pixels[q]) {
             count += q.count;
             (0..3).for_each(|c| sum[c] += f64::from(q.radiance[c]));
         }
         std::array::from_fn(|c| {
-            let mean = sight[c] + sum[c] / f64::from(count.max(1));
+            let mean = emission[c] + sum[c] / f64::from(count.max(1));
             1.0 / (mean * mean + DEFAULT_EPSILON)
         })
     }
@@ -253,42 +253,42 @@ impl<'a> Pilot<'a> {
     }
 
     /// Relative variance of the visible emission, by the given sets.
-    fn of_sight(&self, i: usize, sets: &[usize]) -> f64 {
-        let variance = self.pixels[i].mean_sight_variance(sets);
+    fn relative_emission_variance(&self, i: usize, sets: &[usize]) -> f64 {
+        let variance = self.pixels[i].mean_emission_variance(sets);
         if variance == [0.0; 3] { 0.0 } else { dot(variance, self.relative_to(i)) }
     }
 
     /// Estimates for each pixel. The relative variance without visible emission is averaged over chosen pixels: the
     /// neighbours, or all pixels with the same material. The variance of visible emission uses the given sets.
-    fn known(&self, is_chosen: impl Fn(usize) -> bool + Sync, sets: &[usize]) -> Vec<Pixel> {
-        let known = |i: usize| self.relative_variance(i).filter(|_| is_chosen(i));
+    fn estimates(&self, is_chosen: impl Fn(usize) -> bool + Sync, sets: &[usize]) -> Vec<Pixel> {
+        let variance = |i: usize| self.relative_variance(i).filter(|_| is_chosen(i));
         let rest = match self.rules.radius {
             Some(radius) => {
                 // Σ over neighbours, and their number
-                let terms = (0..self.bounds.area()).into_par_iter().map(|i| known(i).map_or([0.0; 2], |v| [v, 1.0]));
+                let terms = (0..self.bounds.area()).into_par_iter().map(|i| variance(i).map_or([0.0; 2], |v| [v, 1.0]));
                 box_sums(terms.collect(), self.bounds.width() as usize, radius)
             }
-            None => self.of_materials(known),
+            None => self.of_materials(variance),
         };
         // In a tile with few pixels, none may be sampled: it has the mean cost
         let (sum, count) =
             self.pixels.iter().filter(|p| p.cost > 0.0).fold((0.0, 0), |(sum, n), p| (sum + f64::from(p.cost), n + 1));
         let mean = (sum / f64::from(count.max(1))) as f32;
         let of_pixel = |(i, [sum, count]): (usize, [f64; 2])| {
-            let Measured { cost, look, .. } = self.pixels[i];
-            let cost = if cost == 0.0 && look > 0.0 { mean } else { cost };
+            let Measured { cost, ray_cost, .. } = self.pixels[i];
+            let cost = if cost == 0.0 && ray_cost > 0.0 { mean } else { cost };
             let rest = (sum.max(0.0) / count.max(1.0)) as f32;
-            Pixel { rest, sight: self.of_sight_around(i, sets) as f32, cost, look }
+            Pixel { rest, emission: self.emission_variance_around(i, sets) as f32, cost, ray_cost }
         };
         rest.into_par_iter().enumerate().map(of_pixel).collect()
     }
 
     /// Σ of the estimates over pixels with the same first material, and their number. A material with few pixels is
     /// close to the mean of all.
-    fn of_materials(&self, known: impl Fn(usize) -> Option<f64>) -> Vec<[f64; 2]> {
+    fn of_materials(&self, variance: impl Fn(usize) -> Option<f64>) -> Vec<[f64; 2]> {
         let (mut all, mut of_material) = ([0.0; 2], BTreeMap::<u32, [f64; 2]>::new());
         for (i, pixel) in self.pixels.iter().enumerate() {
-            let Some(v) = known(i) else { continue };
+            let Some(v) = variance(i) else { continue };
             for sums in [&mut all, of_material.entry(pixel.material).or_default()] {
                 *sums = [sums[0] + v, sums[1] + 1.0];
             }
@@ -301,21 +301,21 @@ impl<'a> Pilot<'a> {
 
     /// Relative variance of visible emission of a pixel, or of its neighbourhood if that is larger: a few samples do
     /// not hit the edge of a light in all pixels that it crosses.
-    fn of_sight_around(&self, i: usize, sets: &[usize]) -> f64 {
-        let (mut variance, mut sight, mut count) = ([0.0; 3], [0.0; 3], 0.0);
-        for q in self.around(i, SIGHT_RADIUS).map(|q| &self.pixels[q]) {
-            let of_pixel = q.mean_sight_variance(sets);
+    fn emission_variance_around(&self, i: usize, sets: &[usize]) -> f64 {
+        let (mut variance, mut emission, mut count) = ([0.0; 3], [0.0; 3], 0.0);
+        for q in self.around(i, EMISSION_RADIUS).map(|q| &self.pixels[q]) {
+            let of_pixel = q.mean_emission_variance(sets);
             (0..3).for_each(|c| {
                 variance[c] += of_pixel[c];
-                sight[c] += f64::from(q.sight[c]);
+                emission[c] += f64::from(q.emission[c]);
             });
             count += 1.0;
         }
         if variance == [0.0; 3] {
             return 0.0;
         }
-        let of_all = dot(variance, self.relative_beside(i, sight.map(|s| s / count))) / count;
-        of_all.max(self.of_sight(i, sets))
+        let of_all = dot(variance, self.relative_beside(i, emission.map(|s| s / count))) / count;
+        of_all.max(self.relative_emission_variance(i, sets))
     }
 
     /// Factor by which the counts reduce error × cost. It is measured on one half of the pixels with counts from the
@@ -326,24 +326,25 @@ impl<'a> Pilot<'a> {
         // Counts from even pixels and the first set
         let width = self.bounds.width() as usize;
         let is_even = |i: usize| (i % width + i / width).is_multiple_of(2);
-        let (counts, looks) = counts(&self.known(is_even, &[0]), (&self.rules, spp));
+        let (counts, emission_rays) = counts(&self.estimates(is_even, &[0]), &self.rules, spp);
 
         // Errors and costs of odd pixels by the second set, uniform and adaptive
         let (mut uniform, mut adaptive) = ([0.0; 3], [0.0; 3]);
         for i in (0..counts.len()).filter(|&i| !is_even(i)) {
             let Some(relative) = self.relative_variance(i) else { continue };
             let p = &self.pixels[i];
-            let [rest, sight] = [p.variance, p.sight_variance[1]].map(|v| v.iter().map(|v| f64::from(*v)).sum::<f64>());
-            let share = Share { samples: f64::from(counts[i]) / f64::from(spp), looks: looks[i] };
+            let [rest, emission] =
+                [p.variance, p.emission_variance[1]].map(|v| v.iter().map(|v| f64::from(*v)).sum::<f64>());
+            let share = Share { samples: f64::from(counts[i]) / f64::from(spp), emission_rays: emission_rays[i] };
             for (sums, share) in [(&mut uniform, Share::ONE), (&mut adaptive, share)] {
-                let known = |rest: f64, sight: f64| Pixel {
+                let pixel = |rest: f64, emission: f64| Pixel {
                     rest: rest as f32,
-                    sight: sight as f32,
+                    emission: emission as f32,
                     cost: p.cost,
-                    look: p.look,
+                    ray_cost: p.ray_cost,
                 };
-                let [relative, cost] = share.of(&known(relative, self.of_sight(i, &[1])));
-                let [absolute, _] = share.of(&known(rest, sight));
+                let [relative, cost] = share.of(&pixel(relative, self.relative_emission_variance(i, &[1])));
+                let [absolute, _] = share.of(&pixel(rest, emission));
                 sums.iter_mut().zip([relative, absolute, cost]).for_each(|(sum, term)| *sum += term);
             }
         }
@@ -387,73 +388,76 @@ fn pilot_tile(
     job: &RenderJob,
     probe: &mut Probe<'_>,
     tile: &PixelBounds,
-    PilotSampling { spp, fraction, seed, edge, sight: sight_spp }: PilotSampling,
+    PilotSampling { spp, fraction, seed, edge, emission: emission_spp }: PilotSampling,
 ) -> Vec<Measured> {
     // Choose blocks of pixels
     let settings = &Estimator::without_fits(&job.settings().integrator, 0);
     let origin = job.world.scene.film.bounds;
-    let seeing = &IntegratorSettings { max_depth: 0, ..*settings };
+    let only_emission = &IntegratorSettings { max_depth: 0, ..*settings };
     let is_chosen = |[x, y]: &[u32; 2]| {
         let [x, y] = [(x - origin.x0) / edge, (y - origin.y0) / edge];
         unit_f32(pcg4d([x, y, PILOT_SEED, 1])[0]) < fraction
     };
     let all: Vec<[u32; 2]> = tile.pixels().collect();
-    let (places, chosen): (Vec<usize>, Vec<[u32; 2]>) = (0..).zip(&all).filter(|(_, pixel)| is_chosen(pixel)).unzip();
+    let (indices, chosen): (Vec<usize>, Vec<[u32; 2]>) = (0..).zip(&all).filter(|(_, pixel)| is_chosen(pixel)).unzip();
 
     // Visible emission of the samples, which is subtracted from them
-    let mut seen = Vec::with_capacity(chosen.len() * spp as usize);
-    probe.trace(seeing, &chosen, (0..spp, seed), |_, sample| seen.push(sample.radiance));
+    let mut visible = Vec::with_capacity(chosen.len() * spp as usize);
+    probe.trace(only_emission, &chosen, 0..spp, seed, |_, sample| visible.push(sample.radiance));
     probe.take_cost(0);
 
     // Samples without visible emission
     let mut sums = vec![PixelAccumulator::default(); all.len()];
-    let mut seen = seen.into_iter();
-    probe.trace(settings, &chosen, (0..spp, seed), |i, sample| {
-        let radiance = sample.radiance - seen.next().unwrap_or_default();
-        sums[places[i]].add(0, &PixelSample { radiance, ..PixelSample::default() });
+    let mut visible = visible.into_iter();
+    probe.trace(settings, &chosen, 0..spp, seed, |i, sample| {
+        let radiance = sample.radiance - visible.next().unwrap_or_default();
+        sums[indices[i]].add(0, &PixelSample { radiance, ..PixelSample::default() });
     });
     let cost = probe.take_cost(chosen.len() * spp as usize);
 
     // Emission rays
-    let sight = see(probe, seeing, (&all, tile.width() as usize), (sight_spp, seed));
-    let looks: u64 = sight.iter().flat_map(|sight| &sight.sets).map(|sums| u64::from(sums.radiance.count)).sum();
-    let costs = [cost, LOOK_COST * probe.take_cost(looks as usize)];
-    sums.iter().zip(&sight).map(|(samples, sight)| Measured::of(samples, sight, costs)).collect()
+    let emission = emission_sums(probe, only_emission, &all, tile.width() as usize, emission_spp, seed);
+    let emission_rays: u64 =
+        emission.iter().flat_map(|emission| &emission.sets).map(|sums| u64::from(sums.radiance.count)).sum();
+    let costs = [cost, EMISSION_RAY_COST * probe.take_cost(emission_rays as usize)];
+    sums.iter().zip(&emission).map(|(samples, emission)| Measured::of(samples, emission, costs)).collect()
 }
 
 /// Two sets of emission rays, of pixels in rows of the given width. Pixels whose neighbours differ get more of them.
-fn see(
+fn emission_sums(
     probe: &mut Probe<'_>,
     settings: &IntegratorSettings,
-    (pixels, width): (&[[u32; 2]], usize),
-    (spp, seed): (u32, u32),
-) -> Vec<Sight> {
+    pixels: &[[u32; 2]],
+    width: usize,
+    spp: u32,
+    seed: u32,
+) -> Vec<EmissionSums> {
     // Samples of both sets, with seeds of their own
-    let none = || Sight { sets: <[PixelAccumulator; 2]>::default(), material: NO_MATERIAL };
-    let mut sums: Vec<Sight> = std::iter::repeat_with(none).take(pixels.len()).collect();
+    let none = || EmissionSums { sets: <[PixelAccumulator; 2]>::default(), material: NO_MATERIAL };
+    let mut sums: Vec<EmissionSums> = std::iter::repeat_with(none).take(pixels.len()).collect();
     let seeds = [1, 2].map(|set| pcg4d([seed, PILOT_SEED, 0, set])[0]);
-    let mut add = |places: &[usize], samples: std::ops::Range<u32>| {
-        let some: Vec<[u32; 2]> = places.iter().map(|&i| pixels[i]).collect();
+    let mut add = |indices: &[usize], samples: std::ops::Range<u32>| {
+        let some: Vec<[u32; 2]> = indices.iter().map(|&i| pixels[i]).collect();
         for (set, seed) in seeds.into_iter().enumerate() {
-            probe.trace(settings, &some, (samples.clone(), seed), |i, sample| {
-                let sight = &mut sums[places[i]];
-                sight.sets[set].add(0, sample);
-                sight.material = sample.features.as_ref().map_or(sight.material, |features| features.material);
+            probe.trace(settings, &some, samples.clone(), seed, |i, sample| {
+                let emission = &mut sums[indices[i]];
+                emission.sets[set].add(0, sample);
+                emission.material = sample.features.as_ref().map_or(emission.material, |features| features.material);
             });
         }
         let luminance = |sums: &PixelAccumulator| luminance(sums.radiance.values());
-        sums.iter().map(|sight| sight.sets.each_ref().map(luminance)).collect::<Vec<_>>()
+        sums.iter().map(|emission| emission.sets.each_ref().map(luminance)).collect::<Vec<_>>()
     };
 
     // All pixels, then those at edges
     let all: Vec<usize> = (0..pixels.len()).collect();
     let first = add(&all, 0..spp);
     let differs = |i: &usize| {
-        let around = around(*i, (width, pixels.len() / width), 1).flat_map(|q| first[q]);
+        let around = around(*i, [width, pixels.len() / width], 1).flat_map(|q| first[q]);
         let (low, high) = around.fold((f64::INFINITY, 0.0), |(a, b), v| (v.min(a), v.max(b)));
         high > EDGE_RATIO * low
     };
     let edges: Vec<usize> = all.iter().copied().filter(differs).collect();
-    add(&edges, spp..SIGHT_OF_EDGES * spp);
+    add(&edges, spp..EDGE_FACTOR * spp);
     sums
 }

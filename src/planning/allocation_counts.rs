@@ -1,6 +1,6 @@
 //! Numbers of camera samples and of emission rays per pixel, computed from variance and cost of both.
 
-use super::constants::{BISECTIONS, CHUNK, ITERATIONS, MAX_LOOKS, MIN_SPLIT, RANGE};
+use super::constants::{BISECTIONS, CHUNK, ITERATIONS, MAX_EMISSION_RAYS, MIN_SPLIT, RANGE};
 use rayon::prelude::*;
 
 /// Parameters of the computation.
@@ -32,11 +32,11 @@ pub(super) struct Pixel {
     /// Relative variance of a sample without visible emission.
     pub(super) rest: f32,
     /// Relative variance of the visible emission of a sample.
-    pub(super) sight: f32,
+    pub(super) emission: f32,
     /// Cost of a sample.
     pub(super) cost: f32,
     /// Cost of an emission ray.
-    pub(super) look: f32,
+    pub(super) ray_cost: f32,
 }
 
 /// Samples and emission rays of a pixel.
@@ -45,58 +45,58 @@ pub(super) struct Share {
     /// Samples, relative to the mean.
     pub(super) samples: f64,
     /// Emission rays per sample, including its own.
-    pub(super) looks: u8,
+    pub(super) emission_rays: u8,
 }
 
 impl Share {
     /// The share of every pixel if sampling is uniform.
-    pub(super) const ONE: Share = Share { samples: 1.0, looks: 1 };
+    pub(super) const ONE: Share = Share { samples: 1.0, emission_rays: 1 };
 
     /// Error and cost of a pixel with this share. The path of a sample includes one emission ray. If there are more,
     /// this ray is traced again, to separate its emission from the rest of the path.
     pub(super) fn of(self, pixel: &Pixel) -> [f64; 2] {
-        let Pixel { rest, sight, cost, look } = *pixel;
-        let looks = f64::from(self.looks);
-        let error = (f64::from(rest) + f64::from(sight) / looks) / self.samples;
-        let of_looks = if self.looks > 1 { looks * f64::from(look) } else { 0.0 };
-        [error, (f64::from(cost.max(1.0)) + of_looks) * self.samples]
+        let Pixel { rest, emission, cost, ray_cost } = *pixel;
+        let emission_rays = f64::from(self.emission_rays);
+        let error = (f64::from(rest) + f64::from(emission) / emission_rays) / self.samples;
+        let of_rays = if self.emission_rays > 1 { emission_rays * f64::from(ray_cost) } else { 0.0 };
+        [error, (f64::from(cost.max(1.0)) + of_rays) * self.samples]
     }
 
     /// The share with the least error + rate × cost. Samples and emission rays each follow from their own variance:
     /// n ∝ √(v/c).
     fn best(pixel: &Pixel, rate: f64, rules: &Rules) -> Share {
-        let [rest, sight, cost, look] =
-            [pixel.rest, pixel.sight, pixel.cost.max(1.0), pixel.look.max(1.0)].map(f64::from);
-        let all_looks = (sight / (look * rate)).sqrt();
-        let with_looks = |samples: f64| {
+        let [rest, emission, cost, ray_cost] =
+            [pixel.rest, pixel.emission, pixel.cost.max(1.0), pixel.ray_cost.max(1.0)].map(f64::from);
+        let all_rays = (emission / (ray_cost * rate)).sqrt();
+        let with_rays = |samples: f64| {
             // NaN if nothing varies, which `max` replaces by 1
-            let looks = (all_looks / samples + 0.5).max(1.0).min(f64::from(MAX_LOOKS));
-            Share { samples, looks: looks as u8 }
+            let emission_rays = (all_rays / samples + 0.5).max(1.0).min(f64::from(MAX_EMISSION_RAYS));
+            Share { samples, emission_rays: emission_rays as u8 }
         };
         let loss = |share: Share| {
             let [error, cost] = share.of(pixel);
             error + rate * cost
         };
         let limit = |variance: f64| (variance / (cost * rate)).sqrt().clamp(RANGE[0], RANGE[1]);
-        let together = if rules.doubles { 1.0 } else { limit(rest + sight) };
-        let first = Share { samples: together, looks: 1 };
+        let together = if rules.doubles { 1.0 } else { limit(rest + emission) };
+        let first = Share { samples: together, emission_rays: 1 };
         let mut best = (first, loss(first));
         let mut consider = |share: Share| {
             let loss = loss(share);
             best = if loss < best.1 { (share, loss) } else { best };
         };
         // Without visible emission, further emission rays are never worth their cost
-        let is_lit = sight > 0.0;
+        let is_lit = emission > 0.0;
         if rules.doubles {
             for samples in [1.0, 2.0, 4.0, 8.0] {
-                consider(Share { samples, looks: 1 });
+                consider(Share { samples, emission_rays: 1 });
                 if is_lit {
-                    consider(with_looks(samples));
+                    consider(with_rays(samples));
                 }
             }
         } else if is_lit {
-            consider(with_looks(together.max(MIN_SPLIT)));
-            consider(with_looks(limit(rest).max(MIN_SPLIT)));
+            consider(with_rays(together.max(MIN_SPLIT)));
+            consider(with_rays(limit(rest).max(MIN_SPLIT)));
         }
         best.0
     }
@@ -105,7 +105,7 @@ impl Share {
 /// Samples per pixel, and emission rays per sample. Minimises the error at the cost of `spp` samples everywhere. With
 /// [`Rules::doubles`], counts are 1, 2, 4 or 8 times `spp`, and minimise error × cost of the image. Pixels of cost 0,
 /// without estimates, are not counted.
-pub(super) fn counts(pixels: &[Pixel], (rules, spp): (&Rules, u32)) -> (Vec<u32>, Vec<u8>) {
+pub(super) fn counts(pixels: &[Pixel], rules: &Rules, spp: u32) -> (Vec<u32>, Vec<u8>) {
     let sums = |rate: f64| -> [f64; 2] {
         let of_chunk = |pixels: &[Pixel]| {
             pixels.iter().filter(|pixel| pixel.cost > 0.0).fold([0.0; 2], |sum, pixel| {
@@ -134,8 +134,8 @@ pub(super) fn counts(pixels: &[Pixel], (rules, spp): (&Rules, u32)) -> (Vec<u32>
         high.exp2()
     };
     let share = |pixel: &Pixel| {
-        let Share { samples, looks } = Share::best(pixel, rate, rules);
-        (((samples * f64::from(spp)).round() as u32).max(1), looks)
+        let Share { samples, emission_rays } = Share::best(pixel, rate, rules);
+        (((samples * f64::from(spp)).round() as u32).max(1), emission_rays)
     };
     pixels.par_iter().map(share).unzip()
 }
@@ -147,22 +147,22 @@ mod tests {
 
     /// Pixels with these variances and costs, without visible emission.
     fn pixels(variances: &[f32], costs: &[f32]) -> Vec<Pixel> {
-        let pixel = |(&rest, &cost): (&f32, &f32)| Pixel { rest, sight: 0.0, cost, look: 1.0 };
+        let pixel = |(&rest, &cost): (&f32, &f32)| Pixel { rest, emission: 0.0, cost, ray_cost: 1.0 };
         variances.iter().zip(costs).map(pixel).collect()
     }
 
     /// Sample counts of pixels without visible emission.
-    fn numbers(variances: &[f32], costs: &[f32], (rules, spp): (&Rules, u32)) -> Vec<u32> {
-        let (counts, looks) = counts(&pixels(variances, costs), (rules, spp));
-        assert!(looks.iter().all(|looks| *looks == 1));
+    fn numbers(variances: &[f32], costs: &[f32], rules: &Rules, spp: u32) -> Vec<u32> {
+        let (counts, emission_rays) = counts(&pixels(variances, costs), rules, spp);
+        assert!(emission_rays.iter().all(|n| *n == 1));
         counts
     }
 
     /// Error and cost of pixels with the computed counts.
-    fn error_and_cost(pixels: &[Pixel], (counts, looks): &(Vec<u32>, Vec<u8>), spp: u32) -> [f64; 2] {
-        let all = pixels.iter().zip(counts.iter().zip(looks));
-        all.fold([0.0; 2], |sum, (pixel, (&n, &looks))| {
-            let [error, cost] = Share { samples: f64::from(n) / f64::from(spp), looks }.of(pixel);
+    fn error_and_cost(pixels: &[Pixel], (counts, emission_rays): &(Vec<u32>, Vec<u8>), spp: u32) -> [f64; 2] {
+        let all = pixels.iter().zip(counts.iter().zip(emission_rays));
+        all.fold([0.0; 2], |sum, (pixel, (&n, &emission_rays))| {
+            let [error, cost] = Share { samples: f64::from(n) / f64::from(spp), emission_rays }.of(pixel);
             [sum[0] + error, sum[1] + cost]
         })
     }
@@ -172,7 +172,7 @@ mod tests {
         // Two in three pixels have a quarter of the variance of the third, and one of the two costs twice as much
         let weights: Vec<f32> = (0..300).map(|i| if i % 3 == 0 { 4.0 } else { 1.0 }).collect();
         let costs: Vec<f32> = (0..300).map(|i| if i % 3 == 1 { 2.0 } else { 1.0 }).collect();
-        let counts = numbers(&weights, &costs, (&ALONE, 64));
+        let counts = numbers(&weights, &costs, &ALONE, 64);
         assert!((f64::from(counts[0]) / f64::from(counts[2]) - 2.0).abs() < 0.05, "{:?}", &counts[..3]);
         assert!((f64::from(counts[2]) / f64::from(counts[1]) - SQRT_2).abs() < 0.05, "{:?}", &counts[..3]);
         let time: f64 = counts.iter().zip(&costs).map(|(&n, &c)| f64::from(n) * f64::from(c)).sum();
@@ -183,27 +183,27 @@ mod tests {
     #[test]
     fn no_pixel_has_less_than_half_or_more_than_eight_times_the_mean() {
         let weights: Vec<f32> = (0..1000_u16).map(|i| if i == 5 { 1e12 } else { f32::from(i % 2) * 1e-9 }).collect();
-        let counts = numbers(&weights, &[1.0; 1000], (&ALONE, 16));
+        let counts = numbers(&weights, &[1.0; 1000], &ALONE, 16);
         assert_eq!((counts[5], counts[0]), (128, 8));
         assert!(counts.iter().all(|n| (8..=128).contains(n)));
         for rules in [ALONE, SHARED] {
-            let still = numbers(&[0.0; 4], &[1.0; 4], (&rules, 16));
+            let still = numbers(&[0.0; 4], &[1.0; 4], &rules, 16);
             assert!(still.iter().all(|n| *n >= 1), "nothing varies: {still:?}");
         }
     }
 
     #[test]
-    fn what_varies_by_visible_lights_has_more_looks_and_not_more_paths() {
+    fn what_varies_by_visible_lights_has_more_emission_rays_and_not_more_paths() {
         // One pixel in 50 covers the edge of a lamp; a path costs 10 emission rays
         let pixel = |i: usize| Pixel {
             rest: 1.0,
-            sight: if i.is_multiple_of(50) { 400.0 } else { 0.0 },
+            emission: if i.is_multiple_of(50) { 400.0 } else { 0.0 },
             cost: 20.0,
-            look: 2.0,
+            ray_cost: 2.0,
         };
         let all: Vec<Pixel> = (0..1000).map(pixel).collect();
         for rules in [ALONE, SHARED] {
-            let given = counts(&all, (&rules, 64));
+            let given = counts(&all, &rules, 64);
             let (edge, other) = ((given.0[0], given.1[0]), (given.0[1], given.1[1]));
             assert_eq!(other.1, 1);
             // √(s c/(r c_look)) if neither count is at a limit
@@ -211,43 +211,47 @@ mod tests {
             assert!(edge.0 < 2 * other.0, "{edge:?} {other:?}");
             let [_, cost] = error_and_cost(&all, &given, 64);
             let uniform: f64 = all.iter().map(|pixel| f64::from(pixel.cost)).sum();
-            assert!(rules.doubles || (cost / uniform - 1.0).abs() < 0.01, "looks are in the time: {cost} {uniform}");
+            assert!(
+                rules.doubles || (cost / uniform - 1.0).abs() < 0.01,
+                "emission rays are in the time: {cost} {uniform}"
+            );
             // Much better than samples alone, and better than half or twice as many emission rays
-            let alone: Vec<Pixel> = all.iter().map(|p| Pixel { rest: p.rest + p.sight, sight: 0.0, ..*p }).collect();
+            let alone: Vec<Pixel> =
+                all.iter().map(|p| Pixel { rest: p.rest + p.emission, emission: 0.0, ..*p }).collect();
             let loss = |given: &(Vec<u32>, Vec<u8>)| error_and_cost(&all, given, 64).iter().product::<f64>();
-            assert!(loss(&given) < 0.65 * loss(&counts(&alone, (&rules, 64))));
-            for looks in [edge.1 / 2, 2 * edge.1] {
-                let changed = given.1.iter().map(|&n| if n > 1 { looks } else { 1 }).collect();
-                assert!(loss(&given) <= 1.001 * loss(&(given.0.clone(), changed)), "{looks}");
+            assert!(loss(&given) < 0.65 * loss(&counts(&alone, &rules, 64)));
+            for emission_rays in [edge.1 / 2, 2 * edge.1] {
+                let changed = given.1.iter().map(|&n| if n > 1 { emission_rays } else { 1 }).collect();
+                assert!(loss(&given) <= 1.001 * loss(&(given.0.clone(), changed)), "{emission_rays}");
             }
         }
         // If the rest varies as much, few additional emission rays are worth their cost
         let still: Vec<Pixel> = all.iter().map(|p| Pixel { rest: 400.0, ..*p }).collect();
-        assert!(counts(&still, (&ALONE, 64)).1.iter().all(|looks| *looks <= 3));
+        assert!(counts(&still, &ALONE, 64).1.iter().all(|n| *n <= 3));
     }
 
     #[test]
     fn who_is_split_has_as_many_samples_as_the_mean_at_least() {
         let power_of_two = |i: usize, by: usize| (i / by % 9) as f32 - 4.0;
         let pixel = |i: usize| {
-            let [rest, sight] = [1, 9].map(|by| 0.1 * power_of_two(i, by).exp2());
-            Pixel { rest, sight: 4.0 * sight, cost: 20.0, look: 2.0 }
+            let [rest, emission] = [1, 9].map(|by| 0.1 * power_of_two(i, by).exp2());
+            Pixel { rest, emission: 4.0 * emission, cost: 20.0, ray_cost: 2.0 }
         };
-        let (numbers, looks) = counts(&(0..810).map(pixel).collect::<Vec<_>>(), (&ALONE, 64));
-        assert!(looks.iter().any(|looks| *looks > 2));
-        assert!(numbers.iter().zip(&looks).all(|(&n, &looks)| looks == 1 || n >= 64));
+        let (numbers, emission_rays) = counts(&(0..810).map(pixel).collect::<Vec<_>>(), &ALONE, 64);
+        assert!(emission_rays.iter().any(|n| *n > 2));
+        assert!(numbers.iter().zip(&emission_rays).all(|(&n, &emission_rays)| emission_rays == 1 || n >= 64));
     }
 
     #[test]
-    fn pixels_of_which_nothing_is_known_have_no_part_in_the_cost() {
-        let known = Pixel { rest: 1.0, sight: 0.0, cost: 20.0, look: 2.0 };
-        let noisy = Pixel { rest: 4.0, ..known };
-        let some: Vec<Pixel> = (0..300).map(|i| if i % 3 == 0 { noisy } else { known }).collect();
+    fn pixels_that_are_not_measured_have_no_part_in_the_cost() {
+        let measured = Pixel { rest: 1.0, emission: 0.0, cost: 20.0, ray_cost: 2.0 };
+        let noisy = Pixel { rest: 4.0, ..measured };
+        let some: Vec<Pixel> = (0..300).map(|i| if i % 3 == 0 { noisy } else { measured }).collect();
         for rules in [ALONE, SHARED] {
-            let alone = counts(&some, (&rules, 64));
+            let alone = counts(&some, &rules, 64);
             let beside: Vec<Pixel> = some.iter().copied().chain(vec![Pixel::default(); 600]).collect();
-            let (numbers, looks) = counts(&beside, (&rules, 64));
-            assert_eq!((&numbers[..300], &looks[..300]), (&alone.0[..], &alone.1[..]));
+            let (numbers, emission_rays) = counts(&beside, &rules, 64);
+            assert_eq!((&numbers[..300], &emission_rays[..300]), (&alone.0[..], &alone.1[..]));
         }
     }
 
@@ -266,7 +270,7 @@ mod tests {
             }
         };
         let weights: Vec<f32> = (0..1000).map(weight).collect();
-        let counts = numbers(&weights, &[2.0; 1000], (&SHARED, 12));
+        let counts = numbers(&weights, &[2.0; 1000], &SHARED, 12);
         let all = pixels(&weights, &[2.0; 1000]);
         let loss = |counts: &[u32]| error_and_cost(&all, &(counts.to_vec(), vec![1; 1000]), 12).iter().product::<f64>();
         assert_eq!(counts[7], 96);

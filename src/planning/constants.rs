@@ -52,7 +52,7 @@ pub(super) const LIGHT_PILOT: u64 = 4;
 pub(super) const COLLISION_COST: f64 = 1.5;
 /// Factor on the counted cost of an emission ray. Measured: 0.9 to 2.5 in four scenes, relative to samples with one
 /// camera ray and 8 proposals.
-pub(super) const LOOK_COST: f64 = 2.0;
+pub(super) const EMISSION_RAY_COST: f64 = 2.0;
 
 // Trials: docs/measurements/efficiency/README.md#trials
 
@@ -70,21 +70,21 @@ pub(super) const MIN_GAIN: f64 = 1.03;
 pub(super) const MIN_ERRORS: f64 = 1.5;
 pub(super) const TUNE_GAIN: f64 = 1.1;
 
-// The pilot of adaptive sampling: docs/measurements/efficiency/README.md#looks
+// The pilot of adaptive sampling: docs/measurements/efficiency/README.md#emission_rays
 
 /// Minimum and maximum samples per pixel of the pilot. If the budget is below the minimum, the pilot samples a fraction
 /// of the pixels.
 pub(super) const PILOT_SPP: [u32; 2] = [2, 8];
-/// Emission rays per pixel in each of two sets: 1/[`SIGHT_PART`] of the samples of the image, within a minimum and a
-/// maximum.
-pub(super) const SIGHT_PART: u32 = 16;
-pub(super) const SIGHT_SPP: [u32; 2] = [1, 4];
+/// Emission rays per pixel in each of two sets: 1/[`EMISSION_DIVISOR`] of the samples of the image, within a minimum and
+/// a maximum.
+pub(super) const EMISSION_DIVISOR: u32 = 16;
+pub(super) const EMISSION_SPP: [u32; 2] = [1, 4];
 /// Ratio of visible emission between neighbours from which on a pixel gets more emission rays, and the factor for their
 /// number.
 pub(super) const EDGE_RATIO: f64 = 4.0;
-pub(super) const SIGHT_OF_EDGES: u32 = 8;
+pub(super) const EDGE_FACTOR: u32 = 8;
 /// Radius of the neighbourhood over which the variance of visible emission is averaged (pixels).
-pub(super) const SIGHT_RADIUS: usize = 1;
+pub(super) const EMISSION_RADIUS: usize = 1;
 /// Weight of the mean of all pixels in the mean of a material (pixels).
 pub(super) const FEW_PIXELS: f64 = 16.0;
 /// Edge of the tiles whose samples have a common cost (pixels). The result depends on it, unlike on the tile size of
@@ -107,7 +107,7 @@ pub(super) const RANGE: [f64; 2] = [0.5, 8.0];
 /// than few samples reveal.
 pub(super) const MIN_SPLIT: f64 = 1.0;
 /// Maximum emission rays per sample, including its own.
-pub(super) const MAX_LOOKS: u8 = 64;
+pub(super) const MAX_EMISSION_RAYS: u8 = 64;
 /// Pixels that one thread sums.
 pub(super) const CHUNK: usize = 1 << 14;
 
@@ -118,7 +118,7 @@ pub(super) const FIRST: u32 = 2;
 /// Maximum samples that a block may need, per sample of the pilot.
 pub(super) const REACH: u32 = 16;
 /// Maximum emission rays per sample, for each sample of the pilot.
-pub(super) const LOOKS_KNOWN: u32 = 4;
+pub(super) const MAX_RAYS_PER_PILOT_SAMPLE: u32 = 4;
 
 // M/N of each pixel: docs/measurements/resampling
 

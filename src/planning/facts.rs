@@ -45,11 +45,11 @@ impl Facts {
 
         // Visible surfaces and their light
         let rays: Vec<Ray> = camera_rays(job).collect();
-        let seen: Vec<SurfaceInteraction> = hits(job, &rays).into_iter().flatten().collect();
-        facts.sky = sky(job, &seen);
+        let visible: Vec<SurfaceInteraction> = hits(job, &rays).into_iter().flatten().collect();
+        facts.sky = sky(job, &visible);
 
         // Diffuse surfaces, and the surfaces around them
-        let diffuse: Vec<&SurfaceInteraction> = seen.iter().filter(|at| is_diffuse(job, at)).collect();
+        let diffuse: Vec<&SurfaceInteraction> = visible.iter().filter(|at| is_diffuse(job, at)).collect();
         let rays: Vec<Ray> = (0..).zip(&diffuse).map(|(i, at)| cosine_ray(at, i)).collect();
         let (mut pairs, mut left) = (0, 0);
         for at in hits(job, &rays) {
@@ -59,7 +59,7 @@ impl Facts {
                 None => left += 1,
             }
         }
-        facts.diffuse_pairs = f64::from(pairs) / seen.len().max(1) as f64;
+        facts.diffuse_pairs = f64::from(pairs) / visible.len().max(1) as f64;
         facts.open = f64::from(left) / rays.len().max(1) as f64;
         facts
     }
@@ -92,10 +92,10 @@ fn cosine_ray(at: &SurfaceInteraction, i: u32) -> Ray {
 
 /// Fraction of lights at infinity in the irradiance of surfaces, estimated by traced light samples; 0 if there is no
 /// light.
-fn sky(job: &RenderJob, seen: &[SurfaceInteraction]) -> f64 {
+fn sky(job: &RenderJob, visible: &[SurfaceInteraction]) -> f64 {
     // Sample lights at each surface
     let (mut segments, mut found) = (RayBatch::default(), Vec::new());
-    for (i, at) in (0..).zip(seen) {
+    for (i, at) in (0..).zip(visible) {
         let n = normal(at);
         for k in 0..LIGHT_SAMPLES {
             let [choice, u, v, _] = pcg4d([i, SEED, 1, k]).map(unit_f32);
@@ -127,8 +127,7 @@ fn hits(job: &RenderJob, rays: &[Ray]) -> Vec<Option<SurfaceInteraction>> {
     let (mut batch, mut hits) = (RayBatch::default(), Vec::new());
     batch.set(rays.iter());
     job.world.accel.intersect(&batch, Coherence::Incoherent, &mut hits);
-    let at =
-        |(ray, hit): (&Ray, &Option<_>)| hit.as_ref().map(|hit| SurfaceInteraction::new(job, ray, (0.0, 0.0), hit));
+    let at = |(ray, hit): (&Ray, &Option<_>)| hit.as_ref().map(|hit| SurfaceInteraction::new(job, ray, 0.0, 0.0, hit));
     rays.iter().zip(&hits).map(at).collect()
 }
 

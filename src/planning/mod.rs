@@ -72,7 +72,7 @@ fn complete(job: &mut RenderJob, open: &Settings, how: &Preparation<'_>) -> Resu
     let pool = preparation::thread_pool(how.threads)?;
     (how.observe)("looking at the scene", None);
     let facts = pool.install(|| rule::apply(job)).filter(|_| how.tunes);
-    let tuning = facts.map(|facts| pool.install(|| tune::tune(job, (open, &facts), how))).transpose()?;
+    let tuning = facts.map(|facts| pool.install(|| tune::tune(job, open, &facts, how))).transpose()?;
     if job.settings().sampling.allocation == Allocation::Auto {
         job.change(|s| s.sampling.allocation = Allocation::Uniform);
     }

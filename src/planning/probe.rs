@@ -3,8 +3,8 @@
 use crate::direct::Fits;
 use crate::film::accumulator::RadianceAccumulator;
 use crate::film::{FeatureSet, PixelSample};
-use crate::integrators::camera_samples::{CameraSampler, Scratch};
-use crate::integrators::cells::Groups;
+use crate::integrators::camera_samples::{CameraSampler, PixelSampleRange, Scratch};
+use crate::integrators::cells::Blocks;
 use crate::integrators::features::{self, Feature};
 use crate::integrators::light_paths::{self, LightPilot};
 use crate::integrators::path::{BATCH_PATHS, CameraSample};
@@ -49,8 +49,8 @@ pub(super) struct Probe<'a> {
 impl<'a> Probe<'a> {
     /// A probe of an image. It leaves out the light of `left`, and pixels share paths as in the image.
     pub(super) fn new(job: &'a RenderJob, left: &LeftToLightPaths, features: FeatureSet) -> Self {
-        let groups = if features::allows(job, Feature::Sharing) { Groups::Grid } else { Groups::None };
-        let mut tracer = PathTracer::sharing(groups, features);
+        let blocks = if features::allows(job, Feature::Sharing) { Blocks::Grid } else { Blocks::None };
+        let mut tracer = PathTracer::sharing(blocks, features);
         tracer.leave(job, left.0.as_ref().map(|(pilot, per_sample)| (pilot, *per_sample)));
         let camera = CameraSampler::new(job, 0);
         Probe { job, camera, tracer, samples: Vec::new(), scratch: Scratch::default(), results: Vec::new() }
@@ -62,7 +62,8 @@ impl<'a> Probe<'a> {
         &mut self,
         settings: &IntegratorSettings,
         pixels: &[[u32; 2]],
-        (samples, seed): (Range<u32>, u32),
+        samples: Range<u32>,
+        seed: u32,
         mut add: impl FnMut(usize, &PixelSample),
     ) {
         // As many pixels at once as fit into a batch
@@ -71,7 +72,7 @@ impl<'a> Probe<'a> {
         for (part, pixels) in pixels.chunks(size).enumerate() {
             // Draw the camera samples
             self.samples.clear();
-            let of_pixels = pixels.iter().map(|&pixel| (0, pixel, samples.clone()));
+            let of_pixels = pixels.iter().map(|&pixel| PixelSampleRange { fit: 0, pixel, samples: samples.clone() });
             self.camera.samples(of_pixels, seed, &mut self.scratch, &mut self.samples);
             self.samples.iter_mut().for_each(|sample| sample.sample_counts = sample_counts);
 
@@ -88,10 +89,11 @@ impl<'a> Probe<'a> {
         &mut self,
         settings: &IntegratorSettings,
         pixels: &[[u32; 2]],
-        samples: (Range<u32>, u32),
+        samples: Range<u32>,
+        seed: u32,
     ) -> Vec<[f64; 3]> {
         let mut sums = vec![RadianceAccumulator::default(); pixels.len()];
-        self.trace(settings, pixels, samples, |i, sample| {
+        self.trace(settings, pixels, samples, seed, |i, sample| {
             sums[i].add(sample.radiance);
         });
         sums.iter().map(RadianceAccumulator::values).collect()
@@ -105,7 +107,7 @@ impl<'a> Probe<'a> {
 }
 
 /// The pixels of an image with this width and height that are at most `radius` from pixel `i` in both directions.
-pub(super) fn around(i: usize, (width, height): (usize, usize), radius: usize) -> impl Iterator<Item = usize> {
+pub(super) fn around(i: usize, [width, height]: [usize; 2], radius: usize) -> impl Iterator<Item = usize> {
     let window = |i: usize, len: usize| i.saturating_sub(radius)..i.saturating_add(radius + 1).min(len);
     let columns = window(i % width, width);
     window(i / width, height).flat_map(move |y| columns.clone().map(move |x| y * width + x))

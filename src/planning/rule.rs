@@ -19,7 +19,7 @@ use super::constants::{
     OTHERS, OUTDOORS, SKY_FRACTIONS, UNSHARED,
 };
 use super::facts::Facts;
-use super::visibility_cache::{build_visibility_cache, seen_points};
+use super::visibility_cache::{build_visibility_cache, visible_points};
 use crate::integrators::features::{self, Feature};
 use crate::lights::{LightCtx, LightId};
 use crate::scene::RenderJob;
@@ -105,7 +105,7 @@ fn choose_contributing(job: &mut RenderJob, facts: &Facts) {
     }
     let Some((cache, _)) = build_visibility_cache(job) else { return };
     job.lights.set_visibility_cache(Some(cache));
-    let points = seen_points(job);
+    let points = visible_points(job);
     // Some triangles of a lamp face away from any point, so lamps are counted instead of triangles
     let sources = job.world.scene.lights.sources();
     let lamp = |&(light, _): &(LightId, u32)| sources[light as usize].map_or((1, light), |source| (0, source));
@@ -113,9 +113,9 @@ fn choose_contributing(job: &mut RenderJob, facts: &Facts) {
         let contributing = job.lights.contributing_lights(&LightCtx::on(p, n));
         contributing.lights.iter().map(lamp).collect::<BTreeSet<_>>().len()
     };
-    let seen = points.iter().map(found).sum::<usize>() as f64;
+    let visible = points.iter().map(found).sum::<usize>() as f64;
     let all = (points.len() * facts.lights) as f64;
-    if points.is_empty() || 1.0 - seen / all < MOST_HIDDEN {
+    if points.is_empty() || 1.0 - visible / all < MOST_HIDDEN {
         job.lights.set_visibility_cache(None);
         return;
     }

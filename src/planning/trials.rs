@@ -29,7 +29,7 @@ pub(super) struct Trials {
     /// 1/√(m² + ε) of each channel, by cell and pixel, where m is the mean of the images of the first trial.
     scales: Vec<Vec<[f64; 3]>>,
     /// Difference of the two seeds' images in visible emission, by cell and pixel. Its noise is left to emission rays.
-    seen: Vec<Vec<[f64; 3]>>,
+    emission: Vec<Vec<[f64; 3]>>,
 }
 
 /// Result of a trial: CPU time per camera sample (ns), and sums of |d| and d² over the pixels of each cell. d is the
@@ -44,16 +44,16 @@ pub(super) struct Measured {
 
 impl Trials {
     /// Trials on about `count` cells, with `spp` samples per pixel and seed. Every `round` has other cells.
-    pub(super) fn new(job: &RenderJob, how: &Preparation<'_>, (count, round): (usize, u32), spp: u32) -> Self {
+    pub(super) fn new(job: &RenderJob, how: &Preparation<'_>, count: usize, round: u32, spp: u32) -> Self {
         let bounds = job.world.scene.film.bounds;
         let all: Vec<PixelBounds> = bounds.tiles(CELL);
         let step = (all.len() as f64 / count.max(1) as f64).max(1.0);
         let first = f64::from(pcg4d([SEED, round, 0, 1])[0]) / f64::from(u32::MAX) * step;
-        let places = (0..).map(|i| (first + f64::from(i) * step) as usize).take_while(|&i| i < all.len());
-        let cells = places.map(|i| all[i].pixels().collect()).collect();
+        let indices = (0..).map(|i| (first + f64::from(i) * step) as usize).take_while(|&i| i < all.len());
+        let cells = indices.map(|i| all[i].pixels().collect()).collect();
         let seed = job.settings().sampling.seed;
         let seeds = [0, 1].map(|k| pcg4d([seed, SEED, round, k])[0]);
-        Trials { cells, spp, seeds, left: LeftToLightPaths::new(job, how), scales: Vec::new(), seen: Vec::new() }
+        Trials { cells, spp, seeds, left: LeftToLightPaths::new(job, how), scales: Vec::new(), emission: Vec::new() }
     }
 
     /// Measures the settings of the job on the threads of the current pool.
@@ -66,15 +66,15 @@ impl Trials {
         let probe = || Probe::new(job, left, FeatureSet::None);
 
         // In the first trial, measure visible emission
-        if self.seen.is_empty() {
-            let seeing = IntegratorSettings { max_depth: 0, ..*settings };
+        if self.emission.is_empty() {
+            let only_emission = IntegratorSettings { max_depth: 0, ..*settings };
             let is_split = may_split(job.settings(), settings);
             let of_cell = |probe: &mut Probe<'_>, cell: &Vec<[u32; 2]>| {
-                let [a, b] = self.seeds.map(|seed| self.means(probe, &seeing, cell, seed));
+                let [a, b] = self.seeds.map(|seed| self.means(probe, &only_emission, cell, seed));
                 let part = if is_split { 1.0 } else { 0.0 };
                 a.iter().zip(&b).map(|(a, b)| [0, 1, 2].map(|c| part * (a[c] - b[c]))).collect()
             };
-            self.seen = self.cells.par_iter().map_init(probe, of_cell).collect();
+            self.emission = self.cells.par_iter().map_init(probe, of_cell).collect();
         }
 
         // Render both images
@@ -99,7 +99,7 @@ impl Trials {
             let mut sums = [0.0; 2];
             for (i, (a, b)) in a.iter().zip(b).enumerate() {
                 for c in 0..3 {
-                    let d = (a[c] - b[c] - self.seen[k][i][c]).abs() * self.scales[k][i][c];
+                    let d = (a[c] - b[c] - self.emission[k][i][c]).abs() * self.scales[k][i][c];
                     let d = if d.is_finite() { d } else { 0.0 };
                     sums = [sums[0] + d, sums[1] + d * d];
                 }
@@ -125,7 +125,7 @@ impl Trials {
         seed: u32,
     ) -> Vec<[f64; 3]> {
         let n = f64::from(self.spp);
-        probe.sums(settings, cell, (0..self.spp, seed)).into_iter().map(|sum| sum.map(|x| x / n)).collect()
+        probe.sums(settings, cell, 0..self.spp, seed).into_iter().map(|sum| sum.map(|x| x / n)).collect()
     }
 }
 

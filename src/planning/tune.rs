@@ -46,7 +46,8 @@ pub struct Tuning {
 /// Tunes the settings of a job. They are the choice of the rule, made from the settings `open` and from `facts`.
 pub(super) fn tune(
     job: &mut RenderJob,
-    (open, facts): (&Settings, &Facts),
+    open: &Settings,
+    facts: &Facts,
     how: &Preparation<'_>,
 ) -> Result<Tuning, PlanError> {
     // Search
@@ -59,7 +60,7 @@ pub(super) fn tune(
 
     // Compare the result with the rule on other cells
     let found = search.best;
-    let mut trials = Trials::new(job, how, (2 * TUNE_CELLS, 1), TUNE_SPP);
+    let mut trials = Trials::new(job, how, 2 * TUNE_CELLS, 1, TUNE_SPP);
     let [rule_measured, found_measured] = [rule, found].map(|settings| {
         job.change(|s| s.integrator = settings);
         trials.measure(job)
@@ -192,7 +193,7 @@ struct Search {
 impl Search {
     fn new(job: &mut RenderJob, how: &Preparation<'_>) -> Result<Self, PlanError> {
         how.goes_on()?;
-        let mut pilot = Trials::new(job, how, (TUNE_CELLS, 0), TUNE_SPP);
+        let mut pilot = Trials::new(job, how, TUNE_CELLS, 0, TUNE_SPP);
         // The first run only fills caches
         pilot.measure(job);
         let start = processor_time::of_process();

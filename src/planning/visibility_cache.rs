@@ -20,8 +20,8 @@ pub fn build_visibility_cache(job: &RenderJob) -> Option<(VisibilityCache, usize
     // Choose lights at visible points
     let lights = &job.lights;
     let paths = job.settings().integrator.photons.visibility_photons.map_or(PHOTON_PATHS, u64::from);
-    let seen = seen_points(job);
-    let weights = weights_at(job, &seen);
+    let visible = visible_points(job);
+    let weights = weights_at(job, &visible);
 
     // Trace photons
     let tracing = Tracing {
@@ -42,12 +42,12 @@ pub fn build_visibility_cache(job: &RenderJob) -> Option<(VisibilityCache, usize
     // Build the cache
     let distribution = tracing.light_distribution(lights)?;
     let paths = lights.lit.iter().map(|&light| (light, paths as f32 * distribution.pmf(light)));
-    let cache = VisibilityCache::adapted_to(&seen, &primary, lights.scene_radius).with_paths(paths);
+    let cache = VisibilityCache::adapted_to(&visible, &primary, lights.scene_radius).with_paths(paths);
     Some((cache, primary.len()))
 }
 
 /// Points visible to the camera, directly or after bounces: positions and normals of importons.
-pub(super) fn seen_points(job: &RenderJob) -> Vec<(Vec3, Vec3)> {
+pub(super) fn visible_points(job: &RenderJob) -> Vec<(Vec3, Vec3)> {
     let settings = job.settings();
     let depth = match settings.integrator.kind {
         IntegratorKind::Direct => 0,

@@ -7,7 +7,7 @@
 //! Rows are corrected in bands, together with the surrounding rows that determine their coefficients. Only the
 //! corrections are kept for the whole image.
 
-use super::tiles::{Tile, position};
+use super::tiles::Tile;
 use crate::film::exact::FixedSum;
 use crate::film::replicas::Replica;
 use crate::film::{Film, PixelBounds, PixelSums};
@@ -28,7 +28,7 @@ pub(super) fn correct(film: &mut Film, tiles: &[Tile]) {
     for top in (y0..y1).step_by(ROWS as usize) {
         let rows = top..y1.min(top + ROWS);
         let around = y0.max(top.saturating_sub(MARGIN as u32))..y1.min(rows.end + MARGIN as u32);
-        let band = Band::read(film, tiles, (rows, around), m);
+        let band = Band::read(film, tiles, rows, around, m);
         band.correct(&mut corrections, &mut replicas);
     }
     film.correct(corrections, replicas);
@@ -48,7 +48,7 @@ struct Band {
 
 impl Band {
     /// Reads `rows` and the rows `around` them, with `m` control variates.
-    fn read(film: &Film, tiles: &[Tile], (rows, around): (Range<u32>, Range<u32>), m: usize) -> Self {
+    fn read(film: &Film, tiles: &[Tile], rows: Range<u32>, around: Range<u32>, m: usize) -> Self {
         let width = film.bounds.width() as usize;
         let mut sums = Vec::new();
         film.read_rows(around.clone(), &mut sums);
@@ -62,7 +62,7 @@ impl Band {
             let exact = tile.fits.exact_sums();
             let mut fits = exact.chunks_exact(3 + m);
             for (i, fit) in (0..tile.bounds.area() as u32).zip(fits.by_ref()) {
-                let [x, y] = position(&tile.bounds, i);
+                let [x, y] = tile.bounds.pixel_at(i);
                 if !around.contains(&y) {
                     continue;
                 }
@@ -74,7 +74,7 @@ impl Band {
 
             // Means of the replicas
             for (replica, fit) in tile.replicas.iter().zip(fits) {
-                let [x, y] = position(&tile.bounds, replica.pixel);
+                let [x, y] = tile.bounds.pixel_at(replica.pixel);
                 if rows.contains(&y) {
                     let mut controls = vec![0.0; m];
                     let count = f64::from(replica.sums.count.max(1));

@@ -8,10 +8,10 @@
 //! An id is the 32-bit MurmurHash3 of a name, reinterpreted as a float. A pixel stores the [`RANKS`] ids with the
 //! largest coverage, two in each group of four channels.
 
-use super::{BATCH_PATHS, RenderSettings, ThreadError, position, thread_pool};
+use super::{BATCH_PATHS, RenderSettings, ThreadError, thread_pool};
 use crate::accel::{Coherence, Hit, RayBatch};
 use crate::film::{Film, PixelBounds};
-use crate::integrators::camera_samples::{CameraSampler, Scratch};
+use crate::integrators::camera_samples::{CameraSampler, PixelSampleRange, Scratch};
 use crate::scene::{RenderJob, Scene};
 use rayon::prelude::*;
 use std::collections::{BTreeMap, HashSet};
@@ -182,7 +182,7 @@ impl Layer {
             for (i, &count) in (0..).zip(&tile.counts) {
                 let (of_pixel, others) = covers.split_at(count.into());
                 covers = others;
-                let [x, y] = position(&tile.bounds, i);
+                let [x, y] = tile.bounds.pixel_at(i);
                 if rows.contains(&y) {
                     let at = (y - rows.start) as usize * row + (x - self.bounds.x0) as usize * STRIDE;
                     data[at..at + 2 * of_pixel.len()].copy_from_slice(of_pixel.as_flattened());
@@ -253,8 +253,13 @@ impl Tracer<'_> {
         while next.is_some() {
             samples.clear();
             while let Some((index, range)) = next.take_if(|(_, r)| samples.len() + r.len() <= BATCH_PATHS) {
-                let pixel = position(tile, index);
-                self.camera.samples(std::iter::once((index, pixel, range)), seed, &mut scratch, &mut samples);
+                let pixel = tile.pixel_at(index);
+                self.camera.samples(
+                    std::iter::once(PixelSampleRange { fit: index, pixel, samples: range }),
+                    seed,
+                    &mut scratch,
+                    &mut samples,
+                );
                 next = ranges.next();
             }
             rays.set(samples.iter().map(|s| &s.ray.ray));

@@ -21,6 +21,9 @@ const IMAGE: f64 = 38.0;
 const FEATURES: f64 = 17.0;
 /// Binary digits per pixel that doubling the samples adds to the image and to the features.
 const DIGITS: [f64; 2] = [9.0, 9.0];
+/// Bytes of a pixel of a light-group layer with light in one sample, and binary digits that doubling the samples adds.
+const LIGHT: f64 = 15.0;
+const LIGHT_DIGITS: f64 = 3.0;
 /// Bytes per pixel of replicas: exact sums and counts, averaged over all pixels.
 const REPLICAS: f64 = 4.0;
 /// Bytes per pixel of a tile besides its sums.
@@ -36,9 +39,11 @@ const CONTROL_DIGITS: f64 = 3.0;
 /// corrected together, fixed and per control variate.
 const CORRECTION: f64 = 12.0;
 const FITTED: [usize; 2] = [240, 13];
-/// Bytes of a pixel read from the film, and of the channels of an image with all layers.
+/// Bytes of a pixel read from the film, of the channels of an image with all layers, and of the channels of a light
+/// group.
 const READ: usize = 144 + 24;
 const CHANNELS: usize = 16 * 4;
+const CHANNELS_OF_LAYER: usize = 3 * 4;
 /// Bytes of OpenImageIO with its dependencies, and of a thread with its batches.
 const LIBRARIES: u64 = 118 << 20;
 const THREAD: u64 = 8 << 20;
@@ -85,7 +90,8 @@ pub fn predict(job: &RenderJob, wanted: &Wanted<'_>) -> Prediction {
     let whole = if wanted.is_denoised { DENOISED } else { 0.0 } + wanted.cryptomattes.len() as f64 * IDS;
     let width = bounds.width() as usize;
     let libraries = if is_loaded() { 0 } else { LIBRARIES };
-    let band = (BAND as usize + 2) * READ * threads + 2 * ROWS_AT_ONCE * CHANNELS;
+    let channels = CHANNELS + light_layers::count(job) * CHANNELS_OF_LAYER;
+    let band = (BAND as usize + 2) * READ * threads + 2 * ROWS_AT_ONCE * channels;
     Prediction {
         film: (pixels * (share * of_sums(job, render) + whole)) as u64,
         output: (width * (band + of_corrected_rows(job))) as u64,
@@ -116,8 +122,8 @@ fn of_sums(job: &RenderJob, render: &RenderSettings) -> f64 {
         bytes += REPLICAS;
     }
 
-    // Layers of light groups
-    bytes += light_layers::count(job) as f64 * grown(IMAGE, DIGITS[0]);
+    // Layers of light groups, as if each group lit all pixels
+    bytes += light_layers::count(job) as f64 * grown(LIGHT, LIGHT_DIGITS);
 
     // Control variates
     let estimator = Estimator::at_vertex(&job.settings().integrator, 0);

@@ -4,15 +4,15 @@
 //! of its coordinates and their indices, independent of the rest of their batch, and are added to exact sums. Threads,
 //! tiles, passes and [`parts`] of the image therefore do not change a bit.
 //!
-//! Passes: `run`, `pace`, `shared_cells`, [`cell_progress`]. Tiles, threads and batches: `tiles`, `worker`,
-//! [`batches`], `looks` (emission rays). Finished film: `control_variates`, [`cryptomatte`], [`output`]. Files:
+//! Passes: `run`, `pace`, `shared_cells`, [`cell_progress`]. Tiles, threads and batches: `tiles`, `tile_samples`,
+//! `worker`, [`batches`], `emission_rays`. Finished film: `control_variates`, [`cryptomatte`], [`output`]. Files:
 //! [`parts`]. Costs: [`memory`], [`phases`].
 
 pub mod batches;
 pub mod cell_progress;
 mod control_variates;
 pub mod cryptomatte;
-mod looks;
+mod emission_rays;
 pub mod memory;
 pub mod output;
 mod pace;
@@ -20,6 +20,7 @@ pub mod parts;
 pub mod phases;
 mod run;
 mod shared_cells;
+mod tile_samples;
 mod tiles;
 mod worker;
 
@@ -40,7 +41,6 @@ use phases::Phase;
 use run::Run;
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;
-use tiles::position;
 pub use tiles::{TileShare, Tiles};
 
 /// Parameters of a rendering. Only the sample range affects the image.

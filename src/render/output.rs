@@ -63,7 +63,7 @@ impl Aov {
             Aov::Records => &["records"],
             Aov::LightGroups => {
                 let of_layer = |name: &String| COLOUR.map(|channel| format!("{}.{channel}", light_layer_name(name)));
-                return film.light_layers().iter().flat_map(|(name, _)| of_layer(name)).collect();
+                return film.light_layers().iter().flat_map(of_layer).collect();
             }
         };
         names.iter().map(|&name| name.to_owned()).collect()
@@ -130,9 +130,9 @@ impl<'a> Layers<'a> {
         } else {
             self.film.read_rows(rows.clone(), &mut pixels);
         }
-        let light_layers = self.rows_of_light_layers(rows.clone());
 
-        // Append the channels of each pixel
+        // Append the channels of each pixel; those of light groups are black until all are there
+        let mut first_of_groups = 0;
         let first = self.film.index(self.film.bounds.x0, rows.start);
         let mut data = Vec::with_capacity(stride * pixels.len());
         for (i, pixel) in pixels.iter().enumerate() {
@@ -151,28 +151,40 @@ impl<'a> Layers<'a> {
                     Aov::Material => data.push(pixel.material as f32),
                     Aov::Object => data.push(pixel.object as f32),
                     Aov::Ratio => {
-                        data.extend(self.sample_count_map.map_or([0.0; 5], |map| ratio_values(map, first + i)));
+                        data.extend(
+                            self.sample_count_map.map_or([0.0; 5], |(map, max)| ratio_values(map, max, first + i)),
+                        );
                     }
                     Aov::Records => data.push(pixel.records as f32),
                     Aov::LightGroups => {
-                        data.extend(light_layers.iter().flat_map(|pixels| pixels[i].mean().map(|v| v as f32)));
+                        first_of_groups = if i == 0 { data.len() } else { first_of_groups };
+                        data.resize(data.len() + 3 * self.film.light_layers().len(), 0.0);
                     }
+                }
+            }
+        }
+        if self.aovs.contains(&Aov::LightGroups) {
+            for layer in 0..self.film.light_layers().len() {
+                let means = light_means(self.film, layer, (rows.clone(), &pixels));
+                for (pixel, mean) in data.chunks_exact_mut(stride).zip(means) {
+                    pixel[first_of_groups + 3 * layer..][..3].copy_from_slice(&mean);
                 }
             }
         }
         data
     }
+}
 
-    /// The light-group layers, if they are requested.
-    fn rows_of_light_layers(&self, rows: Range<u32>) -> Vec<Vec<PixelSums>> {
-        let layers = if self.aovs.contains(&Aov::LightGroups) { self.film.light_layers() } else { &[] };
-        let pixels = |film: &Film| {
-            let mut pixels = Vec::new();
-            film.read_rows(rows.clone(), &mut pixels);
-            pixels
-        };
-        layers.iter().map(|(_, film)| pixels(film)).collect()
-    }
+/// Mean radiance of a light-group layer in some rows, whose pixels are given.
+fn light_means(
+    film: &Film,
+    layer: usize,
+    (rows, pixels): (Range<u32>, &[PixelSums]),
+) -> impl Iterator<Item = [f32; 3]> {
+    let mut light = Vec::new();
+    film.read_light(layer, rows, &mut light);
+    let mean = |(sum, pixel): ([f64; 3], &PixelSums)| sum.map(|v| (v / pixel.count.max(1) as f64) as f32);
+    light.into_iter().zip(pixels).map(mean)
 }
 
 /// The image `R G B` and the given AOVs, linear, all rows at once. Use [`Layers`] for large images.
@@ -183,28 +195,29 @@ pub fn channels(film: &Film, aovs: &[Aov], sample_count_map: Option<&SampleCount
 
 /// The same values as one named image per AOV and light group, the image itself first.
 pub fn layers(film: &Film, aovs: &[Aov], sample_count_map: Option<&SampleCountMap>) -> Vec<(String, Image)> {
-    // An image of some channels
-    let image = |film: &Film, has_image: bool, aovs: &[Aov]| {
+    // Images of some channels, and of a light group
+    let (width, height) = (film.bounds.width() as usize, film.bounds.height() as usize);
+    let image = |has_image: bool, aovs: &[Aov]| {
         let layers = Layers::new(film, has_image, aovs, sample_count_map);
-        Image {
-            width: film.bounds.width() as usize,
-            height: film.bounds.height() as usize,
-            channels: layers.names(),
-            data: layers.rows_in_parallel(film.bounds.y0..film.bounds.y1),
-        }
+        let data = layers.rows_in_parallel(film.bounds.y0..film.bounds.y1);
+        Image { width, height, channels: layers.names(), data }
+    };
+    let of_group = |(layer, name): (usize, &String)| {
+        let band = |rows: Range<u32>| {
+            let mut pixels = Vec::new();
+            film.read_rows(rows.clone(), &mut pixels);
+            light_means(film, layer, (rows, &pixels)).flatten().collect()
+        };
+        let data = film.bands().map(band).collect::<Vec<Vec<f32>>>().concat();
+        (light_layer_name(name), Image { width, height, channels: COLOUR.map(str::to_owned).to_vec(), data })
     };
 
-    // One image per AOV, or per light group
+    // One image per AOV, or per light group; the image itself comes first
     let of_aov = |&aov: &Aov| match aov {
-        Aov::LightGroups => {
-            let layer = |(name, film): &(String, Film)| (light_layer_name(name), image(film, true, &[]));
-            film.light_layers().iter().map(layer).collect()
-        }
-        _ => vec![(<&str>::from(aov).to_owned(), image(film, false, &[aov]))],
+        Aov::LightGroups => film.light_layers().iter().enumerate().map(of_group).collect(),
+        _ => vec![(<&str>::from(aov).to_owned(), image(false, &[aov]))],
     };
-
-    // The image itself comes first
-    let whole = (IMAGE_LAYER.to_owned(), image(film, true, &[]));
+    let whole = (IMAGE_LAYER.to_owned(), image(true, &[]));
     std::iter::once(whole).chain(aovs.iter().flat_map(of_aov)).collect()
 }
 
@@ -223,7 +236,7 @@ pub fn default_aovs(film: &Film, has_ratio: bool, has_records: bool) -> Vec<Aov>
 
 /// Colour and counts of a pixel of the map. The colour scale is logarithmic, from red at ratio 1 to green at the
 /// largest ratio of the map.
-fn ratio_values((map, max): (&SampleCountMap, f32), pixel: usize) -> [f32; 5] {
+fn ratio_values(map: &SampleCountMap, max: f32, pixel: usize) -> [f32; 5] {
     let ratio = map.ratios[pixel];
     let green = (ratio.ln() / max.ln()).clamp(0.0, 1.0);
     let samples = (map.time / (f64::from(ratio) * map.t1 + map.t2)) as f32;

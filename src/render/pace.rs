@@ -1,8 +1,13 @@
-//! Lengths of passes within a time limit.
+//! Lengths of passes, and the end of a rendering.
 //!
 //! When the time is over, tiles that have not started lack the samples of the last pass. To keep their number small,
 //! passes become shorter towards the end: each takes half of the remaining time at the speed so far.
 
+use super::run::Run;
+use crate::direct::Estimator;
+use crate::imaging::tiles::TileStore;
+use lumiris_numbers::estimators::ocv::block_of;
+use std::sync::atomic::Ordering;
 use std::time::Duration;
 
 /// Fraction of the time limit that may remain unused if no whole pass fits into it.
@@ -11,14 +16,72 @@ const LEFT_OVER: f64 = 0.03;
 /// Minimum extra time for tiles without a sample: an image with holes is of little use.
 const GRACE: Duration = Duration::from_millis(500);
 
+/// Maximum camera samples of a tile in a pass. Reading and writing the sums of a pixel takes as long as adding several
+/// samples, so short passes are inefficient.
+const TILE_SAMPLES: u32 = 1 << 14;
+
+impl Run<'_> {
+    /// Samples per pixel of the next pass over all tiles: 1, 1, 2, 4, …, so that a whole image is available soon.
+    /// Progressive estimators fit in blocks of samples; a pass does not exceed the block. `done` samples per pixel are
+    /// rendered, `now` of them by this run.
+    pub(super) fn next_pass(&self, done: u32, now: u32) -> u32 {
+        let longest = done.clamp(1, self.pass_length());
+        let length = self.in_time(now, longest).unwrap_or(longest);
+        if !Estimator::at_vertex(&self.job.settings().integrator, 0).is_progressive() {
+            return length;
+        }
+        let block = block_of(done);
+        length.min(block.first + block.len - done)
+    }
+
+    /// Samples per pixel of the longest pass.
+    pub(super) fn pass_length(&self) -> u32 {
+        (TILE_SAMPLES / self.tile_size.max(1).pow(2)).clamp(1, 64)
+    }
+
+    /// Samples per pixel of the next pass within the time limit, at most `longest`. `done` samples per pixel were
+    /// rendered by this run.
+    fn in_time(&self, done: u32, longest: u32) -> Option<u32> {
+        let limit = self.settings.time_limit.filter(|_| done > 0)?;
+        Some(pass_in_time(done, self.start.elapsed(), limit, longest))
+    }
+
+    /// True if no further pass starts, after `done` samples per pixel of this run.
+    pub(super) fn stopped(&self, done: u32) -> bool {
+        self.in_time(done, 1) == Some(0) || self.stops_at_once()
+    }
+
+    /// True if the time limit is reached.
+    pub(super) fn is_late(&self) -> bool {
+        self.settings.time_limit.is_some_and(|limit| self.start.elapsed() >= limit)
+    }
+
+    /// True if pixels whose next sample has the index `next` get no further samples because the time is over. For their
+    /// first sample there is a grace period.
+    pub(super) fn leaves(&self, next: u32) -> bool {
+        let is_over = |limit| self.start.elapsed() >= of_first_samples(limit);
+        self.is_late() && (next > self.begin() || self.settings.time_limit.is_some_and(is_over))
+    }
+
+    /// True if no further tile starts.
+    pub(super) fn stops_at_once(&self) -> bool {
+        self.stop.load(Ordering::Relaxed) || self.failure().is_some()
+    }
+
+    /// Reason why some samples are wrong, if any are.
+    pub(super) fn failure(&self) -> Option<&str> {
+        self.texels.and_then(TileStore::failure)
+    }
+}
+
 /// Time after which even tiles without a sample do not start.
-pub(super) fn of_first_samples(limit: Duration) -> Duration {
+fn of_first_samples(limit: Duration) -> Duration {
     limit.saturating_add(GRACE.max(limit.mul_f64(LEFT_OVER)))
 }
 
 /// Samples per pixel of the next pass, at most `longest`, after `done` samples in the time `elapsed`; 0 if no pass
 /// starts.
-pub(super) fn pass_in_time(done: u32, elapsed: Duration, limit: Duration, longest: u32) -> u32 {
+fn pass_in_time(done: u32, elapsed: Duration, limit: Duration, longest: u32) -> u32 {
     let left = limit.saturating_sub(elapsed).as_secs_f64();
     let fit = left * f64::from(done) / elapsed.as_secs_f64().max(1e-9);
     if fit < 1.0 && left <= LEFT_OVER * limit.as_secs_f64() {

@@ -2,28 +2,23 @@
 
 use super::cell_progress::CellProgress;
 use super::control_variates;
-use super::pace::{of_first_samples, pass_in_time};
 use super::parts::{Checkpoints, PartError, StoredTile};
 use super::phases::WorkerTimes;
-use super::tiles::{Tile, Tiles, batches, bounds_of_tiles, empty_layers, film, position, replica_choice};
-use super::worker::{AnyWorker, Workers};
-use super::{BATCH_PATHS, Continuation, Progress, RenderError, RenderSettings, Rendering, TileObserver};
-use crate::direct::{Estimator, Fits};
+use super::tiles::{Tile, Tiles, add_records, bounds_of_tiles, film, replica_choice};
+use super::worker::Workers;
+use super::{Continuation, Progress, RenderError, RenderSettings, Rendering, TileObserver};
+use crate::direct::Estimator;
+use crate::film::layers::PackedLayers;
 use crate::film::packed::PackedSums;
-use crate::film::replicas::ReplicaAccumulator;
 use crate::film::replicas::ReplicaChoice;
 use crate::film::{FeatureSet, Film, FilmTile, PixelBounds};
 use crate::imaging::tiles::TileStore;
-use crate::integrators::camera_samples::{self, CameraSampler};
-use crate::integrators::cells::{self, REPLICA_CELL};
-use crate::integrators::path::CameraSample;
+use crate::integrators::camera_samples::CameraSampler;
+use crate::integrators::cells::REPLICA_CELL;
 use crate::integrators::{PathStats, Statistics, integrator, light_layers, reuse};
 use crate::planning::processor_time;
 use crate::scene::{FilmSettings, RenderJob};
-use lumiris_numbers::estimators::ocv::block_of;
-use lumiris_numbers::math::hash::pcg4d;
 use rayon::prelude::*;
-use std::collections::BTreeMap;
 use std::ops::Range;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
@@ -34,16 +29,6 @@ use std::time::{Duration, Instant};
 const NOISE_INTERVAL: Duration = Duration::from_secs(1);
 /// Minimum time between two computations of the noise, as a multiple of the time that one takes.
 const NOISE_REST: u32 = 50;
-
-/// Maximum camera samples of a tile in a pass. Reading and writing the sums of a pixel takes as long as adding several
-/// samples, so short passes are inefficient.
-const TILE_SAMPLES: u32 = 1 << 14;
-
-// All samples of a cell with the same share index are in one batch
-const _: () = assert!(BATCH_PATHS >= cells::CELL.pow(2) as usize && BATCH_PATHS >= REPLICA_CELL.pow(2) as usize);
-
-/// Combined with the seed of the image to give the seed of replicas.
-const REPLICA_SEED: u32 = 0x72_65_70_73;
 
 /// A pass over all tiles.
 pub(super) struct Pass<'a> {
@@ -65,17 +50,17 @@ impl Pass<'_> {
 /// A rendering in progress.
 pub(super) struct Run<'a> {
     pub(super) job: &'a RenderJob,
-    settings: &'a RenderSettings,
+    pub(super) settings: &'a RenderSettings,
     /// True if pixels share paths. The unit of a pass is then a cell instead of a tile.
     pub(super) shares_paths: bool,
     /// Edge of tiles (pixels). Where pixels share paths, the edge of the cells that are estimated twice.
     pub(super) tile_size: u32,
-    stop: &'a AtomicBool,
+    pub(super) stop: &'a AtomicBool,
     /// Texels that did not fit into memory.
-    texels: Option<&'a TileStore>,
+    pub(super) texels: Option<&'a TileStore>,
     observe: &'a (dyn Fn(&Progress) + Sync),
     pub(super) camera: CameraSampler<'a>,
-    start: Instant,
+    pub(super) start: Instant,
     samples_done: AtomicU64,
     rays: AtomicU64,
     passes: AtomicU32,
@@ -138,9 +123,7 @@ impl<'a> Run<'a> {
                 // Compute the noise at intervals
                 let now = Instant::now();
                 if tells_noise && now >= observed && first < end && !self.is_late() {
-                    let processor = processor_time::of_process();
-                    noise = Some(self.film(&tiles.tiles).summary().noise.median);
-                    times.noise += processor_time::of_process().saturating_sub(processor);
+                    noise = Some(self.median_noise(&tiles.tiles, &mut times));
                     observed = Instant::now() + NOISE_INTERVAL.max(now.elapsed() * NOISE_REST);
                 }
             }
@@ -211,7 +194,7 @@ impl<'a> Run<'a> {
     }
 
     /// Index of the first sample, after the skipped ones.
-    fn begin(&self) -> u32 {
+    pub(super) fn begin(&self) -> u32 {
         self.settings.first_sample + self.settings.skip.min(self.settings.spp)
     }
 
@@ -262,7 +245,7 @@ impl<'a> Run<'a> {
         let replicas = replicas.map_or(Vec::new(), |choice| choice.of_tile(all, &bounds));
         let integrator = &self.job.settings().integrator;
         let fits = Estimator::at_vertex(integrator, 0).fits(self.job, bounds.area() + replicas.len());
-        let layers = empty_layers(light_layers::count(self.job), bounds.area());
+        let layers = Arc::new(PackedLayers::new(light_layers::count(self.job), bounds.area()));
         Tile { bounds, done: self.begin(), sums: Arc::new(PackedSums::new(bounds.area())), layers, replicas, fits }
     }
 
@@ -272,62 +255,18 @@ impl<'a> Run<'a> {
         film(resolution, bounds, tiles, light_layers::names(self.job))
     }
 
+    /// Median noise of the image so far. The time that it takes is added to `times`.
+    fn median_noise(&self, tiles: &[Tile], times: &mut WorkerTimes) -> f64 {
+        let start = processor_time::of_process();
+        let noise = self.film(tiles).summary().noise.median;
+        times.noise += processor_time::of_process().saturating_sub(start);
+        noise
+    }
+
     /// The film of one tile.
     pub(super) fn film_of(&self, tile: &Tile) -> Film {
-        let pixels = FilmTile { bounds: tile.bounds, sums: Arc::clone(&tile.sums) };
+        let pixels = FilmTile { bounds: tile.bounds, sums: Arc::clone(&tile.sums), layers: Arc::default() };
         Film::new(self.job.world.scene.film.resolution, tile.bounds, vec![pixels], Vec::new())
-    }
-
-    /// Samples per pixel of the next pass over all tiles: 1, 1, 2, 4, …, so that a whole image is available soon.
-    /// Progressive estimators fit in blocks of samples; a pass does not exceed the block. `done` samples per pixel are
-    /// rendered, `now` of them by this run.
-    fn next_pass(&self, done: u32, now: u32) -> u32 {
-        let longest = done.clamp(1, self.pass_length());
-        let length = self.in_time(now, longest).unwrap_or(longest);
-        if !Estimator::at_vertex(&self.job.settings().integrator, 0).is_progressive() {
-            return length;
-        }
-        let block = block_of(done);
-        length.min(block.first + block.len - done)
-    }
-
-    /// Samples per pixel of the longest pass.
-    pub(super) fn pass_length(&self) -> u32 {
-        (TILE_SAMPLES / self.tile_size.max(1).pow(2)).clamp(1, 64)
-    }
-
-    /// Samples per pixel of the next pass within the time limit, at most `longest`. `done` samples per pixel were
-    /// rendered by this run.
-    fn in_time(&self, done: u32, longest: u32) -> Option<u32> {
-        let limit = self.settings.time_limit.filter(|_| done > 0)?;
-        Some(pass_in_time(done, self.start.elapsed(), limit, longest))
-    }
-
-    /// True if no further pass starts, after `done` samples per pixel of this run.
-    fn stopped(&self, done: u32) -> bool {
-        self.in_time(done, 1) == Some(0) || self.stops_at_once()
-    }
-
-    /// True if the time limit is reached.
-    fn is_late(&self) -> bool {
-        self.settings.time_limit.is_some_and(|limit| self.start.elapsed() >= limit)
-    }
-
-    /// True if pixels whose next sample has the index `next` get no further samples because the time is over. For their
-    /// first sample there is a grace period.
-    pub(super) fn leaves(&self, next: u32) -> bool {
-        let is_over = |limit| self.start.elapsed() >= of_first_samples(limit);
-        self.is_late() && (next > self.begin() || self.settings.time_limit.is_some_and(is_over))
-    }
-
-    /// True if no further tile starts.
-    pub(super) fn stops_at_once(&self) -> bool {
-        self.stop.load(Ordering::Relaxed) || self.failure().is_some()
-    }
-
-    /// Reason why some samples are wrong, if any are.
-    fn failure(&self) -> Option<&str> {
-        self.texels.and_then(TileStore::failure)
     }
 
     /// Adds the samples of a pass to every tile that does not have them yet.
@@ -352,171 +291,18 @@ impl<'a> Run<'a> {
                     watch(&self.film_of(tile));
                 }
                 let done = tile.bounds.area() as u64 * u64::from(samples.end - samples.start);
-                self.note(&stats, done, (total, pass.noise));
+                self.note(&stats, done, total, pass.noise);
                 stats
             })
-            .reduce(PathStats::default, |mut a, b| {
-                a.merge(&b);
-                a
-            })
+            .sum()
     }
 
     /// Counts finished samples, and notifies observers of the progress.
-    pub(super) fn note(&self, stats: &PathStats, samples: u64, (total, noise): (u64, Option<f64>)) {
+    pub(super) fn note(&self, stats: &PathStats, samples: u64, total: u64, noise: Option<f64>) {
         let rays = stats.camera_rays + stats.bounce_rays + stats.direct.emitter_rays + stats.direct.segments;
         self.samples_done.fetch_add(samples, Ordering::Relaxed);
         self.rays.fetch_add(rays, Ordering::Relaxed);
         (self.observe)(&self.progress(total, noise));
-    }
-
-    /// Adds a range of samples to one tile.
-    fn render_tile(&self, worker: &mut AnyWorker<'_>, tile: &mut Tile, samples: Range<u32>) -> PathStats {
-        let mut ill_conditioned = 0;
-        let done = samples.start - self.settings.first_sample;
-
-        // Solve for the coefficients at the beginning of a block
-        let start = Instant::now();
-        let is_progressive = Estimator::at_vertex(&self.job.settings().integrator, 0).is_progressive();
-        let begins_block = is_progressive && done > 0 && block_of(done).first == done;
-        if begins_block {
-            ill_conditioned = tile.fits.solve();
-        }
-        let solve = start.elapsed();
-
-        // Trace the pixels and the replicas
-        worker.read(tile);
-        self.trace_pixels_of(worker, &mut tile.fits, &tile.bounds, &samples);
-        worker.write(tile);
-        self.render_replicas(worker, (&tile.bounds, &mut tile.replicas, &mut tile.fits), &samples);
-        tile.fits.pack(&mut worker.packing);
-
-        // Add the time and the number of systems to the statistics
-        let mut stats = worker.take_stats();
-        if begins_block {
-            let direct = &mut stats.direct;
-            direct.systems += (tile.sums.len() + tile.replicas.len()) as u64;
-            direct.ill_conditioned += ill_conditioned;
-            direct.solve += solve;
-            direct.select += solve;
-        }
-        stats
-    }
-
-    /// Adds the samples of a pass to the sums of all pixels within `bounds`, in batches: whole pixels, or whole share
-    /// indices where pixels share paths.
-    pub(super) fn trace_pixels_of(
-        &self,
-        worker: &mut AnyWorker<'_>,
-        fits: &mut Fits,
-        bounds: &PixelBounds,
-        pass: &Range<u32>,
-    ) {
-        let seed = self.job.settings().sampling.seed;
-        let of_pixel = |index: usize| position(bounds, index as u32);
-        for (pixels, samples) in self.batches(bounds.area(), of_pixel, pass) {
-            let start = Instant::now();
-            self.camera_samples(bounds, pixels.clone(), &samples, &mut worker.scratch, &mut worker.samples);
-            worker.times.camera_samples += start.elapsed();
-            let of_pixels = pixels.clone().map(of_pixel).map(|pixel| (pixel, self.samples_of(pixel, &samples)));
-            worker.trace((self.job, &self.camera), fits, (of_pixels, seed));
-            let pixels = pixels.map(|index| (index, self.samples_of(of_pixel(index), &samples)));
-            worker.add(&self.job.world.scene.film, pixels);
-        }
-    }
-
-    /// Splits a pass over some pixels into batches: ranges of pixels, or ranges of the pass where pixels share paths.
-    fn batches(
-        &self,
-        pixels: usize,
-        pixel: impl Fn(usize) -> [u32; 2],
-        pass: &Range<u32>,
-    ) -> Vec<(Range<usize>, Range<u32>)> {
-        let of = |index: usize, pass: &Range<u32>| self.samples_of(pixel(index), pass).len();
-        if self.shares_paths {
-            let paths = |i: u32| (0..pixels).map(|index| of(index, &(i..i + 1))).sum();
-            return batches(pass.clone(), paths).into_iter().map(|part| (0..pixels, part)).collect();
-        }
-        let parts = batches(0..pixels as u32, |index| of(index as usize, pass));
-        parts.into_iter().map(|part| (part.start as usize..part.end as usize, pass.clone())).collect()
-    }
-
-    /// Adds the samples of a pass to the replicas of a tile. The tile is given by its bounds, replicas and fits.
-    pub(super) fn render_replicas(
-        &self,
-        worker: &mut AnyWorker<'_>,
-        (bounds, all, fits): (&PixelBounds, &mut [ReplicaAccumulator], &mut Fits),
-        pass: &Range<u32>,
-    ) {
-        // Replicas have random numbers of their own
-        let seed = pcg4d([self.job.settings().sampling.seed, REPLICA_SEED, 0, 0])[0];
-        let pixels: Vec<[u32; 2]> = all.iter().map(|r| position(bounds, r.pixel)).collect();
-        if pixels.is_empty() {
-            return;
-        }
-        let fit = |replica: usize| (bounds.area() + replica) as u32;
-        for (replicas, pass) in self.batches(pixels.len(), |i| pixels[i], pass) {
-            let samples_of = |i: usize| self.samples_of(pixels[i], &pass);
-            // Draw the camera samples
-            let start = Instant::now();
-            worker.samples.clear();
-            let of_fits = replicas.clone().map(|i| (fit(i), pixels[i], samples_of(i)));
-            self.camera.samples(of_fits, seed, &mut worker.scratch, &mut worker.samples);
-            worker.samples.iter_mut().for_each(|sample| sample.is_replica = true);
-            worker.times.camera_samples += start.elapsed();
-
-            // Trace them and add the results
-            let of_pixels = replicas.clone().map(|i| (pixels[i], samples_of(i)));
-            worker.trace((self.job, &self.camera), fits, (of_pixels, seed));
-            let mut results = worker.results.iter();
-            for i in replicas {
-                results.by_ref().take(samples_of(i).len()).for_each(|result| all[i].add(result));
-            }
-        }
-    }
-
-    /// Camera samples of some pixels of a tile in a pass. Pixels are numbered row by row.
-    pub(super) fn camera_samples(
-        &self,
-        tile: &PixelBounds,
-        pixels: Range<usize>,
-        pass: &Range<u32>,
-        scratch: &mut camera_samples::Scratch,
-        out: &mut Vec<CameraSample>,
-    ) {
-        out.clear();
-        let pixels = pixels.map(|index| {
-            let pixel = position(tile, index as u32);
-            (index as u32, pixel, self.samples_of(pixel, pass))
-        });
-        self.camera.samples(pixels, self.job.settings().sampling.seed, scratch, out);
-    }
-
-    /// Indices of the samples of a pixel in a pass. With adaptive sampling their number differs between pixels.
-    #[inline]
-    fn samples_of(&self, pixel: [u32; 2], pass: &Range<u32>) -> Range<u32> {
-        let Some(of_pixels) = &self.job.pixel_samples else { return pass.clone() };
-        let first = self.settings.first_sample;
-        let [start, end] = [pass.start, pass.end].map(|i| first + of_pixels.until(pixel, i - first));
-        start..end
-    }
-}
-
-/// Adds the records of a cache, given by their pixels, to the sums of the tiles.
-fn add_records(records: &[[u32; 2]], tiles: &mut [Tile]) {
-    let mut of_rows = BTreeMap::<u32, Vec<u32>>::new();
-    records.iter().for_each(|&[x, y]| of_rows.entry(y).or_default().push(x));
-    let add = |tile: &mut Tile| {
-        let PixelBounds { x0, x1, y0, y1 } = tile.bounds;
-        let inside = of_rows.range(y0..y1).flat_map(|(y, row)| row.iter().map(move |x| [*x, *y]));
-        let mut inside = inside.filter(|[x, _]| (x0..x1).contains(x)).peekable();
-        if inside.peek().is_some() {
-            let mut sums = tile.sums.unpacked();
-            inside.for_each(|[x, y]| sums[((y - y0) * (x1 - x0) + x - x0) as usize].records += 1);
-            tile.set_sums(&sums, &mut Vec::new());
-        }
-    };
-    if !records.is_empty() {
-        tiles.par_iter_mut().for_each(add);
     }
 }
 

@@ -1,6 +1,6 @@
 //! Passes over images whose pixels share paths.
 //!
-//! The unit of work is a cell with some share indices ([`cells`], [`super::cell_progress`]). Its pixels are traced
+//! The unit of work is a cell with some share groups ([`cells`], [`super::cell_progress`]). Its pixels are traced
 //! together; their sums are then added to the tiles that overlap the cell. The sums are exact, so the order does not
 //! matter. Replicas share paths in cells of their own, which are the tiles. Finished units are recorded until all
 //! pixels have the samples of the pass.
@@ -13,7 +13,7 @@ use crate::film::exact::FixedSum;
 use crate::film::replicas::ReplicaAccumulator;
 use crate::film::{Film, PixelBounds};
 use crate::integrators::PathStats;
-use crate::integrators::cells::{REPLICA_CELL, TURNS, cells};
+use crate::integrators::cells::{GROUPS_PER_LAYOUT, REPLICA_CELL, cells};
 use rayon::prelude::*;
 use std::ops::Range;
 use std::sync::{Mutex, MutexGuard, PoisonError};
@@ -21,15 +21,15 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 /// A unit of work.
 struct Unit {
     of: Of,
-    turns: Range<u32>,
+    share_groups: Range<u32>,
     is_done: bool,
 }
 
 /// Pixels of a unit.
 #[derive(Clone, Copy)]
 enum Of {
-    /// A cell, by its index among the `count` cells of a group of share indices.
-    Cell { bounds: PixelBounds, group: u32, index: usize, count: usize },
+    /// A cell, by its index among the `count` cells of a layout.
+    Cell { bounds: PixelBounds, layout: u32, index: usize, count: usize },
     /// The replicas of the tile with this index.
     Replicas(usize),
 }
@@ -66,7 +66,7 @@ impl Run<'_> {
         let bounds = image.tiles(REPLICA_CELL);
         let are_alike = bounds.len() == tiles.len()
             && tiles.iter().zip(bounds).all(|(tile, bounds)| tile.bounds == bounds && tile.done == tiles[0].done);
-        let count = |group: u32| cells(image, group.wrapping_mul(TURNS), self.seed()).len();
+        let count = |layout: u32| cells(image, layout.wrapping_mul(GROUPS_PER_LAYOUT), self.seed()).len();
         are_alike && progress.fits(count, tiles.len()) && progress.end().is_none_or(|end| end <= self.end())
     }
 
@@ -80,18 +80,18 @@ impl Run<'_> {
 
         // Trace one unit
         let of_unit = |unit: &mut Unit| {
-            if pass.is_over() || self.stops_at_once() || self.leaves(unit.turns.start) {
+            if pass.is_over() || self.stops_at_once() || self.leaves(unit.share_groups.start) {
                 return PathStats::default();
             }
-            let seen = |film: Film| {
+            let watch = |film: Film| {
                 if let Some(watch) = pass.watch {
                     watch(&film)
                 }
             };
             let stats = workers.with_one(|worker| {
                 match unit.of {
-                    Of::Cell { bounds, .. } => self.render_cell(worker, &shared, (&bounds, &unit.turns), seen),
-                    Of::Replicas(tile) => self.render_replicas_of(worker, &shared, (tile, &unit.turns)),
+                    Of::Cell { bounds, .. } => self.render_cell(worker, &shared, &bounds, &unit.share_groups, watch),
+                    Of::Replicas(tile) => self.render_replicas_of(worker, &shared, tile, &unit.share_groups),
                 }
                 worker.take_stats()
             });
@@ -99,36 +99,37 @@ impl Run<'_> {
             // Record it, and notify observers
             unit.is_done = true;
             let pixels = if let Of::Cell { bounds, .. } = unit.of { bounds.area() } else { 0 };
-            self.note(&stats, pixels as u64 * unit.turns.len() as u64, (total, pass.noise));
+            self.note(&stats, pixels as u64 * unit.share_groups.len() as u64, total, pass.noise);
             stats
         };
 
         // Trace all units
-        let stats = units.par_iter_mut().with_max_len(1).map(of_unit).reduce(PathStats::default, |mut a, b| {
-            a.merge(&b);
-            a
-        });
+        let stats = units.par_iter_mut().with_max_len(1).map(of_unit).sum();
         note_units(tiles, &units, pass.samples.end);
         stats
     }
 
     /// The unfinished units of a pass.
     fn units(&self, Tiles { tiles, cells: progress }: &Tiles, samples: &Range<u32>) -> Vec<Unit> {
-        // Cells of each group of share indices
+        // Cells of each layout
         let unit = |of: Of, next: u32, end: u32| {
-            let turns = next.max(samples.start)..end.min(samples.end);
-            (!turns.is_empty()).then_some(Unit { of, turns, is_done: false })
+            let share_groups = next.max(samples.start)..end.min(samples.end);
+            (!share_groups.is_empty()).then_some(Unit { of, share_groups, is_done: false })
         };
         let image = &self.job.world.scene.film.bounds;
-        let of_group = |group: u32| {
-            let cells = cells(image, group * TURNS, self.seed());
+        let of_layout = |layout: u32| {
+            let cells = cells(image, layout * GROUPS_PER_LAYOUT, self.seed());
             let count = cells.len();
             cells.into_iter().enumerate().filter_map(move |(index, bounds)| {
-                let next = progress.of_cell(group, index).max(group * TURNS);
-                unit(Of::Cell { bounds, group, index, count }, next, (group * TURNS).saturating_add(TURNS))
+                let next = progress.of_cell(layout, index).max(layout * GROUPS_PER_LAYOUT);
+                unit(
+                    Of::Cell { bounds, layout, index, count },
+                    next,
+                    (layout * GROUPS_PER_LAYOUT).saturating_add(GROUPS_PER_LAYOUT),
+                )
             })
         };
-        let of_cells = (samples.start / TURNS..=(samples.end - 1) / TURNS).flat_map(of_group);
+        let of_cells = (samples.start / GROUPS_PER_LAYOUT..=(samples.end - 1) / GROUPS_PER_LAYOUT).flat_map(of_layout);
 
         // Tiles with replicas
         let twice = tiles.iter().enumerate().filter(|(_, tile)| !tile.replicas.is_empty());
@@ -136,23 +137,24 @@ impl Run<'_> {
         of_cells.chain(of_replicas).collect()
     }
 
-    /// Traces a cell and adds its samples to the overlapping tiles. `seen` receives their films.
+    /// Traces a cell and adds its samples to the overlapping tiles. `watch` receives their films.
     fn render_cell(
         &self,
         worker: &mut AnyWorker<'_>,
         tiles: &SharedTiles<'_>,
-        (cell, turns): (&PixelBounds, &Range<u32>),
-        seen: impl Fn(Film),
+        cell: &PixelBounds,
+        share_groups: &Range<u32>,
+        watch: impl Fn(Film),
     ) {
         let mut fits = self.fits(cell.area());
         worker.begin(cell.area());
-        self.trace_pixels_of(worker, &mut fits, cell, turns);
+        self.trace_pixels_of(worker, &mut fits, cell, share_groups);
         let controls = fits.exact_sums();
         for mut tile in tiles.touched(cell) {
             worker.add_to(&mut tile, cell);
             merge_controls(&mut tile, cell, &controls);
             tile.fits.pack(&mut worker.packing);
-            seen(self.film_of(&tile));
+            watch(self.film_of(&tile));
         }
     }
 
@@ -161,10 +163,10 @@ impl Run<'_> {
         &self,
         worker: &mut AnyWorker<'_>,
         tiles: &SharedTiles<'_>,
-        (tile, turns): (usize, &Range<u32>),
+        tile: usize,
+        share_groups: &Range<u32>,
     ) {
         // Start empty sums for the same replicas
-        let shared = &tiles.tiles[tile];
         let (bounds, mut replicas) = {
             let tile = tiles.tile(tile);
             let none = |r: &ReplicaAccumulator| ReplicaAccumulator { pixel: r.pixel, ..ReplicaAccumulator::default() };
@@ -173,10 +175,10 @@ impl Run<'_> {
 
         // Trace without a lock
         let mut fits = self.fits(bounds.area() + replicas.len());
-        self.render_replicas(worker, (&bounds, &mut replicas, &mut fits), turns);
+        self.render_replicas(worker, &bounds, &mut replicas, &mut fits, share_groups);
 
         // Merge
-        let mut tile = shared.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut tile = tiles.tile(tile);
         tile.replicas.iter_mut().zip(&replicas).for_each(|(sum, more)| sum.merge(more));
         let sums = fits.exact_sums();
         let row = sums.len() / (bounds.area() + replicas.len());
@@ -213,8 +215,8 @@ fn merge_controls(tile: &mut Tile, cell: &PixelBounds, controls: &[FixedSum]) {
 fn note_units(Tiles { tiles, cells: progress }: &mut Tiles, units: &[Unit], end: u32) {
     for unit in units.iter().filter(|unit| unit.is_done) {
         match unit.of {
-            Of::Cell { group, index, count, .. } => progress.set_cell(group, (index, count), unit.turns.end),
-            Of::Replicas(tile) => progress.set_replicas((tile, tiles.len()), unit.turns.end),
+            Of::Cell { layout, index, count, .. } => progress.set_cell(layout, index, count, unit.share_groups.end),
+            Of::Replicas(tile) => progress.set_replicas(tile, tiles.len(), unit.share_groups.end),
         }
     }
     if units.iter().all(|unit| unit.is_done) {

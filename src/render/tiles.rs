@@ -4,6 +4,7 @@ use super::cell_progress::CellProgress;
 use super::{BATCH_PATHS, RenderSettings};
 use crate::direct::{Estimator, Fits};
 use crate::film::accumulator::PixelAccumulator;
+use crate::film::layers::PackedLayers;
 use crate::film::packed::PackedSums;
 use crate::film::replicas::{ReplicaAccumulator, ReplicaChoice};
 use crate::film::{Film, FilmTile, PixelBounds};
@@ -11,6 +12,8 @@ use crate::integrators::cells::REPLICA_CELL;
 use crate::integrators::{light_paths, reuse};
 use crate::scene::RenderJob;
 use crate::settings::IntegratorKind;
+use rayon::prelude::*;
+use std::collections::BTreeMap;
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -48,8 +51,8 @@ pub(super) struct Tile {
     pub(super) done: u32,
     /// Sums of its pixels, row by row, shared with films.
     pub(super) sums: Arc<PackedSums>,
-    /// Sums of the light-group layers.
-    pub(super) layers: Vec<Arc<PackedSums>>,
+    /// Sums of the light-group layers, shared with films.
+    pub(super) layers: Arc<PackedLayers>,
     pub(super) replicas: Vec<ReplicaAccumulator>,
     /// Fits of its pixels, row by row, then of its replicas.
     pub(super) fits: Fits,
@@ -58,28 +61,14 @@ pub(super) struct Tile {
 impl Tile {
     /// Replaces the sums of the pixels. `scratch` is a buffer.
     pub(super) fn set_sums(&mut self, sums: &[PixelAccumulator], scratch: &mut Vec<u8>) {
-        set(&mut self.sums, sums, scratch);
+        // Sums that a film shares stay unchanged
+        if Arc::get_mut(&mut self.sums).is_none() {
+            self.sums = Arc::new(PackedSums::new(sums.len()));
+        }
+        if let Some(packed) = Arc::get_mut(&mut self.sums) {
+            packed.set(sums, scratch);
+        }
     }
-
-    /// Replaces the sums of a light-group layer.
-    pub(super) fn set_layer(&mut self, layer: usize, sums: &[PixelAccumulator], scratch: &mut Vec<u8>) {
-        set(&mut self.layers[layer], sums, scratch);
-    }
-}
-
-fn set(packed: &mut Arc<PackedSums>, sums: &[PixelAccumulator], scratch: &mut Vec<u8>) {
-    // Sums that a film shares stay unchanged
-    if Arc::get_mut(packed).is_none() {
-        *packed = Arc::new(PackedSums::new(sums.len()));
-    }
-    if let Some(packed) = Arc::get_mut(packed) {
-        packed.set(sums, scratch);
-    }
-}
-
-/// Light-group layers of a tile without samples.
-pub(super) fn empty_layers(count: usize, pixels: usize) -> Vec<Arc<PackedSums>> {
-    (0..count).map(|_| Arc::new(PackedSums::new(pixels))).collect()
 }
 
 /// Tiles that cover an image, or a part of it.
@@ -114,29 +103,33 @@ pub(super) fn replica_choice(job: &RenderJob, render: &RenderSettings) -> Option
 
 /// The film of some tiles, which shares their sums. `layers` are the names of the light-group layers.
 pub(super) fn film(resolution: [u32; 2], bounds: PixelBounds, tiles: &[Tile], layers: &[String]) -> Film {
-    let width = bounds.width();
-    let index = |tile: &Tile, pixel: u32| {
-        let [x, y] = position(&tile.bounds, pixel);
-        (y - bounds.y0) * width + (x - bounds.x0)
-    };
+    let index = |tile: &Tile, pixel: u32| bounds.index_of(tile.bounds.pixel_at(pixel)) as u32;
 
     // Replicas, with their pixel indices in the film
     let replicas = tiles.iter().flat_map(|t| t.replicas.iter().map(move |r| r.replica(index(t, r.pixel))));
     let replicas = replicas.collect();
 
-    // A film for each light-group layer
-    let of_layer = |i: usize| {
-        let tiles = tiles.iter().map(|t| FilmTile { bounds: t.bounds, sums: Arc::clone(&t.layers[i]) });
-        Film::new(resolution, bounds, tiles.collect(), Vec::new())
-    };
-    let layers = layers.iter().enumerate().map(|(i, name)| (name.clone(), of_layer(i))).collect();
-    let tiles = tiles.iter().map(|t| FilmTile { bounds: t.bounds, sums: Arc::clone(&t.sums) });
-    Film::new(resolution, bounds, tiles.collect(), replicas).with_light_layers(layers)
+    let tile = |t: &Tile| FilmTile { bounds: t.bounds, sums: Arc::clone(&t.sums), layers: Arc::clone(&t.layers) };
+    Film::new(resolution, bounds, tiles.iter().map(tile).collect(), replicas).with_light_layers(layers.to_vec())
 }
 
-/// Coordinates of the pixel with the given index in a tile, row by row.
-pub(super) fn position(tile: &PixelBounds, index: u32) -> [u32; 2] {
-    [tile.x0 + index % tile.width(), tile.y0 + index / tile.width()]
+/// Adds the records of a cache, given by their pixels, to the sums of the tiles.
+pub(super) fn add_records(records: &[[u32; 2]], tiles: &mut [Tile]) {
+    let mut of_rows = BTreeMap::<u32, Vec<u32>>::new();
+    records.iter().for_each(|&[x, y]| of_rows.entry(y).or_default().push(x));
+    let add = |tile: &mut Tile| {
+        let bounds = tile.bounds;
+        let inside = of_rows.range(bounds.y0..bounds.y1).flat_map(|(y, row)| row.iter().map(move |x| [*x, *y]));
+        let mut inside = inside.filter(|pixel| bounds.contains(*pixel)).peekable();
+        if inside.peek().is_some() {
+            let mut sums = tile.sums.unpacked();
+            inside.for_each(|pixel| sums[bounds.index_of(pixel)].records += 1);
+            tile.set_sums(&sums, &mut Vec::new());
+        }
+    };
+    if !records.is_empty() {
+        tiles.par_iter_mut().for_each(add);
+    }
 }
 
 /// Splits a range into parts of at most [`BATCH_PATHS`] paths each. A part has at least one element.
@@ -167,7 +160,7 @@ mod tests {
             let mut covered = vec![0; 203 * 77];
             for index in 0..count {
                 for tile in bounds_of_tiles(&image, size, Some(TileShare { index, count })) {
-                    (0..tile.area() as u32).map(|i| position(&tile, i)).for_each(|[x, y]| {
+                    tile.pixels().for_each(|[x, y]| {
                         covered[(y * 203 + x) as usize] += 1;
                     });
                 }

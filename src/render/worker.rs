@@ -1,17 +1,18 @@
 //! Tracers and buffers of the threads of a rendering.
 
-use super::looks::Looks;
+use super::emission_rays::EmissionRays;
 use super::phases::WorkerTimes;
 use super::tiles::Tile;
 use crate::direct::Fits;
 use crate::film::accumulator::PixelAccumulator;
+use crate::film::layers::LayerScratch;
 use crate::film::{FeatureSet, PixelBounds, PixelSample};
-use crate::integrators::camera_samples::{CameraSampler, Scratch};
+use crate::integrators::camera_samples::{CameraSampler, PixelSampleRange, Scratch};
 use crate::integrators::path::CameraSample;
 use crate::integrators::{Integrator, PathStats, Tracer};
-use crate::scene::{FilmSettings, RenderJob};
-use std::ops::Range;
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use crate::scene::FilmSettings;
+use lumiris_numbers::math::Rgb;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
 /// Buffers of one thread.
@@ -24,18 +25,35 @@ pub(super) struct Worker<T> {
     pub(super) sums: Vec<PixelAccumulator>,
     /// Sums of a tile that receives the sums of a cell, where cells are traced instead of tiles.
     of_tile: Vec<PixelAccumulator>,
-    /// Sums of the light-group layers.
-    layers: Vec<Vec<PixelAccumulator>>,
+    /// Samples of each light-group layer with their pixels, until they are added to a tile.
+    light: Vec<Vec<(u32, Rgb)>>,
+    /// Pixel of each sample of a batch.
+    pixels: Vec<u32>,
     /// Buffer for packing sums.
     pub(super) packing: Vec<u8>,
-    looks: Looks,
+    of_layers: LayerScratch,
+    emission_rays: EmissionRays,
     pub(super) times: WorkerTimes,
 }
 
 impl<T> Worker<T> {
     pub(super) fn new(tracer: T) -> Self {
-        let (samples, scratch, results, sums, of_tile, layers, packing, looks, times) = Default::default();
-        Worker { tracer, samples, scratch, results, sums, of_tile, layers, packing, looks, times }
+        let (samples, scratch, results, sums, of_tile, light, pixels) = Default::default();
+        let (packing, of_layers, emission_rays, times) = Default::default();
+        Worker {
+            tracer,
+            samples,
+            scratch,
+            results,
+            sums,
+            of_tile,
+            light,
+            pixels,
+            packing,
+            of_layers,
+            emission_rays,
+            times,
+        }
     }
 }
 
@@ -44,12 +62,9 @@ impl AnyWorker<'_> {
     pub(super) fn read(&mut self, tile: &Tile) {
         let start = Instant::now();
         let area = tile.bounds.area();
-        self.layers.resize_with(tile.layers.len(), Vec::new);
-        let layers = self.layers.iter_mut().zip(&tile.layers);
-        for (sums, packed) in layers.chain([(&mut self.sums, &tile.sums)]) {
-            sums.resize(area, PixelAccumulator::default());
-            packed.read(0..area, sums);
-        }
+        self.sums.resize(area, PixelAccumulator::default());
+        tile.sums.read(0..area, &mut self.sums);
+        self.light.resize_with(tile.layers.len(), Vec::new);
         self.times.film += start.elapsed();
     }
 
@@ -76,18 +91,19 @@ impl AnyWorker<'_> {
     /// in the order of the samples, with the indices of their samples. `seed` is the seed of the samples.
     pub(super) fn trace(
         &mut self,
-        (job, camera): (&RenderJob, &CameraSampler<'_>),
+        camera: &CameraSampler<'_>,
         fits: &mut Fits,
-        (pixels, seed): (impl Iterator<Item = ([u32; 2], Range<u32>)>, u32),
+        pixels: impl Iterator<Item = PixelSampleRange>,
+        seed: u32,
     ) {
         // Trace paths, then the additional emission rays
         let start = Instant::now();
-        let Worker { tracer, samples, results, looks, .. } = self;
-        tracer.trace(job, samples, fits, results);
-        looks.replace((job, camera), (samples, seed), pixels, (results, tracer.light_layers()));
+        let Worker { tracer, samples, results, emission_rays, .. } = self;
+        tracer.trace(camera.job(), samples, fits, results);
+        emission_rays.replace(camera, samples, seed, pixels, results, tracer.light_layers());
 
         // Apply the white balance
-        let film = &job.world.scene.film;
+        let film = &camera.job().world.scene.film;
         if film.balance.is_some() {
             for result in &mut self.results {
                 (result.radiance, result.offset) = (film.balanced(result.radiance), film.balanced(result.offset));
@@ -99,28 +115,25 @@ impl AnyWorker<'_> {
     /// Counts and times since the last call.
     pub(super) fn take_stats(&mut self) -> PathStats {
         let mut stats = self.tracer.take_stats();
-        stats.merge(&self.looks.take_stats());
+        stats.merge(&self.emission_rays.take_stats());
         stats
     }
 
     /// Adds the results to the sums of their pixels. `pixels` lists the pixels in the order of the results, with the
     /// indices of their samples.
-    pub(super) fn add(&mut self, film: &FilmSettings, pixels: impl Iterator<Item = (usize, Range<u32>)>) {
+    pub(super) fn add(&mut self, film: &FilmSettings, pixels: impl Iterator<Item = PixelSampleRange>) {
         let start = Instant::now();
-        let Worker { tracer, results, sums, layers, .. } = self;
-        let count = layers.len();
-        let of_layers = tracer.light_layers();
+        let Worker { tracer, results, sums, light, pixels: pixel_of, .. } = self;
         let mut first = 0;
-        for (pixel, samples) in pixels {
+        pixel_of.clear();
+        for PixelSampleRange { fit, samples, .. } in pixels {
             let of_pixel = first..first + samples.len();
             first = of_pixel.end;
-            sums[pixel].add_all(samples.start, &results[of_pixel.clone()]);
-            for (layer, sums) in layers.iter_mut().enumerate() {
-                for (i, k) in samples.clone().zip(of_pixel.clone()) {
-                    let radiance = film.balanced(of_layers[k * count + layer]);
-                    sums[pixel].add(i, &PixelSample { radiance, ..PixelSample::default() });
-                }
-            }
+            sums[fit as usize].add_all(samples.start, &results[of_pixel]);
+            pixel_of.resize(first, fit);
+        }
+        for sum in tracer.light_layers().iter().flat_map(|layers| layers.entries()) {
+            light[sum.layer as usize].push((pixel_of[sum.sample as usize], film.balanced(sum.radiance)));
         }
         self.times.film += start.elapsed();
     }
@@ -129,8 +142,10 @@ impl AnyWorker<'_> {
     pub(super) fn write(&mut self, tile: &mut Tile) {
         let start = Instant::now();
         tile.set_sums(&self.sums, &mut self.packing);
-        for (layer, sums) in self.layers.iter().enumerate() {
-            tile.set_layer(layer, sums, &mut self.packing);
+        for (layer, samples) in self.light.iter_mut().enumerate().filter(|(_, samples)| !samples.is_empty()) {
+            // Sums that a film shares stay unchanged
+            Arc::make_mut(&mut tile.layers).add(layer, samples, &mut self.of_layers);
+            samples.clear();
         }
         self.times.film += start.elapsed();
     }
@@ -160,7 +175,7 @@ impl<'a> Workers<'a> {
         let mut worker = idle.unwrap_or_else(|| {
             let mut tracer = self.integrator.tracer(self.features);
             tracer.keep_light_layers(self.light_layers);
-            Worker { looks: Looks::new(self.light_layers), ..Worker::new(tracer) }
+            Worker { emission_rays: EmissionRays::new(self.light_layers), ..Worker::new(tracer) }
         });
         let (result, times) = WorkerTimes::of(|| work(&mut worker));
         worker.times.merge(&times);

@@ -1,6 +1,9 @@
 //! A render job: a world with its settings, and the data derived from both.
 
-use super::{PixelSamples, SampleCountMap, Scene, World};
+use super::input::Scene;
+use super::pixel_samples::PixelSamples;
+use super::sample_count_map::SampleCountMap;
+use super::world::World;
 use crate::accel::Hit;
 use crate::bsdfs::MAX_LOBES;
 use crate::geometry::{GeometryId, Shape};

@@ -21,9 +21,8 @@ pub struct SampleCountMap {
 
 impl SampleCountMap {
     /// M/N of a pixel.
-    pub fn ratio(&self, [x, y]: [u32; 2]) -> f32 {
-        let row = (y - self.bounds.y0) as usize * self.bounds.width() as usize;
-        self.ratios[row + (x - self.bounds.x0) as usize]
+    pub fn ratio(&self, pixel: [u32; 2]) -> f32 {
+        self.ratios[self.bounds.index_of(pixel)]
     }
 
     /// Sample counts of one estimate in a pixel, rounded stochastically by `u`, so that their expectations are exact.

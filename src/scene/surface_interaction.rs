@@ -1,6 +1,6 @@
 //! A surface interaction: a hit with the data for shading.
 
-use super::RenderJob;
+use super::job::RenderJob;
 use crate::accel::Hit;
 use crate::geometry::{SurfaceHit, VertexValues};
 use crate::materials::{Dispersion, SurfaceBsdf};
@@ -31,7 +31,7 @@ impl SurfaceInteraction {
     ///
     /// The texture footprint is the pixel that sees the point directly, for every kind of path. Light paths, photons
     /// and shadow rays must evaluate the same surface as the camera paths that they are combined with.
-    pub fn new(job: &RenderJob, ray: &Ray, (width, spread): (f32, f32), hit: &Hit) -> Self {
+    pub fn new(job: &RenderJob, ray: &Ray, width: f32, spread: f32, hit: &Hit) -> Self {
         let set = &job.world.scene.geometry;
         let surface = set.surface_hit_of_ray(hit.geometry, hit.primitive, hit.instance, hit.uv, ray);
         let distance = hit.t * ray.d.length();

@@ -1,6 +1,6 @@
 //! A scene with its ray tracers.
 
-use super::Scene;
+use super::input::Scene;
 use crate::accel::bvh::Bvh;
 use crate::accel::embree::{EmbreeAccel, EmbreeError};
 use crate::accel::{Accel, Coherence, Hit, RayBatch};

@@ -1,8 +1,9 @@
 //! Settings that are given explicitly, on the command line, in a scene file or in Python, and the settings among them
 //! without effect on an image.
 
+use super::image_settings::Settings;
 use super::table::Setting;
-use super::{Settings, Value};
+use super::value::Value;
 
 /// Explicit settings, each with its last value.
 #[derive(Clone, Debug, Default)]

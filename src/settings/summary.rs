@@ -1,6 +1,8 @@
 //! A one-line description of the rendering, in plain words.
 
-use super::{Allocation, EstimatorKind, IntegratorKind, SampleCounts, Settings};
+use super::image_settings::Settings;
+use super::integrator::{EstimatorKind, IntegratorKind, SampleCounts};
+use super::sampling::Allocation;
 
 impl Settings {
     /// The estimator of direct light, path sharing, and the sample distribution, in one line. It depends only on the

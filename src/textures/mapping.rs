@@ -1,6 +1,6 @@
 //! Maps from surface points to texture coordinates.
 
-use super::TextureContext;
+use super::context::TextureContext;
 use glam::Mat2;
 use lumiris_numbers::math::{DAffine3, DVec2, Vec2, Vec3, warp};
 use std::f32::consts::{FRAC_1_PI, PI, TAU};

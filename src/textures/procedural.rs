@@ -1,7 +1,8 @@
 //! Procedural textures of pbrt-v4: sums of noise, marble, and polka dots. They are point sampled: all octaves are
 //! evaluated at any pixel size, and the samples of a pixel average them.
 
-use super::{Mapping2d, TextureContext};
+use super::context::TextureContext;
+use super::mapping::Mapping2d;
 use lumiris_numbers::math::noise::noise;
 use lumiris_numbers::math::{DAffine3, DVec3, Rgb, Vec2};
 use std::f64::consts::TAU;

@@ -1,7 +1,7 @@
 //! UDIM: images side by side in the plane of texture coordinates. Tile 1001 + u + 10·v covers [u, u + 1) × [v, v + 1),
 //! for u from 0 to 9.
 
-use super::ImageId;
+use super::context::ImageId;
 use lumiris_numbers::math::{DVec2, Vec2};
 
 /// Index into [`TextureSet::udims`](super::TextureSet::udims).

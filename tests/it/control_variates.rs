@@ -68,8 +68,8 @@ fn different_numbers_of_samples_change_no_mean() {
         });
         let bounds = job.world.scene.film.bounds;
         let counts = (0..bounds.area() as u32).map(|i| 8 << (i * 7 / 3 % 4)).collect();
-        let looks = (0..bounds.area()).map(|i| [1, 1, 3][i % 3]).collect();
-        job.pixel_samples = Some(PixelSamples { bounds, spp: 16, counts, looks });
+        let emission_rays = (0..bounds.area()).map(|i| [1, 1, 3][i % 3]).collect();
+        job.pixel_samples = Some(PixelSamples { bounds, spp: 16, counts, emission_rays });
         let image = |seed| {
             job.change(|s| s.sampling.seed = seed);
             let settings = RenderSettings { spp: 16, ..RenderSettings::default() };

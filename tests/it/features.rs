@@ -1,12 +1,13 @@
 //! Table of feature conflicts: each row refuses with its own sentence, and all allowed combinations have the light of
 //! plain path tracing.
 
-use lumiris::film::{Film, PixelSums};
+use lumiris::film::Film;
 use lumiris::import::cache::FileCache;
 use lumiris::import::{LoadOptions, load_text};
 use lumiris::integrators::features::{Feature, OPTIONAL, TABLE, between, conflict, refusal};
 use lumiris::integrators::{light_layers, light_paths, reuse};
 use lumiris::planning::{Preparation, prepare};
+use lumiris::render::output::{Aov, layers};
 use lumiris::render::{RenderSettings, render};
 use lumiris::scene::{AccelKind, RenderJob};
 use lumiris::settings::{EstimatorKind, IntegratorKind, IntegratorSettings, OcvForm, Target};
@@ -216,10 +217,11 @@ fn means(scene: &Scene, seeds: std::ops::Range<u32>) -> [Welford; 3] {
     for seed in seeds {
         job.change(|s| s.sampling.seed = seed);
         let film = film(&job, 8).unwrap();
-        let layers = film.light_layers().iter().map(|(_, layer)| layer.pixels());
-        let parts: Vec<_> = if light_layers::count(&job) > 0 { layers.collect() } else { vec![film.pixels()] };
+        let images = layers(&film, &[Aov::LightGroups], None);
+        let parts = if light_layers::count(&job) > 0 { &images[1..] } else { &images[..] };
+        let pixels = || parts.iter().flat_map(|(_, image)| image.data.as_chunks::<3>().0);
         for (c, mean) in means.iter_mut().enumerate() {
-            mean.add(parts.iter().flatten().map(|pixel| PixelSums::mean(pixel)[c]).sum::<f64>() / film.len() as f64);
+            mean.add(pixels().map(|pixel| f64::from(pixel[c])).sum::<f64>() / film.len() as f64);
         }
     }
     means

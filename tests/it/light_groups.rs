@@ -1,11 +1,12 @@
 //! Layers of the image by light group: they add up to the image, and each has the light of its group.
 
-use lumiris::film::{Film, PixelBounds, PixelSums};
+use lumiris::film::{Film, PixelBounds};
+use lumiris::imaging::Image;
 use lumiris::import::cache::FileCache;
 use lumiris::import::{LoadOptions, load_text};
 use lumiris::integrators::features::{Feature, allows};
 use lumiris::integrators::light_layers;
-use lumiris::render::output::{Aov, channels};
+use lumiris::render::output::{Aov, channels, layers};
 use lumiris::render::{RenderSettings, render};
 use lumiris::scene::{AccelKind, PixelSamples, RenderJob};
 use lumiris::settings::{EstimatorKind, IntegratorKind, Target};
@@ -98,8 +99,8 @@ fn choose(job: &mut RenderJob, (kind, estimator, samples): (IntegratorKind, Esti
 /// The same sample count in all pixels, with extra emission rays in some of them.
 fn split(spp: u32) -> PixelSamples {
     let (bounds, pixels) = (PixelBounds { x0: 0, x1: EDGE, y0: 0, y1: EDGE }, (EDGE * EDGE) as usize);
-    let looks = (0..pixels).map(|i| [1, 6][i % 2]).collect();
-    PixelSamples { bounds, spp, counts: vec![spp; pixels], looks }
+    let emission_rays = (0..pixels).map(|i| [1, 6][i % 2]).collect();
+    PixelSamples { bounds, spp, counts: vec![spp; pixels], emission_rays }
 }
 
 #[test]
@@ -111,15 +112,13 @@ fn layers_add_up_to_the_image_and_leave_its_bits() {
         choose(&mut job, method);
         assert_eq!(light_layers::count(&job), LIGHTS.len(), "{method:?}");
         let with = film(&job, 4);
-        let names: Vec<&str> = with.light_layers().iter().map(|(name, _)| name.as_str()).collect();
-        assert_eq!(names, LIGHTS.map(|(name, _)| name), "{method:?}");
+        assert_eq!(with.light_layers(), LIGHTS.map(|(name, _)| name), "{method:?}");
 
         // Sums of the layers
         let mut sums = vec![[0.0; 3]; with.len()];
-        for (_, layer) in with.light_layers() {
-            let pixels = layer.pixels();
-            assert!(pixels.iter().all(|p| p.count == 4 && p.invalid == 0));
-            sums.iter_mut().zip(&pixels).for_each(|(sum, p)| (0..3).for_each(|c| sum[c] += p.mean()[c]));
+        for (_, layer) in &layers(&with, &[Aov::LightGroups], None)[1..] {
+            let pixels = layer.data.as_chunks::<3>().0;
+            sums.iter_mut().zip(pixels).for_each(|(sum, p)| (0..3).for_each(|c| sum[c] += f64::from(p[c])));
         }
         for (sum, pixel) in sums.iter().zip(with.pixels()) {
             for (sum, whole) in sum.iter().zip(pixel.mean()) {
@@ -145,8 +144,9 @@ fn layers_add_up_to_the_image_and_leave_its_bits() {
 fn a_layer_has_the_light_of_its_group_alone() {
     // Means of images
     let images = 24;
-    let mean = |pixels: &[PixelSums]| {
-        [0, 1, 2].map(|c| pixels.iter().map(|p| p.mean()[c]).sum::<f64>() / f64::from(EDGE * EDGE))
+    let mean = |image: &Image| {
+        let pixels = image.data.as_chunks::<3>().0;
+        [0, 1, 2].map(|c| pixels.iter().map(|p| f64::from(p[c])).sum::<f64>() / f64::from(EDGE * EDGE))
     };
     let film = |job: &mut RenderJob, seed| {
         job.change(|s| s.sampling.seed = seed);
@@ -167,9 +167,12 @@ fn a_layer_has_the_light_of_its_group_alone() {
         let films: Vec<Film> = (0..images).map(|seed| film(&mut all, seed)).collect();
         for (alone, (group, _)) in of_lights.iter_mut().zip(LIGHTS) {
             choose(alone, method);
-            let layer = |film: &Film| film.light_layers().iter().find(|(name, _)| name == group).unwrap().1.pixels();
-            let of_layer: Vec<_> = films.iter().map(|film| mean(&layer(film))).collect();
-            let of_image: Vec<_> = (images..2 * images).map(|seed| mean(&film(alone, seed).pixels())).collect();
+            let name = format!("light_{group}");
+            let of_layers = films.iter().map(|film| layers(film, &[Aov::LightGroups], None));
+            let layer = |layers: Vec<(String, Image)>| layers.into_iter().find(|(other, _)| *other == name).unwrap().1;
+            let of_layer: Vec<_> = of_layers.map(|layers| mean(&layer(layers))).collect();
+            let image = |seed| mean(&layers(&film(alone, seed), &[], None)[0].1);
+            let of_image: Vec<_> = (images..2 * images).map(image).collect();
             for c in 0..3 {
                 let ((a, va), (b, vb)) = (summary(&of_layer, c), summary(&of_image, c));
                 let error = (va + vb).sqrt();

@@ -114,7 +114,7 @@ fn samples_of_any_number_have_their_light_paths() {
 fn different_numbers(job: &RenderJob, spp: u32) -> PixelSamples {
     let bounds = job.world.scene.film.bounds;
     let counts = (0..bounds.area() as u32).map(|i| (spp / 2) << (i * 7 / 3 % 4)).collect();
-    PixelSamples { bounds, spp, counts, looks: Vec::new() }
+    PixelSamples { bounds, spp, counts, emission_rays: Vec::new() }
 }
 
 /// Light paths and camera paths divide the light between them: light via metal and glass must be neither lost nor

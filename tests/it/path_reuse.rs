@@ -54,7 +54,7 @@ pub(crate) fn pixel_means(job: &mut RenderJob, seeds: std::ops::Range<u32>, spp:
 fn different_numbers(job: &RenderJob, spp: u32) -> PixelSamples {
     let bounds = job.world.scene.film.bounds;
     let counts = (0..bounds.area() as u32).map(|i| (spp / 4) << (i * 7 / 3 % 4)).collect();
-    PixelSamples { bounds, spp, counts, looks: Vec::new() }
+    PixelSamples { bounds, spp, counts, emission_rays: Vec::new() }
 }
 
 /// The mean and its variance.

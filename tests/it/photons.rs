@@ -3,8 +3,8 @@
 use super::irradiance_cache::{ROOM, world_of};
 use lumiris::integrators::irradiance_cache::gather::{Gatherer, RecordRequest};
 use lumiris::photons::{
-    GatherScratch, Importance, ImportanceSettings, LowImportance, Photon, PhotonBudget, PhotonError, PhotonMap, Place,
-    Search, Traced, Tracing, path_count, trace_importons, trace_photons,
+    GatherPoint, GatherScratch, Importance, ImportanceSettings, LowImportance, Photon, PhotonBudget, PhotonError,
+    PhotonMap, Search, Traced, Tracing, path_count, trace_importons, trace_photons,
 };
 use lumiris::scene::RenderJob;
 use lumiris::settings::{Cached, IntegratorKind};
@@ -60,7 +60,7 @@ fn channels(rgb: Rgb) -> [f64; 3] {
 }
 
 /// Irradiance at a point over seeds, by channel.
-fn irradiances(runs: u32, place: &Place, search: Search, photons: impl Fn(u32) -> Vec<Photon>) -> [Welford; 3] {
+fn irradiances(runs: u32, place: &GatherPoint, search: Search, photons: impl Fn(u32) -> Vec<Photon>) -> [Welford; 3] {
     let mut e = [Welford::default(); 3];
     for seed in 0..runs {
         let map = PhotonMap::new(photons(seed));
@@ -111,7 +111,7 @@ fn a_furnace_has_its_irradiance_whatever_lossless_things_stand_in_it() {
         ("no surface", "Material \"interface\" Translate 0.2 -0.9 0.1 Shape \"sphere\" \"float radius\" [ 0.9 ]\n"),
     ] {
         let job = world_of(&furnace(things), |_| ());
-        let place = Place::flat(Vec3::new(0.1, -2.0, 0.2), Vec3::Y);
+        let place = GatherPoint::flat(Vec3::new(0.1, -2.0, 0.2), Vec3::Y);
         let tracing = |seed| Tracing { seed, max_depth: 80, ..Tracing::default() };
         let e = irradiances(12, &place, Search::Radius(0.5), |seed| both(&trace(&job, &tracing(seed), 20_000)));
         for (c, rho) in [0.5, 0.25, 0.75].into_iter().enumerate() {
@@ -194,7 +194,7 @@ fn photons_agree_with_path_tracing_among_many_materials() {
         let expected = path_traced(&job, (p, n), radius, key);
         let mut e = [Welford::default(); 3];
         for map in &maps {
-            let value = map.irradiance(&Place::flat(p, n), Search::Radius(radius), &mut GatherScratch::default());
+            let value = map.irradiance(&GatherPoint::flat(p, n), Search::Radius(radius), &mut GatherScratch::default());
             e.iter_mut().zip(channels(value)).for_each(|(e, value)| e.add(value));
         }
         for (c, (e, expected)) in e.iter().zip(&expected).enumerate() {
@@ -213,7 +213,7 @@ fn inside_glass_light_is_denser_by_the_square_of_the_index() {
     let things = "Translate 0.2 -0.9 0.1\nMaterial \"dielectric\"\nShape \"sphere\" \"float radius\" [ 0.9 ]\n\
         Material \"diffuse\" \"rgb reflectance\" [ 1 1 1 ]\nShape \"sphere\" \"float radius\" [ 0.6 ]\n";
     let job = world_of(&furnace(things), |_| ());
-    let place = Place::flat(Vec3::new(0.2, -0.3, 0.1), Vec3::Y);
+    let place = GatherPoint::flat(Vec3::new(0.2, -0.3, 0.1), Vec3::Y);
     let tracing = |seed| Tracing { seed, max_depth: 150, ..Tracing::default() };
     let e = irradiances(12, &place, Search::Radius(0.25), |seed| both(&trace(&job, &tracing(seed), 20_000)));
     for (c, rho) in [0.5, 0.25, 0.75].into_iter().enumerate() {
@@ -244,7 +244,7 @@ Shape "trianglemesh" "point3 P" [ 0 0 -1  0 2 -1  0 2 1  0 0 1 ] "integer indice
     let [record] = Gatherer::default().records(&job, &[wanted(p, n)])[..] else { panic!("one record") };
     let tracing = |seed| Tracing { seed, max_depth: 1, ..Tracing::default() };
     let search = Search::Radius(0.2);
-    let e = irradiances(12, &Place::flat(p, n), search, |seed| trace(&job, &tracing(seed), 700_000).global);
+    let e = irradiances(12, &GatherPoint::flat(p, n), search, |seed| trace(&job, &tracing(seed), 700_000).global);
     let expected = f64::from(record.light.e.g);
     let bound = 4.0 * e[1].standard_error() + 0.02 * expected;
     assert!(bound < 0.08 * expected, "the test can tell");
@@ -265,7 +265,7 @@ Material "dielectric" Translate 0 1.05 0 Shape "sphere" "float radius" [ 0.7 ]
 
 #[test]
 fn caustics_come_from_direct_and_from_indirect_light() {
-    let below = Place::flat(Vec3::ZERO, Vec3::Y);
+    let below = GatherPoint::flat(Vec3::ZERO, Vec3::Y);
     let mut scratch = GatherScratch::default();
     let tracing = Tracing { max_depth: 6, ..Tracing::default() };
 
@@ -285,7 +285,7 @@ fn caustics_come_from_direct_and_from_indirect_light() {
     let indirect = trace(&world_of(&up, |_| ()), &tracing, 100_000);
     assert!(indirect.global.iter().filter(|p| p.is_primary()).all(|p| p.p().y > 3.9));
     let map = PhotonMap::new(indirect.caustic);
-    let at = |x: f32| Place::flat(Vec3::new(x, 0.0, 0.0), Vec3::Y);
+    let at = |x: f32| GatherPoint::flat(Vec3::new(x, 0.0, 0.0), Vec3::Y);
     let e = |x: f32, scratch: &mut GatherScratch| map.irradiance(&at(x), Search::Radius(0.15), scratch).g;
     assert!(e(0.0, &mut scratch) > 10.0 * e(2.0, &mut scratch) && e(0.0, &mut scratch) > 0.0);
 }
@@ -293,7 +293,7 @@ fn caustics_come_from_direct_and_from_indirect_light() {
 #[test]
 fn a_global_map_of_some_of_the_photon_paths_is_the_same_on_average() {
     let job = world_of(ROOM, |_| ());
-    let place = Place::flat(Vec3::new(0.4, 0.0, 0.5), Vec3::Y);
+    let place = GatherPoint::flat(Vec3::new(0.4, 0.0, 0.5), Vec3::Y);
     let (q, count) = (0.2, 40_000);
     let of = |q| {
         let run = |seed| trace(&job, &Tracing { seed, q, max_depth: 5, ..Tracing::default() }, count);
@@ -350,8 +350,8 @@ fn importance_moves_photons_to_what_is_seen_and_keeps_their_light() {
     assert!(floor.is_unbiased() && !importance(&job, LowImportance::CutOff(0.02)).is_unbiased());
 
     // The same expected light at visible and hidden points
-    let seen = Place::flat(Vec3::new(-1.0, 0.0, 0.2), Vec3::Y);
-    let hidden = Place::flat(Vec3::new(1.2, 0.0, -0.3), Vec3::Y);
+    let seen = GatherPoint::flat(Vec3::new(-1.0, 0.0, 0.2), Vec3::Y);
+    let hidden = GatherPoint::flat(Vec3::new(1.2, 0.0, -0.3), Vec3::Y);
     for place in [seen, hidden] {
         let plain = irradiances(runs, &place, Search::Radius(0.3), |seed| by(None, seed).global);
         let thinned = irradiances(runs, &place, Search::Radius(0.3), |seed| by(Some(&floor), 100 + seed).global);

@@ -67,7 +67,7 @@ fn adaptive_images_have_the_samples_they_ask_for_and_do_not_depend_on_threads_or
         let pixels = film.pixels();
         assert!(film.replicas().iter().all(|r| r.count == pixels[r.pixel as usize].count));
         // Edges of the lamp have extra emission rays
-        assert!(samples.looks.iter().any(|looks| *looks > 2));
+        assert!(samples.emission_rays.iter().any(|n| *n > 2));
         if noise.is_none() {
             let mean = samples.total() as f64 / film.len() as f64;
             assert!((32.0..128.0).contains(&mean), "the time is that of 64: {mean}");
@@ -206,7 +206,7 @@ fn numbers_of_samples_add_no_bias() {
     let truth_of_lamp = mean(&part(&exact, 0, 1 << 17).pixels());
 
     let (mut noise, mut adaptive, mut wrong) = (Welford::default(), Welford::default(), Welford::default());
-    let (mut seen, mut with_looks) = (Welford::default(), 0);
+    let (mut seen, mut with_rays) = (Welford::default(), 0);
     let mut numbers = std::collections::BTreeSet::new();
     for seed in 0..RUNS {
         job.change(|s| {
@@ -219,7 +219,7 @@ fn numbers_of_samples_add_no_bias() {
             (s.sampling.seed, s.sampling.noise, s.sampling.spp) = (seed, Some(THRESHOLD), 256);
         });
         let (film, samples) = rendered(&mut lamp, 1, 16);
-        with_looks += u32::from(!samples.looks.is_empty());
+        with_rays += u32::from(!samples.emission_rays.is_empty());
         seen.add(mean(&film.pixels()));
 
         job.change(|s| (s.sampling.noise, s.sampling.allocation, s.sampling.spp) = (None, Allocation::Adaptive, 16));
@@ -235,7 +235,7 @@ fn numbers_of_samples_add_no_bias() {
     assert!(z(&noise).abs() < 3.0, "--noise: {} instead of {truth}, z = {}", noise.mean(), z(&noise));
     let of_lamp = z_test(seen.mean(), truth_of_lamp, seen.standard_error()).statistic;
     assert!(of_lamp.abs() < 3.0, "--noise, a lamp: {} instead of {truth_of_lamp}, z = {of_lamp}", seen.mean());
-    assert!(with_looks > RUNS / 4, "{with_looks}");
+    assert!(with_rays > RUNS / 4, "{with_rays}");
     assert!(z(&adaptive).abs() < 3.0, "adaptive: {} instead of {truth}, z = {}", adaptive.mean(), z(&adaptive));
     // A quarter of the runs suffices to detect the bias of samples that determine their own number
     assert!(z(&wrong) < -5.0, "{} instead of {truth}, z = {}", wrong.mean(), z(&wrong));

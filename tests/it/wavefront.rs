@@ -34,17 +34,7 @@ fn camera_samples(job: &RenderJob) -> Vec<CameraSample> {
         let film = Vec2::new(pixel[0] as f32 + 0.5, pixel[1] as f32 + 0.5);
         let ray = job.world.scene.camera.ray(film, [0.5; 2], 0.0);
         let sample_counts = job.settings().integrator.sample_counts();
-        CameraSample {
-            ray,
-            weight: 1.0,
-            stream,
-            direct: stream,
-            sample_counts,
-            turn: 0,
-            fit: 0,
-            pixel,
-            is_replica: false,
-        }
+        CameraSample { pixel, ..CameraSample::of_ray(ray, 1.0, stream, sample_counts) }
     };
     pixels.map(sample).collect()
 }

@@ -1,8 +1,10 @@
 //! `whitebalance` of a film: a linear map of the film without it.
 
-use lumiris::film::{Film, PixelSums};
+use lumiris::film::Film;
+use lumiris::imaging::Image;
 use lumiris::import::cache::FileCache;
 use lumiris::import::{LoadOptions, load_text};
+use lumiris::render::output::{Aov, layers};
 use lumiris::render::{RenderSettings, render};
 use lumiris::scene::{AccelKind, RenderJob};
 use lumiris::settings::{EstimatorKind, IntegratorKind};
@@ -39,8 +41,8 @@ fn film(job: &RenderJob) -> Film {
 
 /// Means of a film and of its layers.
 fn means(film: &Film) -> Vec<Vec<[f64; 3]>> {
-    let of = |film: &Film| film.pixels().iter().map(PixelSums::mean).collect();
-    std::iter::once(of(film)).chain(film.light_layers().iter().map(|(_, layer)| of(layer))).collect()
+    let of = |image: &Image| image.data.as_chunks::<3>().0.iter().map(|pixel| pixel.map(f64::from)).collect();
+    layers(film, &[Aov::LightGroups], None).iter().map(|(_, image)| of(image)).collect()
 }
 
 #[test]

@@ -1,6 +1,8 @@
 //! Speed of photon tracing, and of building and querying photon maps.
 
-use lumiris::photons::{GatherScratch, PhotonBudget, PhotonError, PhotonMap, Place, Search, Tracing, trace_photons};
+use lumiris::photons::{
+    GatherPoint, GatherScratch, PhotonBudget, PhotonError, PhotonMap, Search, Tracing, trace_photons,
+};
 use lumiris::render::{RenderError, thread_pool};
 use lumiris::scene::RenderJob;
 use lumiris_numbers::estimators::stats::median;
@@ -88,7 +90,8 @@ pub fn measure_photons(job: &RenderJob, threads: Option<usize>, runs: u32) -> Re
 
 fn queries_per_second(map: &PhotonMap, search: Search, runs: u32) -> f64 {
     let stride = (map.len() / QUERIES).max(1);
-    let places: Vec<Place> = map.photons().iter().step_by(stride).map(|p| Place::flat(p.p(), p.n())).collect();
+    let places: Vec<GatherPoint> =
+        map.photons().iter().step_by(stride).map(|p| GatherPoint::flat(p.p(), p.n())).collect();
     let mut scratch = GatherScratch::default();
     let mut times = Vec::new();
     for _ in 0..runs.max(1) {

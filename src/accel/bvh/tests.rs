@@ -4,6 +4,7 @@ use super::*;
 use crate::accel::scenes_for_tests::{
     Stripes, mixed_scene, random_patches, random_quadric, random_rays, separate_triangles, soup,
 };
+use crate::accel::{Accel, Coherence, Hit, RayBatch};
 use crate::geometry::reference_for_tests::random_point;
 use crate::geometry::triangle::{RayPrecomputed, intersect_triangle};
 use crate::geometry::{BilinearMesh, GeometryId, Instance, TriangleMesh, loop_subdivide};

@@ -1,8 +1,8 @@
 //! Traversal of both levels by a single ray.
 
+use super::hierarchy::{Bvh, TESTED};
 use super::tree::{Block, Child, ChildRef, Node, Other, Tree};
-use super::{Bvh, TESTED};
-use crate::accel::Hit;
+use crate::accel::{Accel, AccelStats, Coherence, Hit, RayBatch};
 use crate::geometry::triangle::{RayPrecomputed, intersect_triangle};
 use crate::geometry::{LocalHit, Visibility};
 use lumiris_numbers::math::{Ray, Vec4, gamma};
@@ -304,5 +304,29 @@ impl<'a, Q: Query> Walk<'a, Q> {
         let flags = self.bvh.flags[hit.geometry as usize];
         let is_stopped = || self.bvh.alpha.as_ref().is_none_or(|test| test.stops((hit, crossing), self.world_ray));
         flags & Q::MASK != 0 && self.query.wants(hit) && (flags & TESTED == 0 || is_stopped())
+    }
+}
+
+impl Accel for Bvh {
+    fn intersect(&self, rays: &RayBatch, _coherence: Coherence, hits: &mut Vec<Option<Hit>>) {
+        hits.clear();
+        let mut stack = Vec::with_capacity(128);
+        hits.extend((0..rays.len()).map(|i| {
+            let ray = rays.get(i);
+            Walk::new(self, &ray, Closest::new(ray.t_max), &mut stack).run().best
+        }));
+    }
+
+    fn occluded(&self, rays: &RayBatch, _coherence: Coherence, occluded: &mut Vec<bool>) {
+        occluded.clear();
+        let mut stack = Vec::with_capacity(128);
+        occluded.extend((0..rays.len()).map(|i| {
+            let ray = rays.get(i);
+            Walk::new(self, &ray, Any::new(ray.t_max), &mut stack).run().found
+        }));
+    }
+
+    fn stats(&self) -> AccelStats {
+        self.stats
     }
 }

@@ -6,11 +6,12 @@
 #![allow(unsafe_code)]
 
 use super::device::Device;
+use super::embree_accel::{Builder, checked_width, has_only_triangles};
+use super::error::EmbreeError;
 use super::kernels::{self, Mode, QueryKind, RayHitPacket, RayPacket, Valid};
 use super::query::{ANY_SINGLE, can_trace, load, single_ray};
 use super::scene::{self, EmbreeScene};
 use super::world::World;
-use super::{Builder, EmbreeError, checked_width, has_only_triangles};
 use crate::accel::RayBatch;
 use crate::geometry::{AlphaSource, GeometrySet, Shape, Visibility};
 use embree4_sys as sys;

@@ -1,7 +1,7 @@
 //! The Embree device: errors, memory, capabilities.
 #![allow(unsafe_code)]
 
-use super::{EmbreeError, ErrorCode};
+use super::error::{EmbreeError, ErrorCode};
 use embree4_sys as sys;
 use embree4_sys::{RTCDeviceProperty as Property, RTCError};
 use std::ffi::{CStr, c_char, c_void};

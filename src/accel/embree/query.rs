@@ -1,8 +1,8 @@
 //! Conversion of ray batches to Embree's single rays and packets, and of the results.
 #![allow(unsafe_code)]
 
-use super::EmbreeAccel;
 use super::context::{QueryContext, Ties};
+use super::embree_accel::EmbreeAccel;
 use super::exact::ExactHits;
 use super::kernels::{self, Mode, QueryKind, RayHitPacket, RayPacket, Valid};
 use super::world::{Refined, Reported};

@@ -1,9 +1,9 @@
 //! Embree geometries and scenes.
 #![allow(unsafe_code)]
 
-use super::EmbreeError;
 use super::callbacks::{self, GeometryContext};
 use super::device::Device;
+use super::error::EmbreeError;
 use crate::geometry::{GeometryId, GeometrySet, Instance, Shape};
 use embree4_sys as sys;
 use embree4_sys::{RTCBufferType, RTCFormat, RTCGeometryType, RTCSceneFlags};

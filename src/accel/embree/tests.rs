@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::accel::Bvh;
+use crate::accel::embree::ErrorCode;
 use crate::accel::scenes_for_tests::{
     Stripes, mixed_scene, random_placement, random_rays, rippled_sphere, separate_triangles, soup,
 };

@@ -5,11 +5,11 @@ mod densities;
 mod evaluated;
 mod measured;
 
-use super::hair::HairLobes;
-use super::principled::Interior;
-use super::sheen::Sheen;
-use super::*;
-use lumiris_numbers::math::{safe_sqrt, sqr, warp};
+use crate::bsdfs::hair::HairLobes;
+use crate::bsdfs::principled::Interior;
+use crate::bsdfs::sheen::Sheen;
+use crate::bsdfs::*;
+use lumiris_numbers::math::{Rgb, Vec3, safe_sqrt, sqr, warp};
 use lumiris_test_support::Moments;
 use lumiris_test_support::random::{Pcg32, RngExt, pcg32};
 use std::f32::consts::{PI, TAU};

@@ -68,7 +68,9 @@ impl Controls {
         &mut self,
         job: &RenderJob,
         [n_light, n_bsdf]: [f32; 2],
-        (samples, traced, scratch): (&SampleColumns, &Traced, &Scratch),
+        samples: &SampleColumns,
+        traced: &Traced,
+        scratch: &Scratch,
         vertices: &Vertices<'_>,
     ) {
         self.find_hidden(job, samples, traced);
@@ -103,7 +105,8 @@ impl Controls {
         &mut self,
         job: &RenderJob,
         [n_light, n_bsdf]: [f32; 2],
-        (samples, emitters): (&SampleColumns, &EmitterRays),
+        samples: &SampleColumns,
+        emitters: &EmitterRays,
         vertices: &Vertices<'_>,
     ) {
         self.divide([n_light, n_bsdf], samples, false);

@@ -3,6 +3,7 @@
 use super::samples::SampleColumns;
 use crate::accel::RayBatch;
 use crate::direct::bsdf_samples::{EmitterInDirection, emitter_at};
+use crate::direct::point::LightPoint;
 use crate::direct::vertices::Vertices;
 use crate::lights::LightId;
 use crate::lights::many::LightSamples;
@@ -30,7 +31,8 @@ impl EmitterRays {
     pub(super) fn find(
         &mut self,
         job: &RenderJob,
-        (vertices, n): (&Vertices<'_>, usize),
+        vertices: &Vertices<'_>,
+        n: usize,
         samples: &mut SampleColumns,
     ) -> u64 {
         let len = padded(n);
@@ -46,7 +48,7 @@ impl EmitterRays {
             lights[i] = hit.light;
             let pmf = |ctx: &_, light| job.lights.sampler.pmf(ctx, light);
             match emitter_at(job, &at.get(i), samples.light.wi.vec3(i), &hit, time[i], pmf) {
-                Some(found) => set_emitter(&mut samples.light, i, &found),
+                Some(emitter) => set_emitter(&mut samples.light, i, &emitter),
                 None => samples.bsdf.pdf[i] = 0.0,
             }
         };
@@ -69,7 +71,13 @@ impl EmitterRays {
             rows.iter().zip(&*emitter_hits).for_each(|(&i, hit)| add(samples, i as usize, *hit));
         }
 
-        // Infinite lights for rays without a hit
+        self.add_infinite(job, vertices, samples);
+        self.rows.len() as u64
+    }
+
+    /// Sets the infinite lights of the rays that hit nothing.
+    fn add_infinite(&self, job: &RenderJob, vertices: &Vertices<'_>, samples: &mut SampleColumns) {
+        let (far, at) = (&self.far, vertices.surface.lit_points());
         let SampleColumns { light: LightSamples { wi, li, pdf, is_far, is_delta, .. }, bsdf, .. } = samples;
         let p_bsdf = &mut bsdf.pdf;
         let directions = wi;
@@ -85,16 +93,15 @@ impl EmitterRays {
                 is_far[i] = 1.0;
             },
         );
-        rows.len() as u64
     }
 }
 
 /// Sets the emitter of BSDF sample `i`.
-fn set_emitter(samples: &mut LightSamples, i: usize, found: &EmitterInDirection) {
-    samples.li.set_rgb(i, found.li);
-    samples.pdf[i] = if samples.is_delta[i] { 0.0 } else { found.p_light };
-    samples.is_far[i] = if found.end.is_some() { 0.0 } else { 1.0 };
-    if let Some((p, p_error, n)) = found.end {
+fn set_emitter(samples: &mut LightSamples, i: usize, emitter: &EmitterInDirection) {
+    samples.li.set_rgb(i, emitter.li);
+    samples.pdf[i] = if samples.is_delta[i] { 0.0 } else { emitter.p_light };
+    samples.is_far[i] = if emitter.end.is_some() { 0.0 } else { 1.0 };
+    if let Some(LightPoint { p, p_error, n }) = emitter.end {
         samples.p.set(i, p);
         samples.p_error.set(i, p_error);
         samples.n.set(i, n);

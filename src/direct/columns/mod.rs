@@ -144,7 +144,7 @@ impl ColumnStage {
             let start = Instant::now();
             let draw = batch.draw(true, index, self.allocations.len());
             self.sample_lights(&batch, draw, sinks.rest);
-            let proposed = self.trace(&batch, draw, sinks, (stats, start));
+            let proposed = self.trace(&batch, draw, sinks, stats, start);
             stats.t1_light += proposed - start;
             self.add_controls(&batch, draw);
         }
@@ -154,7 +154,7 @@ impl ColumnStage {
             let start = Instant::now();
             let draw = batch.draw(false, index, self.allocations.len());
             stats.emitter_rays += self.sample_bsdfs(&batch, draw);
-            self.trace(&batch, draw, sinks, (stats, start));
+            self.trace(&batch, draw, sinks, stats, start);
             self.add_controls(&batch, draw);
         }
     }
@@ -201,9 +201,9 @@ impl ColumnStage {
         let n = [batch.usual.n_light, batch.usual.n_bsdf];
         let ColumnStage { controls, samples, traced, scratch, emitter_rays, .. } = self;
         if draw.by_light {
-            controls.add_light_samples(batch.job, n, (samples, traced, scratch), batch.vertices);
+            controls.add_light_samples(batch.job, n, samples, traced, scratch, batch.vertices);
         } else {
-            controls.add_bsdf_samples(batch.job, n, (samples, emitter_rays), batch.vertices);
+            controls.add_bsdf_samples(batch.job, n, samples, emitter_rays, batch.vertices);
         }
     }
 
@@ -302,7 +302,7 @@ impl ColumnStage {
 
         // Emitters
         self.samples.make_origins(&vertices.surface, padded(n));
-        let count = self.emitter_rays.find(job, (vertices, n), &mut self.samples);
+        let count = self.emitter_rays.find(job, vertices, n, &mut self.samples);
         self.weigh(batch, draw);
         count
     }
@@ -332,7 +332,8 @@ impl ColumnStage {
         batch: &Batch<'_, '_>,
         draw: Draw,
         sinks: &mut Sinks<'_>,
-        (stats, start): (&mut DirectStats, Instant),
+        stats: &mut DirectStats,
+        start: Instant,
     ) -> Instant {
         let Batch { job, techniques, vertices, .. } = *batch;
         // Control variates of a light sample need its occlusion by emitters, even if its weight is 0
@@ -372,28 +373,31 @@ impl ColumnStage {
     /// stay there.
     fn occlude(&mut self, batch: &Batch<'_, '_>, draw: Draw, stats: &mut DirectStats) {
         let Batch { job, vertices, .. } = *batch;
-        let Traced { rows, rays, occluded, crossing, crossing_rays } = &mut self.traced;
+        let Traced { rows, rays, occluded, crossing, some_rays, some_occluded } = &mut self.traced;
 
         // Segments that may pass surfaces or media
         let crosses = |row: u32| job.shadows_pass() || vertices.media(row as usize) != Sides::default();
         crossing.clear();
         crossing.extend((0..rows.len() as u32).filter(|&k| crosses(rows[k as usize])));
+        stats.segments += (rays.len() - crossing.len()) as u64;
+        if crossing.is_empty() {
+            return job.world.accel.occluded(rays, Coherence::Packets, occluded);
+        }
 
         // Occlusion of the others
+        occluded.clear();
+        occluded.resize(rays.len(), false);
         if crossing.len() < rows.len() {
-            job.world.accel.occluded(rays, Coherence::Packets, occluded);
-            stats.segments += (rays.len() - crossing.len()) as u64;
-        } else {
-            occluded.clear();
-            occluded.resize(rays.len(), false);
-        }
-        if crossing.is_empty() {
-            return;
+            let others = || (0..rows.len()).filter(|&k| !crosses(rows[k]));
+            some_rays.clear();
+            others().for_each(|k| some_rays.push(&rays.get(k)));
+            job.world.accel.occluded(some_rays, Coherence::Packets, some_occluded);
+            others().zip(some_occluded).for_each(|(k, is_occluded)| occluded[k] = *is_occluded);
         }
 
         // Transmittance
-        crossing_rays.clear();
-        crossing.iter().for_each(|&k| crossing_rays.push(&rays.get(k as usize)));
+        some_rays.clear();
+        crossing.iter().for_each(|&k| some_rays.push(&rays.get(k as usize)));
         self.cross(batch, draw, stats);
     }
 
@@ -417,7 +421,7 @@ impl ColumnStage {
         };
 
         // Trace, and multiply the contributions
-        crossing.start(job, &self.traced.crossing_rays, departure);
+        crossing.start(job, &self.traced.some_rays, departure);
         stats.segments += crossing.trace(job);
         stats.collisions += crossing.collisions();
         for (k, transmittance) in crossing.transmittance().enumerate() {

@@ -70,10 +70,11 @@ pub(super) struct Traced {
     pub(super) rows: Vec<u32>,
     pub(super) rays: RayBatch,
     pub(super) occluded: Vec<bool>,
-    /// Indices of the segments that may pass surfaces or media, and copies of these segments.
+    /// Indices of the segments that may pass surfaces or media.
     pub(super) crossing: Vec<u32>,
-    /// See [`Self::crossing`].
-    pub(super) crossing_rays: RayBatch,
+    /// Copies of some of the segments, and their occlusion.
+    pub(super) some_rays: RayBatch,
+    pub(super) some_occluded: Vec<bool>,
 }
 
 impl Traced {

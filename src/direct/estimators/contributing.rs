@@ -84,7 +84,7 @@ impl Contributing {
         let job = t1.job;
         let mut draws = Draws { estimator: *self, job, buffers, of_points: Vec::new() };
         let allocate = |point: &ShadingPoint<'_>| self.allocation(point);
-        t1.draw_lights(allocate, |_, at, allocation, records| draws.draw(at, allocation, records));
+        t1.draw_lights(allocate, |_, index, point, allocation, records| draws.draw(index, point, allocation, records));
         let Draws { buffers, of_points, .. } = draws;
         let drawn_at = |point: u32| of_points.get(point as usize).and_then(Option::as_ref);
         t1.draw_bsdf(allocate, &mut [], |point, ctx, light| {
@@ -125,7 +125,7 @@ struct Draws<'a, 'b> {
 #[derive(Clone, Debug)]
 struct Drawn<'a> {
     /// 𝓛_con with photon counts.
-    seen: ContributingLights<'a>,
+    contributing: ContributingLights<'a>,
     /// Samples on 𝓛_con (S_con).
     n: u32,
     /// Range of their rates in [`Buffers::rates`]; empty if lights are chosen by photon counts.
@@ -140,7 +140,7 @@ struct Drawn<'a> {
 enum Others {
     /// n samples of lights without photons, which survive with a probability of their expected contribution times
     /// `scale`.
-    Unseen { n: u32, scale: f32 },
+    Noncontributing { n: u32, scale: f32 },
     /// n samples of all lights by the light sampler.
     BySampler { n: u32 },
 }
@@ -151,32 +151,33 @@ impl Drawn<'_> {
     fn rate(&self, lights: &LightSampling, buffers: &Buffers, ctx: &LightCtx, light: LightId) -> f32 {
         let n = match self.others {
             Others::BySampler { n } => return n as f32 * lights.sampler.pmf(ctx, light),
-            Others::Unseen { n, .. } => n as f32,
+            Others::Noncontributing { n, .. } => n as f32,
         };
-        if let Some(k) = self.seen.place(light) {
+        if let Some(k) = self.contributing.place(light) {
             let weighted = buffers.rates[self.rates.clone()].get(k).copied();
             return weighted.unwrap_or_else(|| self.rate_by_photons(k));
         }
-        let (Others::Unseen { scale, .. }, Some(learned)) = (self.others, lights.learned_visibility()) else {
+        let (Others::Noncontributing { scale, .. }, Some(learned)) = (self.others, lights.learned_visibility()) else {
             return 0.0;
         };
-        let unseen = learned.unseen_light(ctx, (&self.seen, &buffers.singles[self.singles.clone()]), light);
-        let pmf = unseen.choice.pmf;
-        if pmf > 0.0 && unseen.importance > 0.0 { n * pmf * survival(&unseen, scale) } else { 0.0 }
+        let noncontributing =
+            learned.unseen_light(ctx, (&self.contributing, &buffers.singles[self.singles.clone()]), light);
+        let pmf = noncontributing.choice.pmf;
+        if pmf > 0.0 && noncontributing.importance > 0.0 { n * pmf * survival(&noncontributing, scale) } else { 0.0 }
     }
 
     /// Expected number of samples of contributing light number `k`, chosen in proportion to photon counts.
     #[inline]
     fn rate_by_photons(&self, k: usize) -> f32 {
-        let total = self.seen.sums.last().map_or(1.0, |&total| total as f32);
-        self.n as f32 * cumulative::weight(self.seen.sums, k) / total
+        let total = self.contributing.sums.last().map_or(1.0, |&total| total as f32);
+        self.n as f32 * cumulative::weight(self.contributing.sums, k) / total
     }
 }
 
 /// Survival probability of a sample of a light without photons; `scale` is the probability per expected contribution.
 #[inline]
-fn survival(unseen: &UnseenLight, scale: f32) -> f32 {
-    (unseen.importance * unseen.visibility.sqrt() / unseen.choice.pmf * scale).min(1.0)
+fn survival(noncontributing: &UnseenLight, scale: f32) -> f32 {
+    (noncontributing.importance * noncontributing.visibility.sqrt() / noncontributing.choice.pmf * scale).min(1.0)
 }
 
 /// A point with its lights.
@@ -191,16 +192,23 @@ struct At<'a, 'p> {
 
 impl At<'_, '_> {
     /// The candidate of a light sample. `rate` is the expected number of samples of the light.
-    fn sample(&self, light: LightId, rate: f32, u: [f32; 2], of_all: (&Drawn<'_>, &Buffers)) -> Option<Candidate> {
+    fn sample(
+        &self,
+        light: LightId,
+        rate: f32,
+        u: [f32; 2],
+        drawn: &Drawn<'_>,
+        buffers: &Buffers,
+    ) -> Option<Candidate> {
         let mut sample = self.lights.lights[light as usize].sample_li(&self.ctx, u)?;
         sample.pdf *= rate;
         if self.n_bsdf > 0.0 && self.overlaps(light) {
             // Infinite lights overlap: all of them contribute to a direction
-            let rate = |ctx: &LightCtx, light| of_all.0.rate(self.lights, of_all.1, ctx, light);
+            let rate = |ctx: &LightCtx, light| drawn.rate(self.lights, buffers, ctx, light);
             (sample.li, sample.pdf) = self.lights.infinite_in_direction_by(&self.ctx, sample.wi, rate);
         }
         let allocation = SampleAllocation { n_bsdf: self.n_bsdf, ..SampleAllocation::fixed(1, 0) };
-        unshadowed_candidate((self.index, self.point), &allocation, (light, sample))
+        unshadowed_candidate(self.index, self.point, &allocation, light, sample)
     }
 
     /// True if other infinite lights overlap with the light.
@@ -232,7 +240,8 @@ impl Draws<'_, '_> {
     /// Draws the light samples of a point. Returns the number of samples.
     fn draw(
         &mut self,
-        (index, point): (u32, &ShadingPoint<'_>),
+        index: u32,
+        point: &ShadingPoint<'_>,
         allocation: &SampleAllocation,
         records: &mut Vec<Candidate>,
     ) -> u32 {
@@ -243,7 +252,7 @@ impl Draws<'_, '_> {
         let n_bsdf = if self.estimator.bsdf_samples > 0 { allocation.n_bsdf } else { 0.0 };
         let Buffers { rates, singles, .. } = &*self.buffers;
         let mut drawn = Drawn {
-            seen: ContributingLights::default(),
+            contributing: ContributingLights::default(),
             n,
             rates: rates.len()..rates.len(),
             singles: singles.len()..singles.len(),
@@ -254,12 +263,12 @@ impl Draws<'_, '_> {
         let by_cache = lights.learned_visibility().and_then(|learned| {
             let ctx = point.light_ctx();
             let at = At { lights, learned, index, point, ctx, n_bsdf };
-            drawn.seen = lights.contributing_lights(&ctx);
+            drawn.contributing = lights.contributing_lights(&ctx);
             self.draw_by_cache(&at, [n, n_non], &mut drawn, records)
         });
         let count = by_cache.unwrap_or_else(|| {
             let allocation = SampleAllocation { n_bsdf, ..SampleAllocation::fixed(n + n_non, 0) };
-            light_samples::draw(self.job, (index, point), &allocation, records)
+            light_samples::draw(self.job, index, point, &allocation, records)
         });
 
         // BSDF samples need the expected sample counts of the lights
@@ -282,37 +291,37 @@ impl Draws<'_, '_> {
         drawn: &mut Drawn<'_>,
         records: &mut Vec<Candidate>,
     ) -> Option<u32> {
-        let seen = drawn.seen.lights;
-        if seen.is_empty() {
-            drawn.others = Others::Unseen { n: n + n_non, scale: f32::INFINITY };
-            return Some(at.draw_unseen((drawn, self.buffers), records));
+        let contributing = drawn.contributing.lights;
+        if contributing.is_empty() {
+            drawn.others = Others::Noncontributing { n: n + n_non, scale: f32::INFINITY };
+            return Some(at.draw_noncontributing(drawn, self.buffers, records));
         }
 
         // Expected contribution Σ E·V̂
-        let expected = if seen.len() <= MAX_WEIGHTED {
-            self.weigh(at, &drawn.seen)?
+        let expected = if contributing.len() <= MAX_WEIGHTED {
+            self.weigh(at, &drawn.contributing)?
         } else {
-            seen.iter().map(|&(light, count)| at.learned.irradiance_of(light, count)).sum()
+            contributing.iter().map(|&(light, count)| at.learned.irradiance_of(light, count)).sum()
         };
 
         // Survival of samples of non-contributing lights
-        at.learned.find_singles(&drawn.seen, &mut self.buffers.singles);
+        at.learned.find_singles(&drawn.contributing, &mut self.buffers.singles);
         drawn.singles.end = self.buffers.singles.len();
-        drawn.others = Others::Unseen { n: n_non, scale: SURVIVAL / expected };
-        if seen.len() <= MAX_WEIGHTED {
+        drawn.others = Others::Noncontributing { n: n_non, scale: SURVIVAL / expected };
+        if contributing.len() <= MAX_WEIGHTED {
             self.draw_weighted(at, drawn, records);
         } else {
             self.draw_by_photons(at, drawn, records);
         }
-        Some(n + at.draw_unseen((drawn, self.buffers), records))
+        Some(n + at.draw_noncontributing(drawn, self.buffers, records))
     }
 
     /// Weights the contributing lights by E·√V̂. Returns Σ E·V̂; `None` if the sums are 0 or not finite.
-    fn weigh(&mut self, at: &At<'_, '_>, seen: &ContributingLights<'_>) -> Option<f32> {
+    fn weigh(&mut self, at: &At<'_, '_>, contributing: &ContributingLights<'_>) -> Option<f32> {
         let weights = &mut self.buffers.weights;
         weights.clear();
         let (mut sum, mut expected) = (0.0, 0.0);
-        for &(light, count) in seen.lights {
+        for &(light, count) in contributing.lights {
             let (importance, visibility) = at.learned.expect(&at.ctx, light, count);
             let weight = importance * visibility.sqrt();
             sum += weight;
@@ -327,7 +336,7 @@ impl Draws<'_, '_> {
         let Buffers { weights, rates, .. } = &mut *self.buffers;
         let [offset] = at.point.stream.domain(domain::COUNTS).draw::<1>();
         let scale = drawn.n as f32 / weights.iter().sum::<f32>();
-        let lights = drawn.seen.lights;
+        let lights = drawn.contributing.lights;
         let numbers = || systematic(weights, scale, offset).zip(lights);
         rates.extend(numbers().map(|((wanted, count), &(light, _))| at.rate(light, wanted, count)));
         drawn.rates.end = rates.len();
@@ -337,20 +346,20 @@ impl Draws<'_, '_> {
             let rate = buffers.rates[drawn.rates.start + k];
             for i in 0..count {
                 let u = at.point.stream.split(domain::CONTRIBUTING + k as u32, count, i).draw::<2>();
-                records.extend(at.sample(light, rate, u, (drawn, buffers)));
+                records.extend(at.sample(light, rate, u, drawn, buffers));
             }
         }
     }
 
     /// Draws samples of contributing lights, chosen in proportion to their photon counts.
     fn draw_by_photons(&self, at: &At<'_, '_>, drawn: &Drawn<'_>, records: &mut Vec<Candidate>) {
-        let (ContributingLights { lights, sums }, n) = (drawn.seen, drawn.n);
+        let (ContributingLights { lights, sums }, n) = (drawn.contributing, drawn.n);
         let Some(&total) = sums.last() else { return };
         for i in 0..n {
             let [u_choice, u0, u1] = at.point.stream.split(domain::LIGHT, n, i).draw::<3>();
             let k = cumulative::find(sums, u_choice * total as f32).min(lights.len() - 1);
             let rate = drawn.rate_by_photons(k);
-            records.extend(at.sample(lights[k].0, rate, [u0, u1], (drawn, self.buffers)));
+            records.extend(at.sample(lights[k].0, rate, [u0, u1], drawn, self.buffers));
         }
     }
 }
@@ -358,25 +367,27 @@ impl Draws<'_, '_> {
 impl At<'_, '_> {
     /// Draws samples of the lights without photons, with roulette by their expected contribution. Returns the number of
     /// surviving samples.
-    fn draw_unseen(&self, (drawn, buffers): (&Drawn<'_>, &Buffers), records: &mut Vec<Candidate>) -> u32 {
-        let Others::Unseen { n, scale } = drawn.others else { return 0 };
-        if drawn.seen.lights.len() == self.lights.lit.len() {
+    fn draw_noncontributing(&self, drawn: &Drawn<'_>, buffers: &Buffers, records: &mut Vec<Candidate>) -> u32 {
+        let Others::Noncontributing { n, scale } = drawn.others else { return 0 };
+        if drawn.contributing.lights.len() == self.lights.lit.len() {
             return 0;
         }
-        let (seen, singles) = (&drawn.seen, &buffers.singles[drawn.singles.clone()]);
+        let (contributing, singles) = (&drawn.contributing, &buffers.singles[drawn.singles.clone()]);
         let mut count = 0;
         for i in 0..n {
             let [u_choice, u_survival, u0, u1] = self.point.stream.split(domain::NONCONTRIBUTING, n, i).draw::<4>();
-            let Some(unseen) = self.learned.sample_unseen(&self.ctx, (seen, singles), u_choice) else { continue };
-            let SampledLight { light, pmf, .. } = unseen.choice;
+            let Some(noncontributing) = self.learned.sample_unseen(&self.ctx, (contributing, singles), u_choice) else {
+                continue;
+            };
+            let SampledLight { light, pmf, .. } = noncontributing.choice;
             // Contributing lights have their own samples
-            if seen.place(light).is_some() || !(unseen.importance > 0.0) {
+            if contributing.place(light).is_some() || !(noncontributing.importance > 0.0) {
                 continue;
             }
-            let survival = survival(&unseen, scale);
+            let survival = survival(&noncontributing, scale);
             if u_survival < survival {
                 count += 1;
-                records.extend(self.sample(light, n as f32 * pmf * survival, [u0, u1], (drawn, buffers)));
+                records.extend(self.sample(light, n as f32 * pmf * survival, [u0, u1], drawn, buffers));
             }
         }
         count

@@ -158,7 +158,7 @@ pub(super) struct Buffers {
     /// BSDF samples, Σ L̄ along their rays, and their candidates.
     pending: Vec<PendingBsdf>,
     crossed: Vec<Rgb>,
-    found: Vec<Option<Candidate>>,
+    bsdf_candidates: Vec<Option<Candidate>>,
     rays: RayBatch,
     ray_of: Vec<u32>,
     next_rays: RayBatch,
@@ -182,16 +182,16 @@ impl Correlated {
         // Light samples
         let start = Instant::now();
         for (index, point) in points.iter().enumerate() {
-            b.draw_delta(job, (index, point), candidates);
+            b.draw_delta(job, index, point, candidates);
             if b.estimates[index].plan.technique == SamplingTechnique::Light {
-                b.draw_light(job, (index, point), candidates);
+                b.draw_light(job, index, point, candidates);
             }
         }
         candidates.stats.t1_light += start.elapsed();
 
         // BSDF samples, and their emitters
         for (index, point) in points.iter().enumerate() {
-            b.draw_bsdf((index, point), candidates);
+            b.draw_bsdf(index, point, candidates);
         }
         b.follow(job, points, candidates);
         b.add_bsdf(candidates);
@@ -223,7 +223,7 @@ impl Correlated {
 
 impl Buffers {
     /// Draws samples of delta lights.
-    fn draw_delta(&mut self, job: &RenderJob, (index, point): (usize, &ShadingPoint<'_>), candidates: &mut Candidates) {
+    fn draw_delta(&mut self, job: &RenderJob, index: usize, point: &ShadingPoint<'_>, candidates: &mut Candidates) {
         let estimate = self.estimates[index];
         let Plan { delta_draws, n_delta, .. } = estimate.plan;
         let Some(sampler) = job.lights.delta.as_ref().filter(|_| delta_draws > 0) else { return };
@@ -239,13 +239,13 @@ impl Buffers {
             let candidate = sampler
                 .sample(&ctx, u_choice)
                 .and_then(|choice| job.lights.sample_choice(&ctx, choice, [u0, u1]))
-                .and_then(|drawn| light_candidate(job, (index as u32, point), &allocation, drawn));
+                .and_then(|(light, s)| light_candidate(job, index as u32, point, &allocation, light, s));
             self.add(index, candidate, control, candidates);
         }
     }
 
     /// Draws light samples of the combined estimate.
-    fn draw_light(&mut self, job: &RenderJob, (index, point): (usize, &ShadingPoint<'_>), candidates: &mut Candidates) {
+    fn draw_light(&mut self, job: &RenderJob, index: usize, point: &ShadingPoint<'_>, candidates: &mut Candidates) {
         let estimate = self.estimates[index];
         let n = estimate.plan.draws;
         let allocation = SampleAllocation::fixed(n, 0);
@@ -257,20 +257,21 @@ impl Buffers {
 
             // Sample, c, and candidate
             let drawn = job.lights.sample(&ctx, u_choice, [u0, u1]);
-            let drawn = drawn.map(|drawn| with_infinite(job, &ctx, drawn));
+            let drawn = drawn.map(|(light, s)| (light, with_infinite(job, &ctx, light, s)));
             let control = match &drawn {
                 Some((light, s)) if !s.is_delta => {
                     estimate.control(sampled_l(job, &estimate, point.p, *light, s), s.wi, s.pdf)
                 }
                 Some(_) | None => estimate.without_g(),
             };
-            let candidate = drawn.and_then(|drawn| light_candidate(job, (index as u32, point), &allocation, drawn));
+            let candidate =
+                drawn.and_then(|(light, s)| light_candidate(job, index as u32, point, &allocation, light, s));
             self.add(index, candidate, Some(control), candidates);
         }
     }
 
     /// Draws BSDF samples without their emitters.
-    fn draw_bsdf(&mut self, (index, point): (usize, &ShadingPoint<'_>), candidates: &mut Candidates) {
+    fn draw_bsdf(&mut self, index: usize, point: &ShadingPoint<'_>, candidates: &mut Candidates) {
         let estimate = self.estimates[index];
         let plan = estimate.plan;
         let (n, expected) = match plan.technique {
@@ -306,7 +307,7 @@ impl Buffers {
 
     /// Finds the emitters along the rays of BSDF samples: the first one for the integrand, and all of them for g.
     fn follow(&mut self, job: &RenderJob, points: &[ShadingPoint<'_>], candidates: &mut Candidates) {
-        self.found.clear();
+        self.bsdf_candidates.clear();
         self.crossed.clear();
         self.crossed.resize(self.pending.len(), job.irradiances.environment());
         self.ray_of.clear();
@@ -320,8 +321,8 @@ impl Buffers {
             candidates.stats.emitter_rays += self.rays.len() as u64;
             job.world.intersect_emitters(&self.rays, &mut self.hits, &mut self.emitter_hits);
             if crossing == 0 {
-                let from = (&self.pending[..], &self.emitter_hits[..]);
-                find_emitters(job, points, from, choice_by_sampler(job), &mut self.far, &mut self.emitters);
+                let Buffers { pending, emitter_hits, far, emitters, .. } = &mut *self;
+                find_emitters(job, points, pending, emitter_hits, choice_by_sampler(job), far, emitters);
             }
             self.next_rays.clear();
             self.next_ray_of.clear();
@@ -329,8 +330,8 @@ impl Buffers {
                 let pending = &self.pending[i as usize];
                 let point = &points[pending.point as usize];
                 if crossing == 0 {
-                    let found = (hit.as_ref(), self.emitters[i as usize]);
-                    self.found.push(bsdf_candidate(job, point, pending, found));
+                    let candidate = bsdf_candidate(job, point, pending, hit.as_ref(), self.emitters[i as usize]);
+                    self.bsdf_candidates.push(candidate);
                 }
                 let estimate = &self.estimates[pending.point as usize];
                 let Some(hit) = hit.filter(|_| !pending.specular && estimate.has_g(pending.wi)) else { continue };
@@ -368,7 +369,7 @@ impl Buffers {
                 estimate.control(self.crossed[i], pending.wi, pending.pdf)
             };
             let is_inside = estimate.plan.technique == SamplingTechnique::Bsdf;
-            self.add(index, self.found[i], is_inside.then_some(control), candidates);
+            self.add(index, self.bsdf_candidates[i], is_inside.then_some(control), candidates);
         }
     }
 

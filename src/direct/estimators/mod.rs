@@ -212,7 +212,7 @@ impl Estimator {
             Estimator::Mc(_) | Estimator::Mis(_) | Estimator::Contributing(_) => segments.resolve(out),
             Estimator::Ris(_) => {
                 segments.resolve(out);
-                out.iter_mut().zip(&ris.known).for_each(|(out, &known)| *out += known);
+                out.iter_mut().zip(&ris.controls).for_each(|(out, &control)| *out += control);
             }
             Estimator::Ocv(ocv) => {
                 ocv.resolve(job, points, (candidates, segments, components), fits, out);

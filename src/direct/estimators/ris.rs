@@ -76,11 +76,11 @@ impl Ris {
     /// samples become candidates, with their contributions.
     pub(super) fn propose_and_draw(&self, t1: &mut T1<'_>, b: &mut Buffers) {
         // BSDF samples of all points. Light samples are only counted here, and made in chunks
-        t1.propose(allocation, |_, _, allocation, _| allocation.light_draws);
+        t1.propose(allocation, |_, _, _, allocation, _| allocation.light_draws);
         let T1 { job, points, candidates, .. } = t1;
         let bsdf_samples = std::mem::replace(&mut candidates.records, std::mem::take(&mut b.bsdf_samples));
         candidates.records.clear();
-        b.known.clear();
+        b.controls.clear();
 
         let mut rest = Chunk { first: 0, points, bsdf: &bsdf_samples };
         while !rest.points.is_empty() {
@@ -135,27 +135,29 @@ impl Ris {
             let (own, rest) = bsdf.split_at(range.end - range.bsdf_start);
             bsdf = rest;
 
-            // Evaluate the samples. With a control variate, `known` gets the part without visibility
-            let mut known = self.has_control().then(|| b.proposals.known(range, own));
+            // Evaluate the samples. With a control variate, `control` gets the part without visibility
+            let mut control = self.has_control().then(|| b.proposals.control(range, own));
             for draw in &b.draws {
                 let place = range.start + draw.index as usize;
                 let evaluated = if place < range.bsdf_start {
-                    let at = ((chunk.first + i) as u32, point);
                     let sample = b.proposals.light_sample(place);
-                    sample.and_then(|s| unshadowed_candidate(at, &SampleAllocation::fixed(0, 0), s))
+                    sample.and_then(|(light, sample)| {
+                        let index = (chunk.first + i) as u32;
+                        unshadowed_candidate(index, point, &SampleAllocation::fixed(0, 0), light, sample)
+                    })
                 } else {
                     Some(own[place - range.bsdf_start])
                 };
                 if let Some(candidate) = evaluated {
                     let contribution = candidate.f * (b.proposals.r[place] * draw.scale);
-                    if let Some(known) = known.as_mut().filter(|_| contribution.is_finite()) {
-                        known.draw(contribution, b.proposals.visibility[place]);
+                    if let Some(control) = control.as_mut().filter(|_| contribution.is_finite()) {
+                        control.draw(contribution, b.proposals.visibility[place]);
                     }
                     candidates.contributions.push(contribution);
                     candidates.records.push(candidate);
                 }
             }
-            b.known.extend(known.map(|known| known.sum()));
+            b.controls.extend(control.map(|control| control.sum()));
         }
     }
 
@@ -241,7 +243,7 @@ pub(super) struct Buffers {
     u: Vec<f32>,
     probes: Segments,
     /// Per point: the part of the estimate without visibility, if V̂ is a control variate.
-    pub(super) known: Vec<Rgb>,
+    pub(super) controls: Vec<Rgb>,
     /// Per point of the chunk: random numbers for the positions of proposals and for the draws, well distributed over
     /// the samples of a pixel.
     numbers: Vec<[f32; 2]>,
@@ -268,7 +270,7 @@ impl Buffers {
                 };
                 match segment {
                     Some((light, segment)) => {
-                        self.probes.push(&segment, (i as u32, light), Rgb::BLACK);
+                        self.probes.push(&segment, i as u32, light, Rgb::BLACK);
                         probed.push(place);
                     }
                     None => self.proposals.weight[place] = 0.0,

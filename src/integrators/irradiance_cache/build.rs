@@ -189,7 +189,7 @@ fn ask_chunk(
     };
     (paths.search.only_reflected, paths.only_specular) = (true, true);
     paths.search.start(job, samples, &mut out);
-    paths.follow((job, &job.settings().integrator), Some(own), samples, &mut Fits::default(), &mut out);
+    paths.follow(job, &job.settings().integrator, Some(own), samples, &mut Fits::default(), &mut out);
     // The requests are in the order of the vertices
     wanted.sort_by_key(|w: &RecordRequest| [w.pixel[1], w.pixel[0]]);
     wanted
@@ -251,9 +251,7 @@ mod tests {
         for sample in 0..SAMPLES {
             let mut counts = vec![0; bounds.area()];
             for round in rounds().iter().filter(|r| r.sample == sample) {
-                for [x, y] in round.pixels(bounds) {
-                    counts[((y - bounds.y0) * bounds.width() + x - bounds.x0) as usize] += 1;
-                }
+                round.pixels(bounds).iter().for_each(|&pixel| counts[bounds.index_of(pixel)] += 1);
             }
             assert!(counts.iter().all(|&c| c == 1), "sample {sample}");
         }

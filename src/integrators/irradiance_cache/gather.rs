@@ -115,17 +115,7 @@ impl Gatherer {
                 let o = offset_origin(w.p, w.p_error, w.n, d);
                 let ray = Ray { o, d, t_max: f32::INFINITY, time: w.time };
                 let ray = CameraRay { ray, spread: w.spread, width0: w.pixel_width, weight: 1.0 };
-                self.samples.push(CameraSample {
-                    ray,
-                    weight: 1.0,
-                    stream,
-                    direct: stream,
-                    sample_counts,
-                    turn: 0,
-                    fit: 0,
-                    pixel: [0; 2],
-                    is_replica: false,
-                });
+                self.samples.push(CameraSample::of_ray(ray, 1.0, stream, sample_counts));
             }
         }
         self.paths.search.only_reflected = true;
@@ -161,8 +151,9 @@ impl Gatherer {
             let points: Vec<ShadingPoint<'_>> = (0_u32..)
                 .zip(wanted)
                 .map(|(fit, w)| {
-                    let place = if estimator.is_progressive() { (block.index, pass - block.first) } else { (0, pass) };
-                    ShadingPoint { fit, ..w.white_point(job, place, estimator.sample_counts()) }
+                    let (block, index) =
+                        if estimator.is_progressive() { (block.index, pass - block.first) } else { (0, pass) };
+                    ShadingPoint { fit, ..w.white_point(job, block, index, estimator.sample_counts()) }
                 })
                 .collect();
             self.direct.estimate(job, &estimator, &points, &mut fits, &mut self.radiance);
@@ -255,7 +246,8 @@ impl RecordRequest {
     fn white_point(
         &self,
         job: &RenderJob,
-        (block, index): (u32, u32),
+        block: u32,
+        index: u32,
         sample_counts: SampleCounts,
     ) -> ShadingPoint<'static> {
         // A white Lambertian surface, whose radiance is E/π

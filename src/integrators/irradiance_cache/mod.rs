@@ -100,7 +100,7 @@ impl Tracer for CacheTracer<'_> {
         self.paths.search.start(job, samples, out);
         let own: &mut AtVertices<'_> =
             &mut |found, out| diffuse::shade(found, includes_direct, out, |v, part| look_up(v, part));
-        self.paths.follow((job, &job.settings().integrator), Some(own), samples, fits, out);
+        self.paths.follow(job, &job.settings().integrator, Some(own), samples, fits, out);
     }
 
     fn take_stats(&mut self) -> PathStats {

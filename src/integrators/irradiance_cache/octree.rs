@@ -33,19 +33,19 @@ impl Node {
 
 /// A node with its position and size.
 #[derive(Clone, Copy)]
-struct Place {
+struct NodeCube {
     node: u32,
     center: Vec3,
     half: f32,
     depth: u32,
 }
 
-impl Place {
+impl NodeCube {
     /// Child `i` with the node index `node`. Bit k of `i` selects the upper half of axis k.
-    fn child(&self, i: usize, node: u32) -> Place {
+    fn child(&self, i: usize, node: u32) -> NodeCube {
         let half = 0.5 * self.half;
         let side = |bit: usize| if i >> bit & 1 == 1 { half } else { -half };
-        Place { node, center: self.center + Vec3::new(side(0), side(1), side(2)), half, depth: self.depth + 1 }
+        NodeCube { node, center: self.center + Vec3::new(side(0), side(1), side(2)), half, depth: self.depth + 1 }
     }
 
     /// True if child `i` intersects the sphere's box.
@@ -73,26 +73,26 @@ impl Octree {
         self.nodes.iter().map(|n| size_of::<Node>() + n.ids.capacity() * size_of::<u32>()).sum()
     }
 
-    fn root(&self) -> Place {
-        Place { node: 0, center: self.center, half: self.half, depth: 0 }
+    fn root(&self) -> NodeCube {
+        NodeCube { node: 0, center: self.center, half: self.half, depth: 0 }
     }
 
     /// Adds a sphere.
     pub fn insert(&mut self, id: u32, p: Vec3, radius: f32) {
         let mut pending = vec![self.root()];
-        while let Some(place) = pending.pop() {
-            if place.half <= 2.0 * radius || place.depth == MAX_DEPTH {
-                self.nodes[place.node as usize].ids.push(id);
+        while let Some(cube) = pending.pop() {
+            if cube.half <= 2.0 * radius || cube.depth == MAX_DEPTH {
+                self.nodes[cube.node as usize].ids.push(id);
                 continue;
             }
-            for i in (0..8).filter(|&i| place.meets(i, p, radius)) {
-                let mut child = self.nodes[place.node as usize].children[i];
+            for i in (0..8).filter(|&i| cube.meets(i, p, radius)) {
+                let mut child = self.nodes[cube.node as usize].children[i];
                 if child == NONE {
                     child = self.nodes.len() as u32;
                     self.nodes.push(Node::new());
-                    self.nodes[place.node as usize].children[i] = child;
+                    self.nodes[cube.node as usize].children[i] = child;
                 }
-                pending.push(place.child(i, child));
+                pending.push(cube.child(i, child));
             }
         }
     }
@@ -101,18 +101,18 @@ impl Octree {
     /// insertions only.
     #[inline]
     pub fn at_point(&self, p: Vec3, mut f: impl FnMut(u32)) {
-        let mut place = self.root();
+        let mut cube = self.root();
         loop {
-            let node = &self.nodes[place.node as usize];
+            let node = &self.nodes[cube.node as usize];
             node.ids.iter().for_each(|&id| f(id));
-            let upper = p.cmpge(place.center);
+            let upper = p.cmpge(cube.center);
             let i = upper.bitmask() as usize;
             if node.children[i] == NONE {
                 return;
             }
-            place.node = node.children[i];
-            place.half *= 0.5;
-            place.center += Vec3::select(upper, Vec3::splat(place.half), Vec3::splat(-place.half));
+            cube.node = node.children[i];
+            cube.half *= 0.5;
+            cube.center += Vec3::select(upper, Vec3::splat(cube.half), Vec3::splat(-cube.half));
         }
     }
 
@@ -120,12 +120,12 @@ impl Octree {
     /// more than once.
     pub fn near(&self, p: Vec3, radius: f32, mut f: impl FnMut(u32)) {
         let mut pending = vec![self.root()];
-        while let Some(place) = pending.pop() {
-            let node = &self.nodes[place.node as usize];
+        while let Some(cube) = pending.pop() {
+            let node = &self.nodes[cube.node as usize];
             node.ids.iter().for_each(|&id| f(id));
             for (i, &child) in node.children.iter().enumerate() {
-                if child != NONE && place.meets(i, p, radius) {
-                    pending.push(place.child(i, child));
+                if child != NONE && cube.meets(i, p, radius) {
+                    pending.push(cube.child(i, child));
                 }
             }
         }

@@ -72,10 +72,10 @@ fn projected(pdf: f32, cos: f32) -> f32 {
 }
 
 /// Density of camera paths (1/(m² sr), projected), for the MIS weight of a light path. The camera ray has the cosine
-/// `cos_seen` and the pixel width `width`. The next direction has the density `pdf` (1/sr) and the cosine `cos`.
+/// `cos_camera` and the pixel width `width`. The next direction has the density `pdf` (1/sr) and the cosine `cos`.
 #[inline]
-pub(super) fn camera_density((cos_seen, width): (f32, f32), (pdf, cos): (f32, f32)) -> f32 {
-    Chain::at_first(cos_seen, width).beyond_first(Some(pdf), cos).density
+pub(super) fn camera_density(cos_camera: f32, width: f32, pdf: f32, cos: f32) -> f32 {
+    Chain::at_first(cos_camera, width).beyond_first(Some(pdf), cos).density
 }
 
 /// Weight of a light path by the balance heuristic [Veach 1997, §9.2.2]; 0 if either density is 0.
@@ -93,7 +93,7 @@ mod tests {
         for (light, width) in [(0.0, 1.0), (1e-9, 0.01), (3.0, 0.2), (1e30, 1e-3), (f32::INFINITY, 1.0)] {
             let chain = Chain::at_first(-0.5, width).beyond_first(Some(0.3), -0.7).bundled();
             assert!(chain.is_caustic());
-            let weight = light_weight(light, camera_density((0.5, width), (0.3, 0.7)));
+            let weight = light_weight(light, camera_density(0.5, width, 0.3, 0.7));
             assert!((chain.rest(light) + weight - 1.0).abs() < 1e-6, "{light} {width}");
         }
     }
@@ -111,6 +111,6 @@ mod tests {
         ] {
             assert!(!none.is_open() && !none.bundled().is_caustic() && none.rest(5.0) == 1.0, "{none:?}");
         }
-        assert_eq!(light_weight(5.0, camera_density((1.0, 1.0), (1.0, 0.0))), 0.0);
+        assert_eq!(light_weight(5.0, camera_density(1.0, 1.0, 1.0, 0.0)), 0.0);
     }
 }

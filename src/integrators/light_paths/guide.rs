@@ -47,7 +47,7 @@ pub(in crate::integrators) struct Guide {
 
 /// Contributions of the paths of a pilot, by light and by direction.
 #[derive(Clone, Debug)]
-pub(super) struct Found {
+pub(super) struct Contributions {
     of_light: Vec<f64>,
     /// By table and cell.
     of_direction: Vec<f64>,
@@ -90,23 +90,23 @@ impl Guide {
     }
 
     /// Empty contributions.
-    pub(super) fn begin(&self) -> Found {
+    pub(super) fn begin(&self) -> Contributions {
         let cells = self.tables.len() * EDGE * EDGE;
-        Found { of_light: vec![0.0; self.rates.len()], of_direction: vec![0.0; cells] }
+        Contributions { of_light: vec![0.0; self.rates.len()], of_direction: vec![0.0; cells] }
     }
 
     /// Adds the contribution `value` of a path that left `light` in the direction `d`.
-    pub(super) fn add(&self, found: &mut Found, light: LightId, d: Vec3, value: f64) {
+    pub(super) fn add(&self, contributions: &mut Contributions, light: LightId, d: Vec3, value: f64) {
         let cell = (equal_area_sphere_to_square(d) * EDGE as f32).clamp(Vec2::ZERO, Vec2::splat((EDGE - 1) as f32));
         let cell = cell.y as usize * EDGE + cell.x as usize;
-        found.of_light[light as usize] += value;
-        found.of_direction[usize::from(self.group_of[light as usize]) * EDGE * EDGE + cell] += value;
+        contributions.of_light[light as usize] += value;
+        contributions.of_direction[usize::from(self.group_of[light as usize]) * EDGE * EDGE + cell] += value;
     }
 
     /// A guide in proportion to the contributions; `None` if all are 0.
-    pub(super) fn learned(&self, set: &LightSet, found: &Found) -> Option<Self> {
-        let tables = found.of_direction.chunks(EDGE * EDGE).map(table).collect();
-        Self::new(set, self.group_of.clone(), tables, self.paths, |light| found.of_light[light as usize])
+    pub(super) fn learned(&self, set: &LightSet, contributions: &Contributions) -> Option<Self> {
+        let tables = contributions.of_direction.chunks(EDGE * EDGE).map(table).collect();
+        Self::new(set, self.group_of.clone(), tables, self.paths, |light| contributions.of_light[light as usize])
     }
 
     /// Density of light paths (1/(m² sr), projected) that leave `light` in the direction `d`, at a point with the
@@ -168,23 +168,23 @@ fn table(cells: &[f64]) -> PiecewiseConstant2D {
     PiecewiseConstant2D::new(&cells, EDGE)
 }
 
-impl Found {
+impl Contributions {
     /// The sum of both, each normalised over the lights, and over the directions of each table.
-    pub(super) fn mixed(&self, other: &Found) -> Found {
+    pub(super) fn mixed(&self, other: &Contributions) -> Contributions {
         let mix = |a: &[f64], b: &[f64]| {
             let [all_a, all_b] = [a, b].map(|values| values.iter().sum::<f64>());
             let share = |value: f64, all: f64| if all > 0.0 { value / all } else { 0.0 };
             a.iter().zip(b).map(|(a, b)| share(*a, all_a) + share(*b, all_b)).collect()
         };
-        let of_tables = |found: &Found| -> Vec<f64> {
+        let of_tables = |contributions: &Contributions| -> Vec<f64> {
             let normalised = |cells: &[f64]| {
                 let all: f64 = cells.iter().sum();
                 cells.iter().map(move |cell| if all > 0.0 { cell / all } else { 0.0 }).collect::<Vec<f64>>()
             };
-            found.of_direction.chunks(EDGE * EDGE).flat_map(normalised).collect()
+            contributions.of_direction.chunks(EDGE * EDGE).flat_map(normalised).collect()
         };
         let of_direction = of_tables(self).iter().zip(of_tables(other)).map(|(a, b)| a + b).collect();
-        Found { of_light: mix(&self.of_light, &other.of_light), of_direction }
+        Contributions { of_light: mix(&self.of_light, &other.of_light), of_direction }
     }
 }
 
@@ -228,12 +228,12 @@ mod tests {
     fn learned_light_paths_have_their_density() {
         let set = lights();
         let all = Guide::everywhere(&set, 1000).unwrap();
-        let mut found = all.begin();
+        let mut contributions = all.begin();
         for (light, d, value) in [(1, v(0.3, 0.2, -0.9), 1.0), (1, v(-0.5, 0.1, -0.4), 0.5), (2, v(0.1, 0.9, 0.4), 2.0)]
         {
-            all.add(&mut found, light, d.normalize(), value);
+            all.add(&mut contributions, light, d.normalize(), value);
         }
-        let guide = all.learned(&set, &found).unwrap().with_paths(500);
+        let guide = all.learned(&set, &contributions).unwrap().with_paths(500);
         assert!(all.learned(&set, &all.begin()).is_none());
         // Counts by light and by cell of the direction table
         const CELLS: usize = 32;

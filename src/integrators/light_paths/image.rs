@@ -1,11 +1,11 @@
-//! Contributions of light paths to the pixels, for some sample steps of an image.
+//! Contributions of light paths to the pixels, for some steps of share groups.
 
 use super::guide::Guide;
 use super::per_sample;
 use super::pilot::LightPilot;
-use super::trace::{LightPathStats, Scene, Seen, parts, trace};
+use super::trace::{CameraConnection, LightPathStats, Scene, parts, trace};
 use crate::film::{PixelBounds, PixelSample};
-use crate::scene::RenderJob;
+use crate::scene::{PixelSamples, RenderJob};
 use lumiris_numbers::math::Rgb;
 use lumiris_numbers::math::hash::pcg4d;
 use rayon::prelude::*;
@@ -22,8 +22,8 @@ const MAX_PATHS: u64 = 1 << 21;
 #[derive(Clone, Copy, Debug)]
 struct Entry {
     x: u32,
-    /// Sample step, masked by [`TURN`].
-    turn: u32,
+    /// Step of the share group.
+    step: u32,
     value: Rgb,
 }
 
@@ -32,7 +32,7 @@ struct Entry {
 pub(in crate::integrators) struct LightImage {
     pub(in crate::integrators) guide: Arc<Guide>,
     bounds: PixelBounds,
-    /// Number of sample steps so far.
+    /// Number of steps so far.
     served: u32,
     /// By row, pixel and step.
     entries: Vec<Entry>,
@@ -58,7 +58,7 @@ impl LightImage {
         Some(LightImage { guide: Arc::new(guide), bounds, served: 0, entries: Vec::new(), rows, has_entries, stats })
     }
 
-    /// Traces the light paths of the sample steps from `first` on. The number of steps equals the number traced so far,
+    /// Traces the light paths of the steps from `first` on. The number of steps equals the number traced so far,
     /// within limits. Returns it.
     pub(in crate::integrators) fn prepare(&mut self, job: &RenderJob, first: u32) -> u32 {
         let most = (MAX_PATHS / u64::from(self.guide.paths)).clamp(1, 1 << 16) as u32;
@@ -68,27 +68,28 @@ impl LightImage {
         // Trace one set of light paths per step
         let seed = job.settings().sampling.seed;
         let paths = u64::from(self.guide.paths);
-        let of_turn = |turn: u32| (turn, pcg4d([seed, SEED, turn, 0])[0]);
-        let parts = (first..first.saturating_add(count)).flat_map(|turn| parts(paths).map(move |part| (turn, part)));
+        let seed_of = |step: u32| pcg4d([seed, SEED, step, 0])[0];
+        let parts = (first..first.saturating_add(count)).flat_map(|step| parts(paths).map(move |part| (step, part)));
         let parts: Vec<(u32, Range<u64>)> = parts.collect();
         let scene = Scene::new(job, &self.guide);
-        let found = trace(&scene, &parts, |turn| of_turn(turn).1, &mut self.stats);
+        let connections = trace(&scene, &parts, seed_of, &mut self.stats);
 
         // Sort the contributions by row, pixel and step
         let factor = 1.0 / paths as f32;
-        let mut all: Vec<(u32, Entry)> = Vec::with_capacity(found.iter().map(Vec::len).sum());
-        for ((turn, _), seen) in parts.iter().zip(&found) {
-            let entry = |s: &Seen| (s.pixel[1], Entry { x: s.pixel[0], turn: *turn & TURN, value: s.value * factor });
-            all.extend(seen.iter().map(entry));
+        let mut all: Vec<(u32, Entry)> = Vec::with_capacity(connections.iter().map(Vec::len).sum());
+        for ((step, _), connections) in parts.iter().zip(&connections) {
+            let step = PixelSamples::step(*step);
+            let entry = |c: &CameraConnection| (c.pixel[1], Entry { x: c.pixel[0], step, value: c.value * factor });
+            all.extend(connections.iter().map(entry));
         }
         // The sort is stable: the contributions of one step to a pixel are added in the order of the light paths
-        all.par_sort_by_key(|(y, entry)| (*y, entry.x, entry.turn));
+        all.par_sort_by_key(|(y, entry)| (*y, entry.x, entry.step));
 
         // Index of pixels and rows
         self.has_entries.fill(0);
         for (y, entry) in &all {
-            let place = self.place(entry.x, *y);
-            self.has_entries[place / 64] |= 1 << (place % 64);
+            let index = self.bounds.index_of([entry.x, *y]);
+            self.has_entries[index / 64] |= 1 << (index % 64);
         }
         for (row, end) in self.rows.iter_mut().enumerate() {
             *end = all.partition_point(|(y, _)| ((*y - self.bounds.y0) as usize) < row) as u32;
@@ -98,50 +99,41 @@ impl LightImage {
         count
     }
 
-    #[inline]
-    fn place(&self, x: u32, y: u32) -> usize {
-        (y - self.bounds.y0) as usize * self.bounds.width() as usize + (x - self.bounds.x0) as usize
-    }
-
-    /// Adds the contributions of light paths to camera samples, given by pixel, sample step, and true for replicas.
+    /// Adds the contributions of light paths to camera samples, given by pixel, share group, and true for replicas.
     pub(in crate::integrators) fn add(
         &self,
         samples: impl Iterator<Item = ([u32; 2], u32, bool)>,
         out: &mut [PixelSample],
     ) {
-        for (([x, y], turn, is_replica), out) in samples.zip(out) {
-            let place = self.place(x, y);
-            if self.has_entries[place / 64] >> (place % 64) & 1 == 0 {
+        for (([x, y], share_group, is_replica), out) in samples.zip(out) {
+            let index = self.bounds.index_of([x, y]);
+            if self.has_entries[index / 64] >> (index % 64) & 1 == 0 {
                 continue;
             }
 
             // Find the entries of the pixel at this step
             let row = (y - self.bounds.y0) as usize;
             let row = &self.entries[self.rows[row] as usize..self.rows[row + 1] as usize];
-            let turn = turn & TURN;
-            let begin = row.partition_point(|entry| (entry.x, entry.turn) < (x, turn));
-            let own = row[begin..].iter().take_while(|entry| (entry.x, entry.turn) == (x, turn));
+            let step = PixelSamples::step(share_group);
+            let begin = row.partition_point(|entry| (entry.x, entry.step) < (x, step));
+            let own = row[begin..].iter().take_while(|entry| (entry.x, entry.step) == (x, step));
 
             // A replica also gets a signed contribution, from which the variance is estimated
             let light = own.map(|entry| entry.value).sum::<Rgb>();
             out.radiance += light;
             if is_replica {
-                out.offset = light * sign(turn) * SQRT_2;
+                out.offset = light * sign(step) * SQRT_2;
             }
         }
     }
 }
 
-/// The sign s of a sample step in a replica. The variance of a pixel is estimated from the difference of replica and
+/// The sign s of a step in a replica. The variance of a pixel is estimated from the difference of replica and
 /// pixel, but both use the same light paths. So the difference is made up: Σ e (1 + √2 s)/n and Σ e/n differ by √2 Σ s
 /// e/n. Half its square is the variance of Σ e/n on average, if the signs are balanced. So two consecutive steps have
 /// opposite signs, in random order. Pixels with samples in few of the steps have random signs, and overestimate the
 /// variance.
-fn sign(turn: u32) -> f32 {
-    let [of_pair, ..] = pcg4d([turn >> 1, SEED, 1, 0]);
-    if (of_pair ^ turn) & 1 == 1 { 1.0 } else { -1.0 }
+fn sign(step: u32) -> f32 {
+    let [of_pair, ..] = pcg4d([step >> 1, SEED, 1, 0]);
+    if (of_pair ^ step) & 1 == 1 { 1.0 } else { -1.0 }
 }
-
-/// Mask of the lower bits of a sample step. The upper bits count the samples of a pixel within the step, see
-/// [`crate::scene::PixelSamples::turn`].
-const TURN: u32 = (1 << 20) - 1;

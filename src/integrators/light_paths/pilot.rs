@@ -25,7 +25,7 @@ pub struct LightPilot {
     pub(super) stats: LightPathStats,
     /// Light paths of the last round that reach the camera: squared unweighted contribution, and density relative to
     /// the density of a camera sample.
-    seen: Vec<[f64; 2]>,
+    moments: Vec<[f64; 2]>,
     /// Number and time (ns) of the light paths of the last round.
     round: (u64, f64),
     /// Time of the pilot (ns).
@@ -60,28 +60,29 @@ impl LightPilot {
         }
 
         // Light paths over metal and glass that reach the camera
-        let mut found = everywhere.begin();
+        let mut contributions = everywhere.begin();
         let mut guide = everywhere.learned(set, &bundling)?;
         let (mut moments, mut of_round) = (Vec::new(), (0, 0.0));
         for round in 1..=ROUNDS {
             let parts: Vec<_> = parts(rays / RAYS_PER_PATH).map(|part| (round, part)).collect();
             let (scene, before) = (Scene::new(job, &guide), stats);
-            let seen = trace(&scene, &parts, seed, &mut stats);
+            let connections = trace(&scene, &parts, seed, &mut stats);
 
             // Learn from their contributions
             moments.clear();
-            for seen in seen.iter().flatten() {
-                let value = f64::from(seen.value.luminance().abs());
-                guide.add(&mut found, seen.light, seen.d, value);
-                let weight = f64::from(seen.weight);
+            for connection in connections.iter().flatten() {
+                let value = f64::from(connection.value.luminance().abs());
+                guide.add(&mut contributions, connection.light, connection.d, value);
+                let weight = f64::from(connection.weight);
                 let ratio = weight / (1.0 - weight).max(1e-9) / f64::from(guide.paths);
                 moments.push([(value / weight).powi(2), ratio]);
             }
             of_round = (stats.paths - before.paths, (stats.time - before.time).as_secs_f64() * 1e9);
-            guide = guide.learned(set, &if round < ROUNDS { found.mixed(&bundling) } else { found.clone() })?;
+            guide = guide
+                .learned(set, &if round < ROUNDS { contributions.mixed(&bundling) } else { contributions.clone() })?;
         }
         let nanoseconds = stats.time.as_secs_f64() * 1e9 * divisor as f64;
-        Some(LightPilot { guide, stats, seen: moments, round: of_round, nanoseconds, pixels: bounds.area() as f64 })
+        Some(LightPilot { guide, stats, moments, round: of_round, nanoseconds, pixels: bounds.area() as f64 })
     }
 
     /// The learned distribution of light paths.
@@ -95,7 +96,7 @@ impl LightPilot {
         let paths = per_sample * self.pixels;
         // ∫f²/(p + paths·q), estimated by light paths of the density q
         let moment = |[square, ratio]: &[f64; 2]| square * ratio / (1.0 + paths * ratio);
-        self.seen.iter().map(moment).sum::<f64>() / (self.round.0.max(1) as f64 * self.pixels)
+        self.moments.iter().map(moment).sum::<f64>() / (self.round.0.max(1) as f64 * self.pixels)
     }
 
     /// Time (ns) of light paths per camera sample, if there are `samples` camera samples.

@@ -34,7 +34,7 @@ struct LightPath {
 
 /// The connection of a light path to the camera, possibly occluded.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Seen {
+pub(super) struct CameraConnection {
     pub(super) pixel: [u32; 2],
     /// Contribution to a pixel with one camera sample, if there were only one light path. Includes the MIS weight.
     pub(super) value: Rgb,
@@ -52,7 +52,7 @@ pub(super) struct Walker {
     next: Vec<LightPath>,
     rays: RayBatch,
     hits: Vec<Option<Hit>>,
-    pub(super) seen: Vec<Seen>,
+    pub(super) connections: Vec<CameraConnection>,
     shadows: RayBatch,
     occluded: Vec<bool>,
     /// Rays and segments traced so far.
@@ -73,10 +73,10 @@ impl<'a> Scene<'a> {
 }
 
 impl Walker {
-    /// Traces some of the light paths of a seed. `self.seen` becomes their unoccluded connections to the camera.
+    /// Traces some of the light paths of a seed. `self.connections` becomes their unoccluded connections to the camera.
     pub(super) fn trace(&mut self, scene: &Scene<'_>, seed: u32, paths: Range<u64>) {
         let job = scene.job;
-        self.seen.clear();
+        self.connections.clear();
         self.shadows.clear();
         self.active.clear();
         self.active.extend(paths.filter_map(|path| emit(scene, path_stream(seed, path))));
@@ -88,18 +88,18 @@ impl Walker {
             self.next.clear();
             for (path, hit) in self.active.iter().zip(&self.hits) {
                 let Some(hit) = hit else { continue };
-                let interaction = SurfaceInteraction::new(job, &path.ray, (0.0, 0.0), hit);
+                let interaction = SurfaceInteraction::new(job, &path.ray, 0.0, 0.0, hit);
                 let Some(bsdf) = interaction.scatter(job) else { continue };
                 if bsdf.makes_caustics {
                     self.next.extend(path.scattered(&interaction, &bsdf, VERTEX + bundled));
                 }
                 // A mixture may be metal for the light and another surface for the camera
-                let may_be_seen = !bsdf.makes_caustics || interaction.is_mixture(job);
+                let may_connect = !bsdf.makes_caustics || interaction.is_mixture(job);
                 if bundled > 0
-                    && may_be_seen
-                    && let Some((seen, segment)) = path.connect(scene, &interaction)
+                    && may_connect
+                    && let Some((connection, segment)) = path.connect(scene, &interaction)
                 {
-                    self.seen.push(seen);
+                    self.connections.push(connection);
                     self.shadows.push(&segment);
                 }
             }
@@ -108,9 +108,9 @@ impl Walker {
 
         // Keep unoccluded connections
         job.world.accel.occluded(&self.shadows, Coherence::Packets, &mut self.occluded);
-        self.traced += self.seen.len() as u64;
+        self.traced += self.connections.len() as u64;
         let mut occluded = self.occluded.iter();
-        self.seen.retain(|_| !occluded.next().copied().unwrap_or(true));
+        self.connections.retain(|_| !occluded.next().copied().unwrap_or(true));
     }
 }
 
@@ -132,7 +132,7 @@ impl Walker {
         self.rays.set(self.active.iter().map(|path| &path.ray));
         job.world.accel.intersect(&self.rays, Coherence::Incoherent, &mut self.hits);
         let met = |(path, hit): (&LightPath, &Option<Hit>)| {
-            let at = SurfaceInteraction::new(job, &path.ray, (0.0, 0.0), hit.as_ref()?);
+            let at = SurfaceInteraction::new(job, &path.ray, 0.0, 0.0, hit.as_ref()?);
             let bundles = at.scatter(job)?.makes_caustics;
             bundles.then_some(Bundling { light: path.light, d: path.d, value: path.power })
         };
@@ -162,27 +162,25 @@ impl LightPath {
     }
 
     /// Connects the path at any other surface to the camera. Returns the contribution and the shadow segment.
-    fn connect(&self, scene: &Scene<'_>, at: &SurfaceInteraction) -> Option<(Seen, Ray)> {
+    fn connect(&self, scene: &Scene<'_>, at: &SurfaceInteraction) -> Option<(CameraConnection, Ray)> {
         let (job, film) = (scene.job, &scene.job.world.scene.film);
         let camera = &job.world.scene.camera;
 
         // Project the point onto the film, and choose a pixel
         let [l0, l1, u] = self.stream.domain(FILM).draw::<3>();
         let p = at.surface.p;
-        let seen = camera.project(p, [l0, l1], 0.0)?;
-        let (pixel, of_filter) = pixel_of(&scene.filter, seen.film_xy, u)?;
-        let [x, y] = pixel;
-        let bounds = film.bounds;
-        if !((bounds.x0..bounds.x1).contains(&x) && (bounds.y0..bounds.y1).contains(&y)) {
+        let projected = camera.project(p, [l0, l1], 0.0)?;
+        let (pixel, of_filter) = pixel_of(&scene.filter, projected.film_xy, u)?;
+        if !film.bounds.contains(pixel) {
             return None;
         }
 
         // The surface with the footprint of a camera ray
-        let from = camera.ray(seen.film_xy, [l0, l1], 0.0);
-        let d = p - seen.o;
+        let from = camera.ray(projected.film_xy, [l0, l1], 0.0);
+        let d = p - projected.o;
         let distance = d.length();
-        let ray = Ray { o: seen.o, d: d / distance, t_max: f32::INFINITY, time: self.ray.time };
-        let at_camera = SurfaceInteraction::new(job, &ray, (from.width0, from.spread), &Hit { t: distance, ..at.hit });
+        let ray = Ray { o: projected.o, d: d / distance, t_max: f32::INFINITY, time: self.ray.time };
+        let at_camera = SurfaceInteraction::new(job, &ray, from.width0, from.spread, &Hit { t: distance, ..at.hit });
         let bsdf = at_camera.scatter(job)?;
         if bsdf.makes_caustics || !bsdf.bsdf.is_evaluated_exactly() {
             return None;
@@ -191,21 +189,21 @@ impl LightPath {
         // MIS weight
         let (wo, wi) = (at_camera.wo, at.wo);
         let (cos, cos_light) = (bsdf.n.dot(wo).abs(), bsdf.n.dot(wi).abs());
-        let of_camera = camera_density((cos, at_camera.width), (bsdf.pdf(wo, wi), cos_light));
+        let of_camera = camera_density(cos, at_camera.width, bsdf.pdf(wo, wi), cos_light);
         let weight = light_weight(self.density, of_camera);
         if !(weight > 0.0) {
             return None;
         }
 
         // Contribution
-        let measure = cos * seen.density / (distance * distance * cos_light);
+        let measure = cos * projected.density / (distance * distance * cos_light);
         let value = self.power * bsdf.f_cos(wo, wi) * (measure * weight * of_filter * film.scale);
         if value.is_black() || !value.is_finite() {
             return None;
         }
         let o = offset_origin(p, at.surface.p_error, bsdf.n, wo);
-        let segment = Ray { o, d: seen.o - o, t_max: SEGMENT_END, time: self.ray.time };
-        Some((Seen { pixel, value, weight, light: self.light, d: self.d }, segment))
+        let segment = Ray { o, d: projected.o - o, t_max: SEGMENT_END, time: self.ray.time };
+        Some((CameraConnection { pixel, value, weight, light: self.light, d: self.d }, segment))
     }
 }
 
@@ -241,7 +239,7 @@ pub struct LightPathStats {
     /// Light paths.
     pub paths: u64,
     /// Light paths that contribute to a pixel.
-    pub seen: u64,
+    pub connected: u64,
     /// Rays and segments traced.
     pub rays: u64,
     /// Time (s), summed over threads.
@@ -260,23 +258,23 @@ pub(super) fn trace(
     parts: &[(u32, Range<u64>)],
     seed: impl Fn(u32) -> u32 + Sync,
     stats: &mut LightPathStats,
-) -> Vec<Vec<Seen>> {
-    let one = |walker: &mut Walker, (turn, part): &(u32, Range<u64>)| {
+) -> Vec<Vec<CameraConnection>> {
+    let one = |walker: &mut Walker, (round, part): &(u32, Range<u64>)| {
         let start = Instant::now();
         walker.traced = 0;
-        walker.trace(scene, seed(*turn), part.clone());
-        (walker.seen.clone(), walker.traced, start.elapsed())
+        walker.trace(scene, seed(*round), part.clone());
+        (walker.connections.clone(), walker.traced, start.elapsed())
     };
     let all: Vec<_> = parts.par_iter().with_max_len(1).map_init(Walker::default, one).collect();
 
     // Statistics, in the order of the batches
     stats.paths += parts.iter().map(|(_, part)| part.end - part.start).sum::<u64>();
     all.into_iter()
-        .map(|(seen, rays, time)| {
-            stats.seen += seen.len() as u64;
+        .map(|(connections, rays, time)| {
+            stats.connected += connections.len() as u64;
             stats.rays += rays;
             stats.time += time;
-            seen
+            connections
         })
         .collect()
 }

@@ -11,7 +11,7 @@
 //! distribution F(s) = 2s² − s⁴, s = d/r.
 
 use crate::accel::{Coherence, Hit, RayBatch};
-use crate::photons::Place;
+use crate::photons::GatherPoint;
 use crate::scene::World;
 use lumiris_numbers::math::{Frame, Ray, Vec3};
 use lumiris_numbers::samplers::SampleStream;
@@ -28,7 +28,7 @@ const HEIGHT: f32 = 0.25;
 /// A kernel to be tested.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Probe {
-    pub(super) place: Place,
+    pub(super) point: GatherPoint,
     /// r.
     pub(super) radius: f32,
     pub(super) time: f32,
@@ -43,7 +43,7 @@ impl Probe {
         let (sin, cos) = (TAU * v).sin_cos();
         let d = self.radius * s2.sqrt();
         let height = HEIGHT * self.radius * (1.0 - s2).sqrt().max(0.2);
-        (self.place.p + Frame::from_z(self.place.n).to_world(Vec3::new(d * cos, d * sin, 0.0)), height)
+        (self.point.p + Frame::from_z(self.point.n).to_world(Vec3::new(d * cos, d * sin, 0.0)), height)
     }
 }
 
@@ -79,8 +79,8 @@ impl Boundary {
         for &i in &self.open {
             let probe = &probes[i as usize];
             let (foot, height) = probe.point(trial);
-            let o = probe.place.p + probe.place.n * height;
-            let d = foot - probe.place.p;
+            let o = probe.point.p + probe.point.n * height;
+            let d = foot - probe.point.p;
             self.rays.push(&Ray { o, d, t_max: 1.0, time: probe.time });
         }
         world.accel.occluded(&self.rays, Coherence::Incoherent, &mut self.blocked);
@@ -91,7 +91,7 @@ impl Boundary {
         for (&i, _) in self.open.iter().zip(&self.blocked).filter(|(_, blocked)| !**blocked) {
             let probe = &probes[i as usize];
             let (foot, height) = probe.point(trial);
-            let (o, d) = (foot + probe.place.n * height, probe.place.n * (-2.0 * height));
+            let (o, d) = (foot + probe.point.n * height, probe.point.n * (-2.0 * height));
             self.rays.push(&Ray { o, d, t_max: 1.0, time: probe.time });
             self.free.push(i);
         }
@@ -101,7 +101,7 @@ impl Boundary {
             let probe = &probes[i as usize];
             let (set, ray) = (&world.scene.geometry, self.rays.get(k));
             let n = set.surface_hit_of_ray(h.geometry, h.primitive, h.instance, h.uv, &ray).n;
-            if n.dot(probe.place.n).abs() >= MIN_NORMAL_COS {
+            if n.dot(probe.point.n).abs() >= MIN_NORMAL_COS {
                 out[i as usize] = trial;
             }
         }
@@ -135,7 +135,7 @@ Shape "trianglemesh" "point3 P" [ -0.5 -1 0  -0.5 1 0  -0.5 1 1  -0.5 -1 1 ] "in
 
     fn numbers(world: &World, p: Vec3, radius: f32) -> Welford {
         let probe = |i| Probe {
-            place: Place::flat(p, Vec3::Z),
+            point: GatherPoint::flat(p, Vec3::Z),
             radius,
             time: 0.0,
             stream: SampleStream::new(SamplerKind::Independent, [i, 0], 0, 9),

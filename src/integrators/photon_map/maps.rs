@@ -14,8 +14,8 @@ use crate::integrators::path::{BatchVertices, CameraSample};
 use crate::integrators::segment::LastVertices;
 use crate::integrators::vertices::{Stage, VertexSearch};
 use crate::photons::{
-    GatherScratch, Importance, ImportanceSettings, LowImportance, Origin, Photon, PhotonBudget, PhotonError, PhotonMap,
-    Place, Search, Traced, Tracing, path_count, trace_importons, trace_photons,
+    GatherPoint, GatherScratch, Importance, ImportanceSettings, LowImportance, Origin, Photon, PhotonBudget,
+    PhotonError, PhotonMap, Search, Traced, Tracing, path_count, trace_importons, trace_photons,
 };
 use crate::scene::{RenderJob, World};
 use crate::settings::{PhotonMapSettings, PhotonStorage};
@@ -75,15 +75,24 @@ pub struct PhotonMaps {
     nearest: u32,
 }
 
+/// Irradiance by density estimation.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct DensityEstimate {
+    /// Irradiance (W/m²).
+    pub(super) e: Rgb,
+    /// Radius of the kernel.
+    pub(super) radius: f32,
+}
+
 /// Irradiance (W/m²) in three parts.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Answer {
     /// Precomputed irradiance.
-    pub(super) known: Rgb,
-    /// By photons of the global map, and the radius of the kernel.
-    pub(super) global: (Rgb, f32),
-    /// By photons of caustics, and the radius of the kernel.
-    pub(super) caustic: (Rgb, f32),
+    pub(super) uncorrected: Rgb,
+    /// By photons of the global map.
+    pub(super) global: DensityEstimate,
+    /// By photons of caustics.
+    pub(super) caustic: DensityEstimate,
     /// Radius of the photons used.
     pub(super) reach: f32,
 }
@@ -108,9 +117,9 @@ pub struct MapMaker<'a> {
 
 impl<'a> MapMaker<'a> {
     /// Traces importons if enabled, and determines the number of photon paths per map. For progressive maps, also
-    /// determines the first radii: the distance of the nearest photons at `seen`, points and normals visible to the
+    /// determines the first radii: the distance of the nearest photons at `visible`, points and normals visible to the
     /// camera.
-    pub fn new(job: &RenderJob, seen: &[(Vec3, Vec3)], stop: &'a AtomicBool) -> Result<Self, PhotonError> {
+    pub fn new(job: &RenderJob, visible: &[(Vec3, Vec3)], stop: &'a AtomicBool) -> Result<Self, PhotonError> {
         let settings = job.settings().integrator.photons;
         let (max_depth, seed) = (job.settings().integrator.max_depth, job.settings().sampling.seed);
 
@@ -146,8 +155,8 @@ impl<'a> MapMaker<'a> {
                     let global = PhotonMap::new(traced.global);
                     let caustic = PhotonMap::new(traced.caustic);
                     let max = job.lights.scene_radius;
-                    let radius = median_reach(&global, seen, settings.nearest, max).unwrap_or(0.01 * max);
-                    let at_caustics = places_of(&caustic);
+                    let radius = median_reach(&global, visible, settings.nearest, max).unwrap_or(0.01 * max);
+                    let at_caustics = points_of(&caustic);
                     [radius, median_reach(&caustic, &at_caustics, settings.nearest, radius).unwrap_or(radius)]
                 }
             });
@@ -208,7 +217,7 @@ impl<'a> MapMaker<'a> {
         }
         let max = job.lights.scene_radius;
         // At the border of a caustic, the nearest photons are far away and unrelated
-        let reach = median_reach(&caustic, &places_of(&caustic), nearest, max).unwrap_or(0.01 * max);
+        let reach = median_reach(&caustic, &points_of(&caustic), nearest, max).unwrap_or(0.01 * max);
         let search = Search::Nearest { count: nearest, max_radius: max };
         let caustic_search = Search::Nearest { count: nearest, max_radius: 2.0 * reach };
         let mut maps = PhotonMaps { global, caustic, records: None, search, caustic_search, nearest };
@@ -236,20 +245,20 @@ impl PhotonMaps {
     }
 
     /// Irradiance of all photons.
-    pub(super) fn irradiance(&self, at: &Place, scratch: &mut GatherScratch) -> Answer {
+    pub(super) fn irradiance(&self, at: &GatherPoint, scratch: &mut GatherScratch) -> Answer {
         if let Some(records) = &self.records {
             // The nearest record: the second one lies on the rim of the kernel and has no weight
             let max = Search::Nearest { count: 2, max_radius: self.max_radius() };
             let mut e = None;
             let spacing = records.gather(at, max, scratch, |record, _| e = Some(record.power()));
-            if let Some(known) = e {
+            if let Some(uncorrected) = e {
                 // The disk with k/4 records holds k photons
                 let reach = spacing * (self.nearest as f32 / (2 * RECORD_STRIDE) as f32).sqrt();
-                return Answer { known, reach, ..Answer::default() };
+                return Answer { uncorrected, reach, ..Answer::default() };
             }
         }
         let [global, caustic] = self.estimate(at, scratch);
-        Answer { global, caustic, reach: global.1, ..Answer::default() }
+        Answer { global, caustic, reach: global.radius, ..Answer::default() }
     }
 
     fn max_radius(&self) -> f32 {
@@ -260,29 +269,29 @@ impl PhotonMaps {
     }
 
     /// Irradiance by density estimation from both maps.
-    fn estimate(&self, at: &Place, scratch: &mut GatherScratch) -> [(Rgb, f32); 2] {
+    fn estimate(&self, at: &GatherPoint, scratch: &mut GatherScratch) -> [DensityEstimate; 2] {
         let mut e = Rgb::BLACK;
         let radius = self.global.gather(at, self.search, scratch, |photon, weight| e += photon.power() * weight);
-        [(e, radius), self.caustics(at, scratch)]
+        [DensityEstimate { e, radius }, self.caustics(at, scratch)]
     }
 
-    /// Irradiance of the caustic map, and the radius of the kernel.
-    pub(super) fn caustics(&self, at: &Place, scratch: &mut GatherScratch) -> (Rgb, f32) {
+    /// Irradiance of the caustic map.
+    pub(super) fn caustics(&self, at: &GatherPoint, scratch: &mut GatherScratch) -> DensityEstimate {
         let mut e = Rgb::BLACK;
         let radius =
             self.caustic.gather(at, self.caustic_search, scratch, |photon, weight| e += photon.power() * weight);
-        (e, radius)
+        DensityEstimate { e, radius }
     }
 
-    /// Irradiance of scattered photons of the global map, and the radius of the kernel.
-    pub(super) fn indirect(&self, at: &Place, scratch: &mut GatherScratch) -> (Rgb, f32) {
+    /// Irradiance of scattered photons of the global map.
+    pub(super) fn indirect(&self, at: &GatherPoint, scratch: &mut GatherScratch) -> DensityEstimate {
         let mut e = Rgb::BLACK;
         let radius = self.global.gather(at, self.search, scratch, |photon, weight| {
             if !photon.is_primary() {
                 e += photon.power() * weight;
             }
         });
-        (e, radius)
+        DensityEstimate { e, radius }
     }
 
     /// Irradiance at every fourth photon, as photons with the irradiance in place of their power.
@@ -293,15 +302,16 @@ impl PhotonMaps {
             let (mut scratch, mut boundary) = (GatherScratch::default(), Boundary::default());
             let (mut probes, mut parts) = (Vec::new(), Vec::new());
             for (i, photon) in chunk.iter().enumerate() {
-                let place = Place::flat(photon.p(), photon.n());
-                for (part, (e, radius)) in self.estimate(&place, &mut scratch).into_iter().enumerate() {
+                let point = GatherPoint::flat(photon.p(), photon.n());
+                for (part, DensityEstimate { e, radius }) in self.estimate(&point, &mut scratch).into_iter().enumerate()
+                {
                     if e.is_black() {
                         continue;
                     }
                     parts.push((i, e * (1.0 / TRIES as f32)));
                     let stream =
                         SampleStream::new(SamplerKind::Independent, [c as u32, i as u32], part as u32, RECORD_SEED);
-                    probes.extend((0..TRIES).map(|k| Probe { place, radius, time: 0.0, stream: stream.domain(k) }));
+                    probes.extend((0..TRIES).map(|k| Probe { point, radius, time: 0.0, stream: stream.domain(k) }));
                 }
             }
 
@@ -321,10 +331,10 @@ impl PhotonMaps {
 }
 
 /// Diffuse points visible to the camera, spread over the image, with their normals.
-pub fn seen(job: &RenderJob, cameras: Cameras<'_>) -> Vec<(Vec3, Vec3)> {
+pub fn visible_points(job: &RenderJob, cameras: Cameras<'_>) -> Vec<(Vec3, Vec3)> {
     let b = job.world.scene.film.bounds;
     let stride = (b.area() / PROBES).max(1);
-    let pixels = (0..b.area() as u32).step_by(stride).map(|i| [b.x0 + i % b.width(), b.y0 + i / b.width()]);
+    let pixels = (0..b.area() as u32).step_by(stride).map(|i| b.pixel_at(i));
     let samples: Vec<CameraSample> = pixels.map(|pixel| cameras(pixel, 0)).collect();
 
     // Trace to the first vertices
@@ -343,26 +353,26 @@ pub fn seen(job: &RenderJob, cameras: Cameras<'_>) -> Vec<(Vec3, Vec3)> {
     });
 
     // Keep Lambertian surfaces, with the normal on the side of the camera
-    let found = BatchVertices { vertex: 0, paths: &search.active, vertices: &vertices };
-    let points = found.each().map(|v| v.point).filter(|v| v.bsdf.lambertian(v.wo).is_some());
+    let first = BatchVertices { vertex: 0, paths: &search.active, vertices: &vertices };
+    let points = first.each().map(|v| v.point).filter(|v| v.bsdf.lambertian(v.wo).is_some());
     points.map(|v| (v.p, if v.bsdf.n.dot(v.wo) < 0.0 { -v.bsdf.n } else { v.bsdf.n })).collect()
 }
 
 /// Position and normal of some photons of a map.
-fn places_of(map: &PhotonMap) -> Vec<(Vec3, Vec3)> {
+fn points_of(map: &PhotonMap) -> Vec<(Vec3, Vec3)> {
     let stride = (map.len() / PROBES).max(1);
     map.photons().iter().step_by(stride).map(|photon| (photon.p(), photon.n())).collect()
 }
 
-/// Median over `places` of the radius that holds `nearest` photons. `None` if, at half of the places or more, `max`
+/// Median over `points` of the radius that holds `nearest` photons. `None` if, at half of the points or more, `max`
 /// holds fewer.
-fn median_reach(map: &PhotonMap, places: &[(Vec3, Vec3)], nearest: u32, max: f32) -> Option<f32> {
+fn median_reach(map: &PhotonMap, points: &[(Vec3, Vec3)], nearest: u32, max: f32) -> Option<f32> {
     let mut scratch = GatherScratch::default();
     let search = Search::Nearest { count: nearest, max_radius: max };
-    let mut radii: Vec<f32> = places
+    let mut radii: Vec<f32> = points
         .iter()
         .map(|&(p, n)| {
-            let radius = map.gather(&Place::flat(p, n), search, &mut scratch, |_, _| ());
+            let radius = map.gather(&GatherPoint::flat(p, n), search, &mut scratch, |_, _| ());
             if radius > 0.0 { radius } else { max }
         })
         .collect();

@@ -29,7 +29,7 @@ use crate::cameras::CameraRay;
 use crate::direct::{Estimator, Fits, ShadingPoint};
 use crate::film::{FeatureSet, PixelSample};
 use crate::materials::SurfaceBsdf;
-use crate::photons::{GatherScratch, PhotonError, Place, Search};
+use crate::photons::{GatherPoint, GatherScratch, PhotonError, Search};
 use crate::scene::RenderJob;
 use crate::settings::{IntegratorSettings, PhotonMapSettings};
 use boundary::{Boundary, Probe};
@@ -37,6 +37,7 @@ use guide::Guide;
 use lumiris_numbers::math::ray::offset_origin;
 use lumiris_numbers::math::{Frame, Ray, Rgb, Vec3};
 use lumiris_numbers::samplers::SampleStream;
+use maps::DensityEstimate;
 use std::f32::consts::FRAC_1_PI;
 use std::sync::atomic::AtomicBool;
 
@@ -59,7 +60,7 @@ pub struct PhotonMapIntegrator<'a> {
 impl<'a> PhotonMapIntegrator<'a> {
     /// Prepares the data common to all maps.
     pub fn new(job: &'a RenderJob, cameras: Cameras<'_>, stop: &'a AtomicBool) -> Result<Self, PhotonError> {
-        let maker = MapMaker::new(job, &maps::seen(job, cameras), stop)?;
+        let maker = MapMaker::new(job, &maps::visible_points(job, cameras), stop)?;
         Ok(PhotonMapIntegrator { job, maker, maps: None })
     }
 }
@@ -138,7 +139,7 @@ struct GatherRequest {
     beta: Rgb,
     /// Index of the vertex along its path, from 0.
     vertex: u32,
-    place: Place,
+    point: GatherPoint,
     p_error: Vec3,
     time: f32,
     stream: SampleStream,
@@ -152,17 +153,17 @@ impl Tracer for PhotonMapTracer<'_> {
         let settings = &job.settings().integrator;
         let (maps, lookups) = (self.maps, &mut self.lookups);
         lookups.requests.clear();
-        let own: &mut AtVertices<'_> = &mut |found, out| {
-            diffuse::shade(found, false, out, |v, part| {
-                if found.vertex + 1 < settings.depth() {
-                    lookups.look_up(maps, &settings.photons, found.vertex, v, part);
+        let own: &mut AtVertices<'_> = &mut |vertices, out| {
+            diffuse::shade(vertices, false, out, |v, part| {
+                if vertices.vertex + 1 < settings.depth() {
+                    lookups.look_up(maps, &settings.photons, vertices.vertex, v, part);
                 }
                 // Added later
                 Some(Rgb::BLACK)
             })
         };
         self.paths.search.start(job, samples, out);
-        self.paths.follow((job, settings), Some(own), samples, fits, out);
+        self.paths.follow(job, settings, Some(own), samples, fits, out);
         self.lookups.correct(job, out);
 
         self.start_gather(settings);
@@ -193,8 +194,8 @@ impl PhotonMapTracer<'_> {
         let sample_counts = Estimator::at_vertex(settings, 1).sample_counts();
         let PhotonMapSettings { gather: count, guide: fraction, .. } = settings.photons;
         for request in &self.lookups.requests {
-            let frame = Frame::from_z(request.place.ns);
-            let guide = guide(self.maps, &request.place, &frame, fraction, &mut self.lookups.scratch);
+            let frame = Frame::from_z(request.point.ns);
+            let guide = guide(self.maps, &request.point, &frame, fraction, &mut self.lookups.scratch);
             for i in 0..count {
                 let stream = request.stream.split(GATHER, count, i);
                 let [u_choice, u0, u1] = stream.draw::<3>();
@@ -202,22 +203,12 @@ impl PhotonMapTracer<'_> {
                 let pdf = guide.pdf(w);
                 let d = frame.to_world(w);
                 // Directions below the surface contribute nothing
-                let is_above = w.z > 0.0 && pdf > 0.0 && d.dot(request.place.n) > 0.0;
+                let is_above = w.z > 0.0 && pdf > 0.0 && d.dot(request.point.n) > 0.0;
                 let weight = if is_above { w.z * FRAC_1_PI / (pdf * count as f32) } else { 0.0 };
-                let o = offset_origin(request.place.p, request.p_error, request.place.n, d);
+                let o = offset_origin(request.point.p, request.p_error, request.point.n, d);
                 let ray = Ray { o, d, t_max: f32::INFINITY, time: request.time };
                 let ray = CameraRay { ray, spread: request.spread, width0: request.width, weight: 1.0 };
-                self.samples.push(CameraSample {
-                    ray,
-                    weight,
-                    stream,
-                    direct: stream,
-                    sample_counts,
-                    turn: 0,
-                    fit: 0,
-                    pixel: [0; 2],
-                    is_replica: false,
-                });
+                self.samples.push(CameraSample::of_ray(ray, weight, stream, sample_counts));
             }
         }
     }
@@ -228,9 +219,9 @@ impl PhotonMapTracer<'_> {
         (self.gather.search.only_reflected, self.gather.estimator_of) = (true, Some(1));
         self.gather.search.start(job, &self.samples, &mut self.results);
         self.gather.search.active.retain(|path| !path.beta.is_black());
-        let own: &mut AtVertices<'_> = &mut |found, out| lookups.arrive(maps, settings, found, out);
+        let own: &mut AtVertices<'_> = &mut |vertices, out| lookups.shade_hits(maps, settings, vertices, out);
         let (samples, fits) = (&self.samples, &mut Fits::default());
-        self.gather.follow((job, settings), Some(own), samples, fits, &mut self.results);
+        self.gather.follow(job, settings, Some(own), samples, fits, &mut self.results);
         self.lookups.correct(job, &mut self.results);
     }
 }
@@ -249,17 +240,17 @@ impl Lookups {
         // Both sides, with a final gather for each
         let path = v.path;
         for (i, side) in (0..).zip(sides(&v.point, part)) {
-            let (albedo, place) = side;
-            wait((v, CAUSTIC + i), side, maps.caustics(&place, &mut self.scratch), &mut self.pending);
+            let Side { albedo, point } = side;
+            wait(v, CAUSTIC + i, &side, maps.caustics(&point, &mut self.scratch), &mut self.pending);
             if settings.gather == 0 {
-                wait((v, GLOBAL + i), side, maps.indirect(&place, &mut self.scratch), &mut self.pending);
+                wait(v, GLOBAL + i, &side, maps.indirect(&point, &mut self.scratch), &mut self.pending);
                 continue;
             }
             self.requests.push(GatherRequest {
                 sample: path.sample,
                 beta: path.beta * albedo,
                 vertex,
-                place,
+                point,
                 p_error: v.point.p_error,
                 time: path.ray.time,
                 stream: v.stream,
@@ -271,11 +262,11 @@ impl Lookups {
 
     /// Looks up the maps at the hits of gather rays. A ray shorter than the search radius continues as a path scattered
     /// by the Lambertian lobe.
-    fn arrive<'w>(
+    fn shade_hits<'w>(
         &mut self,
         maps: &PhotonMaps,
         settings: &IntegratorSettings,
-        found: &BatchVertices<'_, 'w>,
+        vertices: &BatchVertices<'_, 'w>,
         out: &mut [PixelSample],
     ) -> Vec<Shading<'w>> {
         let rays_per_request = settings.photons.gather.max(1);
@@ -284,7 +275,7 @@ impl Lookups {
             let (path, point) = (v.path, &v.point);
             let Some(part) = point.bsdf.lambertian(point.wo) else { return Shading::default() };
             let first = self.pending.len();
-            let (radiance, reach) = reflected(maps, &v, &part, (&mut self.scratch, &mut self.pending));
+            let (radiance, reach) = reflected(maps, &v, &part, &mut self.scratch, &mut self.pending);
             let is_near = point.p.distance(path.ray.o) < reach;
             if !is_near {
                 out[path.sample as usize].radiance += path.beta * radiance;
@@ -294,13 +285,13 @@ impl Lookups {
             // Too near: caustics, direct light and another segment instead
             self.pending.truncate(first);
             for (i, side) in (0..).zip(sides(point, &part)) {
-                wait((&v, CAUSTIC + i), side, maps.caustics(&side.1, &mut self.scratch), &mut self.pending);
+                wait(&v, CAUSTIC + i, &side, maps.caustics(&side.point, &mut self.scratch), &mut self.pending);
             }
             let lit = Some(only_lambertian(&point.bsdf, &part));
             let before = self.requests[(path.sample / rays_per_request) as usize].vertex;
-            Shading { lit, next: lit.filter(|_| before + found.vertex + 2 < settings.depth()) }
+            Shading { lit, next: lit.filter(|_| before + vertices.vertex + 2 < settings.depth()) }
         };
-        found.each().map(shading).collect()
+        vertices.each().map(shading).collect()
     }
 
     /// Adds the pending radiance, multiplied by the numbers of trials.
@@ -315,25 +306,34 @@ impl Lookups {
     }
 }
 
-/// The sides of a vertex that scatter light to the viewer, with their albedos.
-fn sides(v: &ShadingPoint<'_>, part: &Lambertian<'_>) -> impl Iterator<Item = (Rgb, Place)> {
-    let (n, ns, p) = (v.bsdf.n, v.viewer_normal(), v.p);
-    let n = if n.dot(v.wo) < 0.0 { -n } else { n };
-    let both = [(part.reflectance, Place { p, n, ns }), (part.transmittance, Place { p, n: -n, ns: -ns })];
-    both.into_iter().filter(|(albedo, _)| !albedo.is_black())
+/// A side of a vertex.
+#[derive(Clone, Copy, Debug)]
+struct Side {
+    albedo: Rgb,
+    point: GatherPoint,
 }
 
-/// Adds the light scattered by one side of a vertex to the pending radiance. `e` is its irradiance, by a kernel of
-/// radius `radius`.
+/// The sides of a vertex that scatter light to the viewer.
+fn sides(v: &ShadingPoint<'_>, part: &Lambertian<'_>) -> impl Iterator<Item = Side> {
+    let (n, ns, p) = (v.bsdf.n, v.viewer_normal(), v.p);
+    let n = if n.dot(v.wo) < 0.0 { -n } else { n };
+    let front = Side { albedo: part.reflectance, point: GatherPoint { p, n, ns } };
+    let back = Side { albedo: part.transmittance, point: GatherPoint { p, n: -n, ns: -ns } };
+    [front, back].into_iter().filter(|side| !side.albedo.is_black())
+}
+
+/// Adds the light scattered by one side of a vertex to the pending radiance. `key` is the random-number domain of the
+/// trials.
 fn wait(
-    (v, key): (&PathVertex<'_, '_>, u32),
-    (albedo, place): (Rgb, Place),
-    (e, radius): (Rgb, f32),
+    v: &PathVertex<'_, '_>,
+    key: u32,
+    &Side { albedo, point }: &Side,
+    DensityEstimate { e, radius }: DensityEstimate,
     pending: &mut Vec<Pending>,
 ) {
     if !e.is_black() {
         let path = v.path;
-        let probe = Probe { place, radius, time: path.ray.time, stream: v.stream.domain(key) };
+        let probe = Probe { point, radius, time: path.ray.time, stream: v.stream.domain(key) };
         pending.push(Pending { owner: path.sample, radiance: path.beta * albedo * e * FRAC_1_PI, probe });
     }
 }
@@ -344,15 +344,16 @@ fn reflected(
     maps: &PhotonMaps,
     v: &PathVertex<'_, '_>,
     part: &Lambertian<'_>,
-    (scratch, pending): (&mut GatherScratch, &mut Vec<Pending>),
+    scratch: &mut GatherScratch,
+    pending: &mut Vec<Pending>,
 ) -> (Rgb, f32) {
     let (mut radiance, mut reach) = (Rgb::BLACK, 0.0_f32);
-    for (i, (albedo, place)) in (0..).zip(sides(&v.point, part)) {
-        let answer = maps.irradiance(&place, scratch);
+    for (i, side) in (0..).zip(sides(&v.point, part)) {
+        let answer = maps.irradiance(&side.point, scratch);
         reach = reach.max(answer.reach);
-        radiance += albedo * answer.known * FRAC_1_PI;
-        wait((v, GLOBAL + i), (albedo, place), answer.global, pending);
-        wait((v, CAUSTIC + i), (albedo, place), answer.caustic, pending);
+        radiance += side.albedo * answer.uncorrected * FRAC_1_PI;
+        wait(v, GLOBAL + i, &side, answer.global, pending);
+        wait(v, CAUSTIC + i, &side, answer.caustic, pending);
     }
     (radiance, reach)
 }
@@ -369,14 +370,14 @@ fn only_lambertian<'a>(bsdf: &SurfaceBsdf<'a>, part: &Lambertian<'_>) -> Surface
 }
 
 /// A guide from the photons around a vertex.
-fn guide(maps: &PhotonMaps, place: &Place, frame: &Frame, fraction: f32, scratch: &mut GatherScratch) -> Guide {
+fn guide(maps: &PhotonMaps, point: &GatherPoint, frame: &Frame, fraction: f32, scratch: &mut GatherScratch) -> Guide {
     let mut photons = Vec::new();
     if fraction > 0.0 {
         let search = match maps.search {
             Search::Nearest { max_radius, .. } => Search::Nearest { count: GUIDES, max_radius },
             Search::Radius(radius) => Search::Radius(radius),
         };
-        maps.global.gather(place, search, scratch, |photon, _| {
+        maps.global.gather(point, search, scratch, |photon, _| {
             if !photon.is_primary() {
                 photons.push((frame.to_local(photon.wi()), photon.power().luminance()));
             }

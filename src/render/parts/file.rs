@@ -20,7 +20,7 @@ use std::path::{Path, PathBuf};
 /// Magic bytes.
 const MAGIC: &[u8; 8] = b"LUMIFILM";
 /// Version of the format.
-const VERSION: u32 = 4;
+const VERSION: u32 = 5;
 /// Letters of the chunks.
 const HEADER: u8 = b'H';
 const TILES: u8 = b'T';
@@ -215,7 +215,7 @@ impl PixelSet {
         let columns = image.width().div_ceil(SHARE_TILE) as usize;
         let cell = |v: u32, origin: u32| ((v - origin) / SHARE_TILE) as usize;
         let mut is_new = |x: u32, y: u32| {
-            let at = (y - image.y0) as usize * image.width() as usize + (x - image.x0) as usize;
+            let at = image.index_of([x, y]);
             let (word, bit) = (&mut self.words[at / 64], 1 << (at % 64));
             let is_ours = header.share.is_none_or(|share| share.has(cell(y, image.y0) * columns + cell(x, image.x0)));
             let is_new = *word & bit == 0;
@@ -311,7 +311,7 @@ mod tests {
 
     fn tile(bounds: PixelBounds, done: u32) -> Tile {
         let sums = Arc::new(PackedSums::new(bounds.area()));
-        Tile { bounds, done, sums, layers: Vec::new(), replicas: Vec::new(), fits: Fits::default() }
+        Tile { bounds, done, sums, layers: Arc::default(), replicas: Vec::new(), fits: Fits::default() }
     }
 
     /// The error of a file with these tiles, whose checksums are correct.

@@ -41,8 +41,10 @@ impl FilmFile {
     /// `warn` receives errors of checkpoints.
     pub fn new(
         asked: &Asked,
-        (job, files): (&RenderJob, &SceneFiles),
-        (settings, spp): (&RenderSettings, u32),
+        job: &RenderJob,
+        files: &SceneFiles,
+        settings: &RenderSettings,
+        spp: u32,
         storage: Storage,
         warn: impl Fn(&str) + Send + Sync + 'static,
     ) -> Result<FilmFile, PartError> {
@@ -90,10 +92,7 @@ impl FilmFile {
 
 /// Fails if the stored sums belong to another scene or to other settings.
 fn check_kinship(stored: &Stored, header: &FilmHeader) -> Result<(), PartError> {
-    let mut differences = stored.header.differences_of_settings(header);
-    if stored.header.spp != header.spp {
-        differences.push(format!("samples per pixel: {}, not {}", header.spp, stored.header.spp));
-    }
+    let differences = stored.header.differences_of_rendering(header);
     if differences.is_empty() {
         return Ok(());
     }

@@ -87,10 +87,7 @@ impl FilmHeader {
     /// Differences that prevent this part and `other` from being parts of one image, one line each: the value of
     /// `other`, then the value of this part.
     pub fn differences(&self, other: &FilmHeader) -> Vec<String> {
-        let mut lines = self.differences_of_settings(other);
-        if self.spp != other.spp {
-            lines.push(format!("samples per pixel: {}, not {}", other.spp, self.spp));
-        }
+        let mut lines = self.differences_of_rendering(other);
         if (self.replicas.is_some(), self.controls) != (other.replicas.is_some(), other.controls) {
             lines.push("one of them holds the sums for a variance layer, the other does not".to_owned());
         }
@@ -101,7 +98,16 @@ impl FilmHeader {
         lines
     }
 
-    /// Like [`Self::differences`], but sample counts may differ.
+    /// Like [`Self::differences`], but the kinds of sums may differ.
+    pub fn differences_of_rendering(&self, other: &FilmHeader) -> Vec<String> {
+        let mut lines = self.differences_of_settings(other);
+        if self.spp != other.spp {
+            lines.push(format!("samples per pixel: {}, not {}", other.spp, self.spp));
+        }
+        lines
+    }
+
+    /// Like [`Self::differences_of_rendering`], but sample counts may differ.
     pub fn differences_of_settings(&self, other: &FilmHeader) -> Vec<String> {
         let mut lines = Vec::new();
         for (key, value) in &self.settings {

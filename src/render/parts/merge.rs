@@ -11,11 +11,12 @@ use super::stored_tile::StoredTile;
 use crate::direct::Fits;
 use crate::film::accumulator::PixelAccumulator;
 use crate::film::exact::FixedSum;
+use crate::film::layers::{LayerScratch, LightSums, PackedLayers};
 use crate::film::packed::PackedSums;
 use crate::film::{Film, PixelBounds};
 use crate::render::control_variates;
 use crate::render::output::{Aov, default_aovs};
-use crate::render::tiles::{SHARE_TILE, Tile, empty_layers, film, position};
+use crate::render::tiles::{SHARE_TILE, Tile, film};
 use std::collections::BTreeMap;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -214,6 +215,7 @@ struct Whole {
     bounds: PixelBounds,
     tiles: Vec<Tile>,
     packing: Vec<u8>,
+    of_layers: LayerScratch,
 }
 
 impl Whole {
@@ -226,10 +228,11 @@ impl Whole {
                 0 => Fits::default(),
                 controls => Fits::of_pixels(controls, bounds.area() + replicas.len()),
             };
-            let layers = empty_layers(header.light_layers.len(), bounds.area());
+            let layers = Arc::new(PackedLayers::new(header.light_layers.len(), bounds.area()));
             Tile { bounds, done: 0, sums: Arc::new(PackedSums::new(bounds.area())), layers, replicas, fits }
         };
-        Whole { bounds: image, tiles: image.tiles(SHARE_TILE).into_iter().map(tile).collect(), packing: Vec::new() }
+        let tiles = image.tiles(SHARE_TILE).into_iter().map(tile).collect();
+        Whole { bounds: image, tiles, packing: Vec::new(), of_layers: LayerScratch::default() }
     }
 
     /// Adds a stored tile of any size.
@@ -252,7 +255,8 @@ impl Whole {
 
         // Add it to the overlapping tiles
         let sums = stored.sums.unpacked();
-        let layers: Vec<_> = stored.layers.iter().map(PackedSums::unpacked).collect();
+        let area = stored.bounds.area();
+        let layers: Vec<_> = (0..stored.layers.len()).map(|layer| stored.layers.lit(layer, 0..area)).collect();
         let columns = self.bounds.width().div_ceil(SHARE_TILE) as usize;
         let cells = |from: u32, to: u32, origin: u32| {
             (((from - origin) / SHARE_TILE) as usize)..((to - origin).div_ceil(SHARE_TILE) as usize)
@@ -260,8 +264,8 @@ impl Whole {
         for y in cells(stored.bounds.y0, stored.bounds.y1, self.bounds.y0) {
             for x in cells(stored.bounds.x0, stored.bounds.x1, self.bounds.x0) {
                 let tile = &mut self.tiles[y * columns + x];
-                add_to(tile, (stored, &sums, &controls[..]), &mut self.packing).map_err(damaged)?;
-                add_layers_to(tile, (&stored.bounds, &layers), &mut self.packing);
+                add_to(tile, stored, &sums, &controls[..], &mut self.packing).map_err(damaged)?;
+                add_layers_to(tile, &stored.bounds, &layers, &mut self.of_layers);
             }
         }
         Ok(())
@@ -272,7 +276,9 @@ impl Whole {
 /// replicas.
 fn add_to(
     tile: &mut Tile,
-    (stored, sums, controls): (&StoredTile, &[PixelAccumulator], &[FixedSum]),
+    stored: &StoredTile,
+    sums: &[PixelAccumulator],
+    controls: &[FixedSum],
     packing: &mut Vec<u8>,
 ) -> Result<(), &'static str> {
     let bounds = tile.bounds;
@@ -308,24 +314,20 @@ fn add_to(
 }
 
 /// Adds the layers of a stored tile to an overlapping tile.
-fn add_layers_to(tile: &mut Tile, (from, layers): (&PixelBounds, &[Vec<PixelAccumulator>]), packing: &mut Vec<u8>) {
-    let bounds = tile.bounds;
-    for (layer, sums) in layers.iter().enumerate() {
-        let mut merged = tile.layers[layer].unpacked();
-        for (i, sums) in (0..).zip(sums) {
-            if let Some(at) = index_in(&bounds, from, i) {
-                merged[at].merge(sums);
-            }
+fn add_layers_to(tile: &mut Tile, from: &PixelBounds, layers: &[Vec<(u32, LightSums)>], scratch: &mut LayerScratch) {
+    for (layer, lit) in layers.iter().enumerate() {
+        let inside = |(i, sums): &(u32, LightSums)| Some((index_in(&tile.bounds, from, *i)? as u32, *sums));
+        let inside: Vec<_> = lit.iter().filter_map(inside).collect();
+        if !inside.is_empty() {
+            Arc::make_mut(&mut tile.layers).merge(layer, &inside, scratch);
         }
-        tile.set_layer(layer, &merged, packing);
     }
 }
 
 /// Index in the tile `to` of the pixel with index `i` in the tile `from`; `None` if it is outside.
 fn index_in(to: &PixelBounds, from: &PixelBounds, i: u32) -> Option<usize> {
-    let [x, y] = position(from, i);
-    let is_inside = (to.x0..to.x1).contains(&x) && (to.y0..to.y1).contains(&y);
-    is_inside.then(|| ((y - to.y0) * to.width() + x - to.x0) as usize)
+    let pixel = from.pixel_at(i);
+    to.contains(pixel).then(|| to.index_of(pixel))
 }
 
 /// The first path that refers to the same file as an earlier one; `None` if there is none.

@@ -4,6 +4,7 @@ use super::error::PartError;
 use super::header::FilmHeader;
 use crate::film::PixelBounds;
 use crate::film::encoding::{Decoder, Encoder};
+use crate::film::layers::{LayerScratch, PackedLayers};
 use crate::film::packed::{PackedRows, PackedSums};
 use crate::film::replicas::ReplicaAccumulator;
 use crate::render::tiles::Tile;
@@ -18,7 +19,7 @@ pub struct StoredTile {
     pub done: u32,
     pub(super) sums: PackedSums,
     /// Sums of the light-group layers.
-    pub(super) layers: Vec<PackedSums>,
+    pub(super) layers: PackedLayers,
     pub(super) replicas: Vec<ReplicaAccumulator>,
     /// Sums of values and control variates, of the pixels and then of the replicas.
     pub(super) controls: PackedRows,
@@ -53,7 +54,7 @@ impl StoredTile {
         if tile.layers.len() != self.layers.len() {
             return Err(PartError::Sums("there are not as many light groups"));
         }
-        tile.layers = self.layers.into_iter().map(Arc::new).collect();
+        tile.layers = Arc::new(self.layers);
 
         // Pixels
         let mut sums = self.sums.unpacked();
@@ -74,10 +75,10 @@ impl StoredTile {
             return None;
         }
         // Counts are not trusted: memory grows with the bytes that are read
-        let mut pixels =
-            || Some(PackedSums::of(&(0..bounds.area()).map(|_| decoder.pixel()).collect::<Option<Vec<_>>>()?));
-        let sums = pixels()?;
-        let layers = (0..layers).map(|_| pixels()).collect::<Option<_>>()?;
+        let sums = PackedSums::of(&(0..bounds.area()).map(|_| decoder.pixel()).collect::<Option<Vec<_>>>()?);
+        let lit = (0..layers).map(|_| decoder.light(bounds.area())).collect::<Option<Vec<_>>>()?;
+        let (mut layers, mut scratch) = (PackedLayers::new(layers, bounds.area()), LayerScratch::default());
+        lit.iter().enumerate().for_each(|(layer, pixels)| layers.merge(layer, pixels, &mut scratch));
         let replicas: Vec<_> = (0..replicas).map(|_| decoder.replica()).collect::<Option<_>>()?;
         let is_in_order = replicas.windows(2).all(|pair| pair[0].pixel < pair[1].pixel);
         if !is_in_order || replicas.iter().any(|r| r.pixel as usize >= bounds.area()) {
@@ -103,9 +104,8 @@ pub(super) fn write(tile: &Tile, encoder: &mut Encoder) {
     encoder.word(tile.layers.len() as u32);
     encoder.word(tile.replicas.len() as u32);
     encoder.word(controls.len() as u32);
-    for sums in std::iter::once(&tile.sums).chain(&tile.layers) {
-        sums.unpacked().iter().for_each(|sums| encoder.pixel(sums));
-    }
+    tile.sums.unpacked().iter().for_each(|sums| encoder.pixel(sums));
+    (0..tile.layers.len()).for_each(|layer| encoder.light(&tile.layers.lit(layer, 0..tile.bounds.area())));
     tile.replicas.iter().for_each(|replica| encoder.replica(replica));
     controls.iter().for_each(|sum| encoder.fixed(sum));
     tile.fits.memory().into_iter().for_each(|values| encoder.floats(values));

@@ -1,6 +1,6 @@
 //! The irradiance cache.
 
-use super::{Applies, Group, MAX_SAMPLES, Setting};
+use super::setting::{Applies, Group, MAX_SAMPLES, Setting};
 use crate::settings::value::{Interval, Kind, Value};
 use crate::settings::{Cached, IntegratorKind};
 

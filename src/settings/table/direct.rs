@@ -1,6 +1,6 @@
 //! Settings of direct light.
 
-use super::{Applies, Group, MAX_SAMPLES, RESEARCH, Setting, choice};
+use super::setting::{Applies, Group, MAX_SAMPLES, RESEARCH, Setting, choice};
 use crate::settings::EstimatorKind::{Auto, Contributing, Correlated, Mis, Ocv, OptimalMis, Ris};
 use crate::settings::value::{Integers, Interval, Kind, Value};
 use crate::settings::{

@@ -1,6 +1,6 @@
 //! Photon maps, and the photons of the visibility cache.
 
-use super::{Applies, Group, MAX_SAMPLES, MAX_U32, Setting};
+use super::setting::{Applies, Group, MAX_SAMPLES, MAX_U32, Setting};
 use crate::settings::value::{Integers, Interval, Kind, Value};
 use crate::settings::{IntegratorKind, PhotonStorage, ProgressiveSettings};
 

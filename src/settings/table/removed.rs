@@ -1,7 +1,7 @@
 //! Settings of earlier versions that no longer exist. Scene files and plans may still contain them: they are ignored
 //! with a message.
 
-use super::Directive;
+use super::setting::Directive;
 
 /// A setting that no longer exists.
 #[derive(Clone, Copy, Debug)]

@@ -1,6 +1,6 @@
 //! Settings of the integrator and of random numbers.
 
-use super::{Applies, Directive, Group, MAX_SAMPLES, MAX_U32, Setting, choice};
+use super::setting::{Applies, Directive, Group, MAX_SAMPLES, MAX_U32, Setting, choice};
 use crate::bsdfs::ProposalDensity;
 use crate::lights::LightSamplerKind;
 use crate::settings::value::{Interval, Kind, Value};

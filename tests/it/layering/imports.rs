@@ -52,6 +52,12 @@ impl Crate {
         self.sources.iter().filter(names).map(|s| s.file.as_str())
     }
 
+    /// The `mod.rs` files of a module and of the folders in it, with their code.
+    pub(super) fn mod_files<'a>(&'a self, module: &str) -> impl Iterator<Item = (&'a str, &'a str)> {
+        let is_one = move |s: &&Source| s.module.first().is_some_and(|m| m == module) && s.file.ends_with("/mod.rs");
+        self.sources.iter().filter(is_one).map(|s| (s.file.as_str(), s.code.as_str()))
+    }
+
     /// All imports between different modules of the crate.
     pub(super) fn imports(&self) -> Vec<Import> {
         let re_exports: BTreeMap<Module, BTreeMap<String, Module>> =

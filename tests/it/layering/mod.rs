@@ -1,8 +1,8 @@
 //! Allowed imports: between crates, between the renderer's modules by layer, and without cycles inside a folder. No
 //! file has conflict markers of an unfinished merge ([`conflicts`]).
 //!
-//! [`imports`] parses the sources. A folder's `mod.rs` is its interface: it declares and re-exports the files of the
-//! folder, and they use its items; this alone is no cycle.
+//! [`imports`] parses the sources. Imports between a folder's `mod.rs` and its files do not count as cycles, so the
+//! `mod.rs` of most folders must not define anything: it only declares and re-exports.
 
 mod conflicts;
 mod imports;
@@ -39,6 +39,22 @@ const LAYERS: &[&[&str]] = &[
     &["integrators"],
     &["planning"],
     &["render"],
+];
+
+/// Modules of the renderer whose `mod.rs` files define nothing.
+const INTERFACES_IN_FILES: &[&str] = &[
+    "textures",
+    "geometry",
+    "bsdfs",
+    "media",
+    "cameras",
+    "film",
+    "materials",
+    "lights",
+    "accel",
+    "settings",
+    "scene",
+    "photons",
 ];
 
 /// Modules of the numbers crate, with the modules that each may import.
@@ -93,6 +109,27 @@ fn modules_import_only_from_lower_layers() {
         }
     }
     assert!(violations.is_empty(), "{}", violations.join("\n"));
+}
+
+/// True for the first line of a definition at the top level of a file.
+fn is_definition(line: &str) -> bool {
+    const KEYWORDS: &[&str] = &["const", "enum", "fn", "impl", "macro_rules", "static", "struct", "trait", "type"];
+    let is_visibility = |word: &&str| word.starts_with("pub") || word.ends_with(')');
+    line.split([' ', '<', '!']).find(|word| !is_visibility(word)).is_some_and(|word| KEYWORDS.contains(&word))
+}
+
+#[test]
+fn interfaces_are_in_files_of_their_own() {
+    let mut violations = Vec::new();
+    for krate in workspace().iter().filter(|krate| krate.name == "lumiris") {
+        for (file, code) in INTERFACES_IN_FILES.iter().flat_map(|module| krate.mod_files(module)) {
+            let definitions = code.lines().filter(|line| is_definition(line));
+            violations.extend(definitions.map(|line| format!("{file} defines: {line}")));
+        }
+    }
+    assert!(violations.is_empty(), "{}", violations.join("\n"));
+    assert!(is_definition("pub(crate) struct Light<'a> {") && is_definition("impl<T> Trait for T {"));
+    assert!(!is_definition("pub use light::Light;") && !is_definition("    const N: usize = 1;"));
 }
 
 /// Import graphs inside each folder: folder, importing file, imported files.

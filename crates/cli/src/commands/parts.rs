@@ -109,7 +109,7 @@ pub(super) fn film_file(
     let checkpoint = checkpoint.map(|(path, seconds)| (path.clone(), Duration::from_secs_f64(*seconds)));
     let plan = if plan.settings.is_empty() { None } else { Some(plan.text()?) };
     let storage = Storage { checkpoint, keeps_sums, stored, plan };
-    Ok(Some(FilmFile::new(&asked(args), (job, files), (settings, spp), storage, progress::say)?))
+    Ok(Some(FilmFile::new(&asked(args), job, files, settings, spp, storage, progress::say)?))
 }
 
 /// Checkpoint statistics for `--stats`.

@@ -422,7 +422,7 @@ fn tile_counts(TileCounts { stored, read, held }: TileCounts) -> serde_json::Val
 }
 
 fn light_path_stats(l: &LightPathStats) -> serde_json::Value {
-    json!({ "paths": l.paths, "seen": l.seen, "rays": l.rays, "thread_seconds": l.time.as_secs_f64() })
+    json!({ "paths": l.paths, "seen": l.connected, "rays": l.rays, "thread_seconds": l.time.as_secs_f64() })
 }
 
 fn photon_stats(p: &MapStats) -> serde_json::Value {

@@ -3,7 +3,7 @@
 use super::baselines::{defensive_choice, defensive_pdf};
 use super::{assert_means, assert_variances};
 use lumiris_numbers::estimators::mc;
-use lumiris_numbers::estimators::ris::control::{Known, doubt};
+use lumiris_numbers::estimators::ris::control::{ControlSum, doubt};
 use lumiris_numbers::estimators::ris::{strata, stratified, systematic, with_replacement};
 use lumiris_numbers::estimators::stats::Welford;
 use lumiris_numbers::math::Rgb;
@@ -188,18 +188,18 @@ fn controlled_runs(integral: Integral, n: usize, guess: Option<Guess>, runs: usi
             p.push(integral, x, 1.0 / (M as f64 * integral.pdf(x)));
             guesses.push(guess.map_or(0.0, |guess| guess(integral, x) as f32));
         }
-        let mut known = Known::default();
+        let mut control = ControlSum::default();
         if guess.is_some() {
             p.weights.iter_mut().zip(&guesses).for_each(|(w, &v)| *w *= doubt(v));
-            p.unshadowed.iter().zip(&guesses).for_each(|(&c, &v)| known.propose(Rgb::from_array(c), v));
+            p.unshadowed.iter().zip(&guesses).for_each(|(&c, &v)| control.propose(Rgb::from_array(c), v));
         }
         systematic(&p.weights, n as u32, stream.random::<f32>(), &mut draws);
         for draw in &draws {
             let j = draw.index as usize;
-            known.draw(Rgb::from_array(p.unshadowed[j]) * draw.scale, guesses[j]);
+            control.draw(Rgb::from_array(p.unshadowed[j]) * draw.scale, guesses[j]);
         }
-        let (seen, known) = (p.estimate(&draws), known.sum().to_array());
-        [0, 1, 2].map(|c| seen[c] + f64::from(known[c]))
+        let (seen, control) = (p.estimate(&draws), control.sum().to_array());
+        [0, 1, 2].map(|c| seen[c] + f64::from(control[c]))
     })
 }
 

@@ -9,7 +9,7 @@ use super::Setup;
 use super::above::Plan;
 use super::seen::{Reference, Seen};
 use lumiris::photons::{
-    GatherScratch, Importance, Photon, PhotonBudget, PhotonMap, Place, Search, Traced, Tracing, trace_photons,
+    GatherPoint, GatherScratch, Importance, Photon, PhotonBudget, PhotonMap, Search, Traced, Tracing, trace_photons,
 };
 use lumiris::scene::RenderJob;
 use lumiris_numbers::math::{Rgb, Vec3};
@@ -85,7 +85,7 @@ pub(super) fn show(setup: &Setup<'_>, seen: &[Option<Seen>], maps: &[&PhotonMap]
     let search = Search::Nearest { count, max_radius: MAX_RADIUS };
     let pixel = |scratch: &mut GatherScratch, seen: &Option<Seen>| {
         seen.map_or([0.0; 3], |s| {
-            let place = Place::flat(s.p, s.n);
+            let place = GatherPoint::flat(s.p, s.n);
             let add = |e: Rgb, map: &&PhotonMap| e + map.irradiance(&place, search, scratch);
             s.radiance(maps.iter().fold(Rgb::BLACK, add))
         })

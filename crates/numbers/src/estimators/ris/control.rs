@@ -24,11 +24,11 @@ pub fn doubt(v: f32) -> f32 {
 
 /// The part of Î that needs no visibility: Σ c_j V̂_j over all proposals minus Σ scale·c_j V̂_j over the draws.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Known {
+pub struct ControlSum {
     sum: Rgb,
 }
 
-impl Known {
+impl ControlSum {
     /// Adds a proposal with the unshadowed contribution `c`. It must have a positive weight.
     #[inline]
     pub fn propose(&mut self, c: Rgb, v: f32) {

@@ -1,0 +1,134 @@
+//! The two-level hierarchy and its construction.
+
+use super::build::{PrimRef, build_binary};
+use super::tree::Tree;
+use crate::accel::{AccelStats, AlphaTest};
+use crate::geometry::{AlphaSource, Geometry, GeometrySet, Group, Shape, Visibility};
+use lumiris_numbers::math::{Affine3A, Bounds3, Vec3};
+use rayon::prelude::*;
+use std::sync::Arc;
+use std::time::Instant;
+
+/// The two-level hierarchy of a scene's geometry.
+pub struct Bvh {
+    pub(super) geometry: Arc<GeometrySet>,
+    pub(super) alpha: Option<AlphaTest>,
+    /// Visibility bits of each geometry, and [`TESTED`] if it has an alpha mask.
+    pub(super) flags: Vec<u32>,
+    pub(super) root: Tree,
+    pub(super) groups: Vec<Tree>,
+    /// Inverse transforms of static instances.
+    pub(super) group_from_world: Vec<Option<Affine3A>>,
+    pub(super) stats: AccelStats,
+}
+
+/// Flag of a geometry whose hits need the alpha test.
+pub(super) const TESTED: u32 = 1 << 31;
+
+impl Bvh {
+    /// Builds the trees in parallel. The result does not depend on the number of threads. Without `alpha`, alpha masks
+    /// are opaque.
+    pub fn new(geometry: Arc<GeometrySet>, alpha: Option<Arc<dyn AlphaSource>>) -> Bvh {
+        // Trees of the groups
+        let start = Instant::now();
+        let flags = geometry.geometries.iter().map(|g| flags_of(g, alpha.is_some())).collect();
+        let is_triangle: Vec<bool> = geometry.geometries.iter().map(|g| matches!(g.shape, Shape::Mesh(_))).collect();
+        let build = |prims| build_tree(&geometry, &is_triangle, prims);
+        let built: Vec<(Tree, u64)> =
+            geometry.groups.par_iter().map(|group| build(group_prims(&geometry, group))).collect();
+        let group_bounds: Vec<Bounds3> = built.iter().map(|(tree, _)| tree.bounds).collect();
+
+        // Tree of the root
+        let mut prims = group_prims(&geometry, &geometry.root);
+        prims.extend(instance_prims(&geometry, &group_bounds));
+        let (root, root_peak) = build(prims);
+
+        // Transforms and memory
+        let group_from_world: Vec<Option<Affine3A>> = geometry
+            .instances
+            .iter()
+            .map(|i| (i.world_from_group.len() == 1).then(|| i.world_from_group[0].inverse()))
+            .collect();
+        let group_bytes: u64 = built.iter().map(|(tree, _)| tree.bytes()).sum();
+        let group_peak: u64 = built.iter().map(|(_, peak)| peak).sum();
+        let bytes = group_bytes + root.bytes() + size_of_val(&group_from_world[..]) as u64;
+        let peak_bytes = bytes.max(group_peak).max(group_bytes + root_peak);
+        Bvh {
+            alpha: alpha.map(|source| AlphaTest::new(Arc::clone(&geometry), source)),
+            geometry,
+            flags,
+            root,
+            groups: built.into_iter().map(|(tree, _)| tree).collect(),
+            group_from_world,
+            stats: AccelStats { bytes, peak_bytes, build_seconds: start.elapsed().as_secs_f64() },
+        }
+    }
+}
+
+fn flags_of(geometry: &Geometry, has_alpha_source: bool) -> u32 {
+    let tested = if geometry.alpha.is_some() && has_alpha_source { TESTED } else { 0 };
+    geometry.visibility.0 & Visibility::ALL.0 | tested
+}
+
+/// A tree, and the peak memory of its build (bytes). `is_triangle` tells of each geometry whether it is a mesh.
+fn build_tree(geometry: &GeometrySet, is_triangle: &[bool], mut prims: Vec<PrimRef>) -> (Tree, u64) {
+    let binary = build_binary(&mut prims, is_triangle);
+    let tree = Tree::new(geometry, &prims, binary.as_ref(), is_triangle);
+    let binary_bytes = binary.map_or(0, |root| root.bytes());
+    let peak = tree.bytes() + size_of_val(&prims[..]) as u64 + binary_bytes;
+    (tree, peak)
+}
+
+/// The finite primitives of a group that are visible to some ray.
+fn group_prims(set: &GeometrySet, group: &Group) -> Vec<PrimRef> {
+    // Hidden geometries have none
+    let mut prims = Vec::new();
+    for &id in &group.geometries {
+        let geometry = &set.geometries[id as usize];
+        if geometry.visibility.0 & Visibility::ALL.0 == 0 {
+            continue;
+        }
+
+        // One primitive per triangle, patch, quadric or curve piece
+        match &geometry.shape {
+            Shape::Mesh(mesh) => prims.par_extend(
+                (0..mesh.triangle_count()).into_par_iter().filter_map(|i| PrimRef::of_points(id, i, &mesh.triangle(i))),
+            ),
+            Shape::Bilinear(mesh) => {
+                prims.extend((0..mesh.patch_count()).filter_map(|i| PrimRef::of_points(id, i, &mesh.patch(i))));
+            }
+            Shape::Quadric(quadric) => prims.extend(PrimRef::of_bounds(id, 0, quadric.bounds())),
+            Shape::Curves(curves) => prims.par_extend(
+                (0..curves.piece_count())
+                    .into_par_iter()
+                    .filter_map(|i| PrimRef::of_bounds(id, i, curves.piece_bounds(i))),
+            ),
+        }
+    }
+    prims
+}
+
+/// Instances with their bounds over all times. Points move on straight lines between time samples, so the boxes at the
+/// samples suffice. Static instances with a singular transform are excluded.
+fn instance_prims(set: &GeometrySet, group_bounds: &[Bounds3]) -> Vec<PrimRef> {
+    let bounds_of = |i: usize| {
+        let instance = &set.instances[i];
+        let bounds = group_bounds[instance.group as usize];
+        let flat = instance.world_from_group.len() == 1 && !instance.world_from_group[0].inverse().is_finite();
+        if bounds.is_empty() || flat || !instance.world_from_group.iter().all(Affine3A::is_finite) {
+            return None;
+        }
+        let placed = instance.world_from_group.iter().map(|m| bounds.transformed(m));
+        let all = placed.fold(Bounds3::EMPTY, Bounds3::union);
+        // The transform of the ray into the group has rounding errors, too
+        let pad = all.min.abs().max(all.max.abs()).max_element() * 2.0_f32.powi(-18);
+        Some(Bounds3 { min: all.min - Vec3::splat(pad), max: all.max + Vec3::splat(pad) })
+    };
+    (0..set.instances.len())
+        .filter_map(|i| bounds_of(i).and_then(|b| PrimRef::of_bounds(PrimRef::INSTANCE, i, b)))
+        .collect()
+}
+
+#[cfg(test)]
+#[path = "tests.rs"]
+mod tests;

@@ -1,0 +1,537 @@
+//! One light sample for each of many points, in columns.
+//!
+//! Points that chose the same light are sampled together: rectangles, triangles and infinite lights by kernels, other
+//! lights one by one. A light that has a kernel always uses it, so the result is bit-identical for any number of
+//! points.
+
+use super::groups::MAX_GROUPS;
+use super::light_sampler::LightSampler;
+use super::sampling::LightSampling;
+use crate::lights::{AreaLight, AreaShape, Light, LightCtx, LightId, LightLanes, LightSample, Tops};
+use lumiris_lanes::area::{Rectangle, many};
+use lumiris_lanes::columns::{Column, Columns3, padded, reserve};
+use lumiris_lanes::level;
+use lumiris_lanes::light_choice::{GlossyLobes, Receivers};
+use lumiris_numbers::math::light_bound::GlossyLobe;
+use lumiris_numbers::math::{Rgb, Vec3};
+use std::cell::LazyCell;
+use std::ops::Range;
+
+/// Maximum number of lights for which points are sorted by counting.
+const MAX_COUNTED: usize = 256;
+
+/// The choice of no light.
+pub const NO_LIGHT: LightId = LightId::MAX;
+
+/// Illuminated points, in columns; see [`LightCtx`].
+#[derive(Clone, Copy, Debug)]
+pub struct LitPoints<'a> {
+    /// Positions.
+    pub p: &'a Columns3,
+    /// Geometric normals on the illuminated side; zero if both sides are illuminated.
+    pub n: &'a Columns3,
+    /// Shading normals.
+    pub ns: &'a Columns3,
+    /// Glossy lobes for the choice of lights; empty if no choice depends on them.
+    pub lobes: &'a [GlossyLobe],
+}
+
+impl LitPoints<'_> {
+    /// Point `i`.
+    #[inline]
+    pub fn get(&self, i: usize) -> LightCtx {
+        let lobe = self.lobes.get(i).copied().unwrap_or(GlossyLobe::NONE);
+        LightCtx { p: self.p.vec3(i), n: self.n.vec3(i), ns: self.ns.vec3(i), lobe }
+    }
+}
+
+/// A light sample for each point, as [`LightSample`].
+#[derive(Debug, Default)]
+pub struct LightSamples {
+    /// Unit directions.
+    pub wi: Columns3,
+    /// Radiances.
+    pub li: Columns3,
+    /// Densities including the probability of the light (1/sr); 0 if there is no sample.
+    pub pdf: Column,
+    /// Points on lights.
+    pub p: Columns3,
+    /// Bounds of their rounding errors.
+    pub p_error: Columns3,
+    /// Normals of lights.
+    pub n: Columns3,
+    /// 1 for lights at infinity, else 0.
+    pub is_far: Column,
+    /// True if no other technique can sample the direction.
+    pub is_delta: Vec<bool>,
+}
+
+impl LightSamples {
+    /// Lengthens the columns if they are shorter.
+    pub fn reserve(&mut self, len: usize) {
+        let LightSamples { wi, li, pdf, p, p_error, n, is_far, is_delta } = self;
+        [wi, li, p, p_error, n].into_iter().for_each(|c| c.reserve(len));
+        reserve(&mut [pdf, is_far], len);
+        is_delta.resize(is_delta.len().max(len), false);
+    }
+
+    /// The first `len` of them, as kernels fill them.
+    fn lanes(&mut self, len: usize) -> LightLanes<'_> {
+        LightLanes { wi: self.wi.get_mut(len), li: self.li.get_mut(len), pdf: &mut self.pdf[..len] }
+    }
+
+    /// Sample `i`, drawn from the point `from`; `None` if there is none.
+    #[inline]
+    pub fn get(&self, i: usize, from: Vec3) -> Option<LightSample> {
+        let (pdf, p, is_far) = (self.pdf[i], self.p.vec3(i), self.is_far[i] > 0.0);
+        (pdf > 0.0).then(|| LightSample {
+            li: self.li.rgb(i),
+            wi: self.wi.vec3(i),
+            pdf,
+            t: if is_far { f32::INFINITY } else { (p - from).length() },
+            p,
+            n: self.n.vec3(i),
+            p_error: self.p_error.vec3(i),
+            is_delta: self.is_delta[i],
+        })
+    }
+
+    /// Copies sample `from` of `other` to `to`.
+    #[inline]
+    fn copy(&mut self, to: usize, other: &LightSamples, from: usize) {
+        self.wi.set(to, other.wi.vec3(from));
+        self.li.set(to, other.li.vec3(from));
+        self.pdf[to] = other.pdf[from];
+        self.p.set(to, other.p.vec3(from));
+        self.p_error.set(to, other.p_error.vec3(from));
+        self.n.set(to, other.n.vec3(from));
+        self.is_far[to] = other.is_far[from];
+        self.is_delta[to] = other.is_delta[from];
+    }
+}
+
+/// Lobes in columns.
+#[derive(Debug, Default)]
+struct LobeColumns {
+    wo: Columns3,
+    rest: [Column; 4],
+}
+
+impl LobeColumns {
+    /// Columns of length `len` with these lobes; `None` if there are none.
+    fn set(&mut self, lobes: &[GlossyLobe], len: usize) -> Option<GlossyLobes<'_>> {
+        let LobeColumns { wo, rest } = self;
+        wo.reserve(len);
+        reserve(&mut rest.each_mut(), len);
+        for (i, lobe) in lobes.iter().enumerate() {
+            wo.set(i, Vec3::from_array(lobe.wo));
+            for (column, x) in rest.iter_mut().zip([lobe.cos_o, lobe.alpha_squared, lobe.scale, lobe.diffuse]) {
+                column[i] = x;
+            }
+        }
+        let [cos_o, alpha_squared, scale, diffuse] = rest.each_ref().map(|column| &column[..len]);
+        (!lobes.is_empty()).then(|| GlossyLobes { wo: wo.get(len), cos_o, alpha_squared, scale, diffuse })
+    }
+}
+
+/// Memory of [`LightSampling::sample_many`].
+#[derive(Debug, Default)]
+pub struct Scratch {
+    /// The light that each point chose, and the probability.
+    chosen: Vec<(LightId, f32)>,
+    /// Precomputed probabilities of the choices at the points.
+    tops: Tops,
+    lobes: LobeColumns,
+    /// Points sorted by light.
+    order: Vec<u32>,
+    begins: Vec<u32>,
+    p: Columns3,
+    u: [Column; 2],
+    samples: LightSamples,
+}
+
+impl Scratch {
+    /// Prepares for samples of `lights` at the `n` points `at`; each point may be sampled several times.
+    pub fn begin(&mut self, lights: &LightSampling, n: usize, at: LitPoints<'_>) {
+        self.tops.clear();
+        if let LightSampler::Tree(choice) = &lights.sampler
+            && lights.sampler.only_light().is_none()
+        {
+            let len = padded(n);
+            let lobes = self.lobes.set(at.lobes, len);
+            self.tops.determine(choice, &Receivers { p: at.p.get(len), ns: at.ns.get(len), lobes });
+        }
+    }
+
+    /// [`LightGroups::pmfs`](super::groups::LightGroups::pmfs) of `lights` at point `i`, given as `at`. There must be
+    /// more than one light.
+    #[inline]
+    pub fn group_pmfs(&self, lights: &LightSampling, i: usize, at: &LightCtx) -> [f32; MAX_GROUPS] {
+        lights.groups.pmfs_again(&lights.sampler, at, self.tops.of(i))
+    }
+
+    /// The light that point `i` chose in the last [`LightSampling::sample_many`], if there is more than one light.
+    pub fn chosen(&self, i: usize) -> LightId {
+        self.chosen[i].0
+    }
+}
+
+impl LightSampling {
+    /// Samples a direction to a light for each of the `n` points `at`: the light by `u[0]`, the direction by `u[1]` and
+    /// `u[2]`. The results equal [`sample`](Self::sample) up to rounding, except that the radiance and density of
+    /// infinite lights are sums over all of them. `out` must have whole vectors. `scratch` must have begun with these
+    /// points.
+    pub fn sample_many(
+        &self,
+        n: usize,
+        at: LitPoints<'_>,
+        u: &[Column; 3],
+        scratch: &mut Scratch,
+        out: &mut LightSamples,
+    ) {
+        // A single light needs no choice
+        if let Some(light) = self.sampler.only_light() {
+            let len = padded(n);
+            self.sample_one_light(light, n, at.p, [&u[1][..len], &u[2][..len]], out);
+        } else {
+            let mut chosen = std::mem::take(&mut scratch.chosen);
+            chosen.clear();
+            let choose = |(i, &u): (usize, &f32)| {
+                let ctx = LazyCell::new(|| at.get(i));
+                let choice = self.sampler.sample_again(&ctx, u, scratch.tops.of(i));
+                choice.map_or((NO_LIGHT, 0.0), |choice| (choice.light, choice.pmf))
+            };
+            chosen.extend(u[0][..n].iter().enumerate().map(choose));
+            self.sample_chosen(&chosen, at.p, [&u[1], &u[2]], scratch, out);
+            scratch.chosen = chosen;
+        }
+
+        // Infinite lights overlap
+        self.unite_infinite(0..n, |i| at.get(i), out);
+    }
+
+    /// Samples a direction for each of the points `p` to its chosen light, by the random numbers `u`. `chosen` holds
+    /// the light and its probability. Otherwise as [`sample_many`](Self::sample_many), but infinite lights are not
+    /// combined.
+    pub fn sample_chosen(
+        &self,
+        chosen: &[(LightId, f32)],
+        p: &Columns3,
+        u: [&Column; 2],
+        scratch: &mut Scratch,
+        out: &mut LightSamples,
+    ) {
+        // One light for all points needs no sorting
+        let len = padded(chosen.len());
+        let mut lights = chosen.iter().map(|c| c.0).filter(|&light| light != NO_LIGHT);
+        if let Some(light) = lights.next()
+            && lights.all(|other| other == light)
+        {
+            self.sample_one_light(light, chosen.len(), p, [&u[0][..len], &u[1][..len]], out);
+            return with_choices(chosen, out);
+        }
+
+        // Gather the points of each light, sample them together, and scatter the results
+        sort_by_light(chosen, self.lights.len(), scratch);
+        scratch.p.reserve(len);
+        scratch.samples.reserve(len);
+        let [u0, u1] = &mut scratch.u;
+        reserve(&mut [u0, u1], len);
+        let mut rest = &scratch.order[..];
+        while let Some(&first) = rest.first() {
+            let light = chosen[first as usize].0;
+            let count = rest.partition_point(|&i| chosen[i as usize].0 == light);
+            let (places, others) = rest.split_at(count);
+            rest = others;
+            for (k, &i) in places.iter().enumerate() {
+                let i = i as usize;
+                scratch.p.set(k, p.vec3(i));
+                (u0[k], u1[k]) = (u[0][i], u[1][i]);
+            }
+            let len = padded(count);
+            self.sample_one_light(light, count, &scratch.p, [&u0[..len], &u1[..len]], &mut scratch.samples);
+            for (k, &i) in places.iter().enumerate() {
+                out.copy(i as usize, &scratch.samples, k);
+            }
+        }
+        with_choices(chosen, out);
+    }
+
+    /// Replaces radiance and density of samples of infinite lights by the sums over all infinite lights, since every
+    /// direction belongs to each of them. `at(i)` is the point of sample `i`.
+    pub fn unite_infinite(&self, places: Range<usize>, at: impl Fn(usize) -> LightCtx, out: &mut LightSamples) {
+        if self.infinite.len() > 1 {
+            for i in places {
+                if out.pdf[i] == 0.0 || out.is_far[i] == 0.0 || out.is_delta[i] {
+                    continue;
+                }
+                let wi = out.wi.vec3(i);
+                let (le, pdf) = self.infinite_in_direction(&at(i), wi);
+                out.li.set_rgb(i, le);
+                out.pdf[i] = pdf;
+            }
+        }
+    }
+
+    /// Samples the same light for `n` points; the columns `u` have whole vectors.
+    fn sample_one_light(&self, light: LightId, n: usize, p: &Columns3, u: [&[f32]; 2], out: &mut LightSamples) {
+        let len = u[0].len();
+        match &self.lights[light as usize] {
+            Light::Area(area) if area.is_even() && area.sample_many(n, p, u, out) => {}
+            light if len > 0 && light.sample_li_lanes(u, &mut out.lanes(len)) => {
+                out.is_far[..n].fill(1.0);
+                out.is_delta[..n].fill(false);
+            }
+            _ => {
+                for i in 0..n {
+                    self.sample_single(i, light, p.vec3(i), [u[0][i], u[1][i]], out);
+                }
+            }
+        }
+    }
+
+    /// Samples one direction.
+    fn sample_single(&self, i: usize, light: LightId, p: Vec3, u: [f32; 2], out: &mut LightSamples) {
+        let sample = self.lights.get(light as usize).and_then(|l| l.sample_li(&LightCtx::at(p), u));
+        let Some(s) = sample else {
+            out.pdf[i] = 0.0;
+            return;
+        };
+        out.wi.set(i, s.wi);
+        out.li.set_rgb(i, s.li);
+        out.pdf[i] = s.pdf;
+        out.p.set(i, s.p);
+        out.p_error.set(i, s.p_error);
+        out.n.set(i, s.n);
+        out.is_far[i] = if s.t.is_finite() { 0.0 } else { 1.0 };
+        out.is_delta[i] = s.is_delta;
+    }
+}
+
+/// Multiplies densities by the probabilities of the choices.
+fn with_choices(chosen: &[(LightId, f32)], out: &mut LightSamples) {
+    for (pdf, &(light, pmf)) in out.pdf.iter_mut().zip(chosen) {
+        *pdf = if light == NO_LIGHT { 0.0 } else { *pdf * pmf };
+    }
+}
+
+/// Sorts the indices of points by their chosen light, without the points that chose none.
+fn sort_by_light(chosen: &[(LightId, f32)], lights: usize, scratch: &mut Scratch) {
+    let Scratch { order, begins, .. } = scratch;
+    let places = || chosen.iter().enumerate().filter(|(_, c)| c.0 != NO_LIGHT);
+    order.clear();
+    if lights > MAX_COUNTED {
+        order.extend(places().map(|(i, _)| i as u32));
+        order.sort_unstable_by_key(|&i| (chosen[i as usize].0, i));
+        return;
+    }
+
+    // Counting sort
+    begins.clear();
+    begins.resize(lights + 1, 0);
+    for (_, &(light, _)) in places() {
+        begins[light as usize + 1] += 1;
+    }
+    for light in 0..lights {
+        begins[light + 1] += begins[light];
+    }
+    order.resize(begins[lights] as usize, 0);
+    for (i, &(light, _)) in places() {
+        let next = &mut begins[light as usize];
+        order[*next as usize] = i as u32;
+        *next += 1;
+    }
+}
+
+impl AreaLight {
+    /// Samples a point for each of the `n` points `p`; returns false if the shape has no kernel.
+    fn sample_many(&self, n: usize, p: &Columns3, u: [&[f32]; 2], out: &mut LightSamples) -> bool {
+        let len = u[0].len();
+        let from = p.get(len);
+        let LightSamples { wi, li, pdf, p: points, p_error, n: normals, is_far, is_delta } = out;
+        let (wi, points, p_error) = (wi.get_mut(len), points.get_mut(len), p_error.get_mut(len));
+        let mut on_light = many::PointsOnLight { wi, p: points, p_error, pdf: &mut pdf[..len] };
+        let normal = match &self.shape {
+            AreaShape::Rectangle(r) => {
+                let rectangle = Rectangle { corner: r.corner, ex: r.ex, ey: r.ey, size: r.size, n: r.n };
+                many::sample_rectangle(level(), &rectangle, r.flatness_error, from, u, &mut on_light);
+                r.n
+            }
+            AreaShape::Triangle(t) => {
+                many::sample_triangle(level(), (t.p, t.n, t.area), from, u, &mut on_light);
+                t.n
+            }
+            AreaShape::Quadric(_) | AreaShape::Patch(_) => return false,
+        };
+
+        // Emission and normal, the same for all points
+        let l: Rgb = self.emission.l;
+        for i in 0..n {
+            if self.is_dark_from(p.vec3(i)) {
+                pdf[i] = 0.0;
+            }
+            li.set_rgb(i, l);
+            normals.set(i, normal);
+        }
+        is_far[..n].fill(0.0);
+        is_delta[..n].fill(false);
+        true
+    }
+}
+
+impl LightSampler {
+    /// The light that is always chosen, if there is only one.
+    pub fn only_light(&self) -> Option<LightId> {
+        match self {
+            LightSampler::Uniform(choice) | LightSampler::Power(choice) => choice.only(),
+            LightSampler::Tree(choice) => match (choice.infinite.as_slice(), choice.tree.only_light()) {
+                ([], light) => light,
+                (&[light], None) if choice.tree.is_empty() => Some(light),
+                _ => None,
+            },
+            LightSampler::Photons(_) => None,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::{Quadric, QuadricKind, Shape, TriangleMesh};
+    use crate::lights::{
+        Emission, EnvironmentFilter, EnvironmentMap, EnvironmentMapping, LightSamplerKind, LightSetBuilder,
+    };
+    use lumiris_numbers::math::warp::sample_uniform_sphere;
+    use lumiris_numbers::math::{Affine3A, Bounds3};
+    use lumiris_test_support::random::{Pcg32, RngExt, pcg32};
+    use std::sync::Arc;
+
+    const N: usize = 203;
+
+    fn mesh(points: &[Vec3], triangles: Vec<[u32; 3]>) -> Shape {
+        Shape::Mesh(TriangleMesh::new(points.to_vec(), triangles).unwrap())
+    }
+
+    /// A large and a small rectangle, a triangle, a sphere, delta lights.
+    fn lamps(builder: &mut LightSetBuilder) {
+        let square = |z: f32, s: f32| [(0.0, 0.0), (0.0, s), (s, s), (s, 0.0)].map(|(x, y)| Vec3::new(x, y, z));
+        let two = vec![[0, 1, 2], [0, 2, 3]];
+        builder.add_area(0, &mesh(&square(2.0, 1.5), two.clone()), &Emission::constant(Rgb::new(5.0, 4.0, 3.0)));
+        builder.add_area(1, &mesh(&square(2.5, 0.1), two), &Emission::constant(Rgb::splat(90.0)));
+        let both = Emission { two_sided: true, ..Emission::constant(Rgb::splat(2.0)) };
+        builder.add_area(
+            2,
+            &mesh(&[Vec3::ONE, Vec3::new(2.0, 1.0, 1.5), Vec3::new(1.0, 2.0, 1.0)], vec![[0, 1, 2]]),
+            &both,
+        );
+        let group_from_local = Affine3A::from_translation(Vec3::new(-1.0, 1.0, 2.0));
+        let kind = QuadricKind::Sphere { radius: 0.4, z_min: -0.4, z_max: 0.4, phi_max: std::f32::consts::TAU };
+        let local_from_group = group_from_local.inverse();
+        let sphere = Shape::Quadric(Quadric { kind, group_from_local, local_from_group, flip_normal: false });
+        builder.add_area(3, &sphere, &Emission::constant(Rgb::splat(7.0)));
+        builder.add(Light::Point { p: Vec3::new(2.0, 2.0, 2.0), intensity: Rgb::splat(3.0) });
+        builder.add(Light::Distant { wi_world: Vec3::Z, l: Rgb::WHITE });
+    }
+
+    fn sky(builder: &mut LightSetBuilder) {
+        let texels = (0..64).map(|i| Rgb::new(i as f32 * 0.01, 0.3, 0.1)).collect();
+        let map = EnvironmentMap::new(texels, [8, 8], EnvironmentMapping::EqualArea, EnvironmentFilter::Bilinear);
+        builder.add(Light::infinite_image(Arc::new(map.unwrap()), &Affine3A::from_rotation_x(0.4), 2.0));
+    }
+
+    fn assert_like_singles(builder: LightSetBuilder, kind: LightSamplerKind, stream: &mut Pcg32) {
+        let set = Arc::new(builder.build(&Bounds3 { min: -Vec3::ONE, max: Vec3::splat(3.0) }));
+        let lights = LightSampling::new(set, kind, 1);
+        let len = padded(N);
+        let [mut p, mut n, mut ns] = [(); 3].map(|()| Columns3::default());
+        [&mut p, &mut n, &mut ns].into_iter().for_each(|c| c.reserve(len));
+        let mut u: [Column; 3] = std::array::from_fn(|_| vec![0.0; len]);
+        for i in 0..N {
+            p.set(i, Vec3::new(stream.random::<f32>(), stream.random::<f32>(), stream.random::<f32>()) * 2.0 - 1.0);
+            n.set(i, Vec3::Z);
+            ns.set(i, Vec3::Z);
+        }
+        let lobes: Vec<GlossyLobe> = (0..N)
+            .map(|i| match i % 3 {
+                0 => GlossyLobe::NONE,
+                k => GlossyLobe::new(sample_uniform_sphere(stream.random::<[f32; 2]>()), Vec3::Z, 0.2 * k as f32, 0.7),
+            })
+            .collect();
+        let at = LitPoints { p: &p, n: &n, ns: &ns, lobes: &lobes };
+        let (mut scratch, mut out) = (Scratch::default(), LightSamples::default());
+        out.reserve(len);
+        scratch.begin(&lights, N, at);
+        // Later choices reuse the probabilities of the first one
+        for _ in 0..3 {
+            u.iter_mut().for_each(|u| u[..N].fill_with(|| stream.random::<f32>()));
+            lights.sample_many(N, at, &u, &mut scratch, &mut out);
+            assert_same(&lights, at, &u, &out);
+        }
+    }
+
+    /// Compares `out` with single samples.
+    fn assert_same(lights: &LightSampling, at: LitPoints<'_>, u: &[Column; 3], out: &LightSamples) {
+        let mut drawn = 0;
+        for i in 0..N {
+            let ctx = at.get(i);
+            let Some((light, s)) = lights.sample(&ctx, u[0][i], [u[1][i], u[2][i]]) else {
+                assert_eq!(out.pdf[i], 0.0);
+                continue;
+            };
+
+            // The single sample, with all infinite lights
+            let (mut li, mut pdf) = (s.li, s.pdf);
+            if lights.infinite.contains(&light) && lights.infinite.len() > 1 {
+                (li, pdf) = lights.infinite_in_direction(&ctx, s.wi);
+            }
+
+            // Both agree up to rounding
+            let what = lights.lights[light as usize].kind_name();
+            drawn += 1;
+            assert!((out.pdf[i] - pdf).abs() <= 2e-4 * pdf, "{what} {} {pdf}", out.pdf[i]);
+            assert!((out.wi.vec3(i) - s.wi).length() < 1e-5, "{what}");
+            assert!((out.li.rgb(i) - li).map(f32::abs).max_component() <= 2e-4 * li.max_component(), "{what}");
+            assert_eq!((out.is_far[i] > 0.0, out.is_delta[i]), (!s.t.is_finite(), s.is_delta), "{what}");
+            if s.t.is_finite() {
+                assert!((out.p.vec3(i) - s.p).length() < 1e-5 && (out.n.vec3(i) - s.n).length() < 1e-5, "{what}");
+                assert!((out.p_error.vec3(i) - s.p_error).abs().max_element() < 1e-6, "{what}");
+            }
+        }
+        assert!(drawn > N / 3, "{drawn}");
+    }
+
+    #[test]
+    fn samples_are_those_of_single_points() {
+        let stream = &mut pcg32([4, 8, 1]);
+        for kind in [LightSamplerKind::Uniform, LightSamplerKind::Power, LightSamplerKind::Tree] {
+            let all = |_: &mut Pcg32| {
+                let mut b = LightSetBuilder::default();
+                lamps(&mut b);
+                b
+            };
+            assert_like_singles(all(stream), kind, stream);
+            // One infinite light, and two that overlap
+            for skies in [1, 2] {
+                let mut b = all(stream);
+                (0..skies).for_each(|_| sky(&mut b));
+                assert_like_singles(b, kind, stream);
+            }
+            // More lights than counting sort handles
+            let mut b = all(stream);
+            for i in 0..MAX_COUNTED as u32 {
+                let p = Vec3::new(i as f32 * 0.1, 1.0, 2.0);
+                b.add(Light::Point { p, intensity: Rgb::splat(0.1) });
+            }
+            assert_like_singles(b, kind, stream);
+            // One light alone
+            let mut b = LightSetBuilder::default();
+            sky(&mut b);
+            assert_like_singles(b, kind, stream);
+            let square = [(0.0, 0.0), (0.0, 1.0), (1.0, 1.0), (1.0, 0.0)].map(|(x, y)| Vec3::new(x, y, 1.5));
+            let mut b = LightSetBuilder::default();
+            let two = vec![[0, 1, 2], [0, 2, 3]];
+            b.add_area(0, &mesh(&square, two), &Emission::constant(Rgb::WHITE));
+            assert_like_singles(b, kind, stream);
+        }
+    }
+}

@@ -1,0 +1,144 @@
+//! The choice of a light by a [`LightTree`] and, beside it, the infinite lights, which have no bounds.
+
+use super::light_tree::LightTree;
+use super::sampled_light::{LightRun, SampledLight, UNIT};
+use super::turns::Turns;
+use crate::lights::{Light, LightCtx, LightId};
+use lumiris_numbers::math::ONE_MINUS_EPSILON;
+use std::ops::Deref;
+use std::sync::Arc;
+
+/// A light tree, with the infinite lights beside it.
+#[derive(Clone, Debug)]
+pub struct TreeChoice {
+    /// The lights with bounds.
+    pub tree: Arc<LightTree>,
+    /// Infinite lights, ascending.
+    pub infinite: Vec<LightId>,
+    /// Ratio of the probability of each infinite light to the probability of the whole tree.
+    odds: f32,
+}
+
+/// One of some lights by `u` in [0, 1), which have the probability `pmf` together.
+#[inline]
+pub(in crate::lights) fn one_of(lights: &[LightId], u: f32, pmf: f32) -> SampledLight {
+    let x = u * lights.len() as f32;
+    let i = (x as usize).min(lights.len() - 1);
+    let u = (x - i as f32).clamp(0.0, ONE_MINUS_EPSILON);
+    SampledLight { light: lights[i], pmf: pmf / lights.len() as f32, u }
+}
+
+impl TreeChoice {
+    /// A choice among `lights` that have power, in a scene of radius `scene_radius` (m); `infinite_fraction` as in [`new`](Self::new).
+    pub(in crate::lights) fn of_lights(lights: &[Light], scene_radius: f32, infinite_fraction: Option<f32>) -> Self {
+        let powers: Vec<f32> = lights.iter().map(|light| light.phi(scene_radius)).collect();
+        Self::new((lights, &powers), infinite_fraction, false)
+    }
+
+    /// A choice among `lights` with the given `powers`. `glows`: emitting parts of media are included.
+    /// `infinite_fraction` is the total probability of the infinite lights (0 to 1, exclusive); `None`: each has the
+    /// same probability as the whole tree.
+    pub(in crate::lights) fn new(
+        (lights, powers): (&[Light], &[f32]),
+        infinite_fraction: Option<f32>,
+        glows: bool,
+    ) -> Self {
+        let is_asked_for = |light: &&Light| glows || !matches!(light, Light::Glow(_));
+        let bounds: Vec<_> = lights.iter().map(|light| Some(light).filter(is_asked_for)?.bounds()).collect();
+        let is_chosen = |&i: &usize| lights[i].is_infinite() && powers[i] > 0.0;
+        let infinite: Vec<LightId> = (0..lights.len()).filter(is_chosen).map(|i| i as LightId).collect();
+        let odds = infinite_fraction.map_or(1.0, |f| f / ((1.0 - f) * infinite.len().max(1) as f32));
+        TreeChoice { tree: Arc::new(LightTree::new(&bounds)), infinite, odds }
+    }
+
+    /// Total probability of the infinite lights; 1 if no light in the tree can contribute.
+    #[inline]
+    pub(in crate::lights) fn infinite_probability(&self, ctx: &LightCtx) -> f32 {
+        self.probability_of_some(ctx, self.infinite.len())
+    }
+
+    /// Total probability of `count` infinite lights, if the other infinite lights cannot be chosen.
+    #[inline]
+    pub(in crate::lights) fn probability_of_some(&self, ctx: &LightCtx, count: usize) -> f32 {
+        if count == 0 {
+            return 0.0;
+        }
+        if self.tree.importance(ctx) > 0.0 { self.fraction_of(count) } else { 1.0 }
+    }
+
+    /// Total probability of the infinite lights if lights in the tree can contribute.
+    pub fn infinite_fraction(&self) -> f32 {
+        self.fraction_of(self.infinite.len())
+    }
+
+    #[inline]
+    fn fraction_of(&self, count: usize) -> f32 {
+        let odds = count as f32 * self.odds;
+        odds / (odds + 1.0)
+    }
+
+    /// Chooses a light by `u` in [0, 1); `None` if there is none.
+    #[inline]
+    pub fn sample(&self, ctx: &LightCtx, u: f32) -> Option<SampledLight> {
+        self.sample_again(&ctx, u, Turns::NONE)
+    }
+
+    /// [`Self::sample`] with precomputed probabilities `turns` of the point.
+    #[inline]
+    pub fn sample_again(&self, ctx: &impl Deref<Target = LightCtx>, u: f32, turns: Turns<'_>) -> Option<SampledLight> {
+        let p_infinite = turns.probability(Turns::BESIDE, || self.infinite_probability(ctx));
+        if u < p_infinite {
+            return Some(one_of(&self.infinite, u / p_infinite, p_infinite));
+        }
+        let u = ((u - p_infinite) / (1.0 - p_infinite)).min(ONE_MINUS_EPSILON);
+        let (light, pmf, u) = self.tree.sample(ctx, u, turns)?;
+        Some(SampledLight { light, pmf: pmf * (1.0 - p_infinite), u })
+    }
+
+    /// Appends runs for the positions from `first` on, which are in [`start`, 1); `share` = 1 − `start` is a factor of
+    /// all probabilities.
+    pub(in crate::lights) fn runs(
+        &self,
+        ctx: &LightCtx,
+        positions: &[u32],
+        first: usize,
+        (start, share): (f64, f32),
+        out: &mut Vec<LightRun>,
+    ) {
+        let TreeChoice { tree, infinite, .. } = self;
+
+        // Infinite lights first, in equal intervals
+        let p_infinite = self.infinite_probability(ctx);
+        let each = f64::from(p_infinite * share) / infinite.len() as f64;
+        let mut first = first;
+        for (i, &light) in infinite.iter().enumerate().filter(|_| p_infinite > 0.0) {
+            let interval = [start + each * i as f64, start + each * (i + 1) as f64];
+            let is_in = |&p: &u32| f64::from(p) * UNIT < interval[1] || p_infinite == 1.0 && i + 1 == infinite.len();
+            let count = positions[first..].partition_point(is_in);
+            if count > 0 {
+                let pmf = p_infinite * share / infinite.len() as f32;
+                out.push(LightRun { light, pmf, places: [first as u32, (first + count) as u32], interval });
+            }
+            first += count;
+        }
+
+        // The tree covers the rest
+        let places = [first as u32, positions.len() as u32];
+        if !tree.is_empty() && p_infinite < 1.0 {
+            let start = start + f64::from(p_infinite * share);
+            tree.runs(ctx, positions, places, (start, (1.0 - p_infinite) * share), out);
+        }
+    }
+
+    #[inline]
+    pub(in crate::lights) fn pmf(&self, ctx: &LightCtx, light: LightId) -> f32 {
+        let p_infinite = self.infinite_probability(ctx);
+        if self.tree.contains(light) {
+            self.tree.pmf(ctx, light) * (1.0 - p_infinite)
+        } else if self.infinite.binary_search(&light).is_ok() {
+            p_infinite / self.infinite.len() as f32
+        } else {
+            0.0
+        }
+    }
+}

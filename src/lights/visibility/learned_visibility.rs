@@ -1,0 +1,333 @@
+//! Visibility of lights estimated from photons: an estimate V̂, and the choice of a light that has no photons in the
+//! visibility cache.
+//!
+//! If a light is visible around a point, μ = E·A·N/Φ of its photons are expected there. E is the unshadowed irradiance
+//! (lm/m² by luminance, up to a factor common to all lights), A the area that a cache lookup covers, N the number of
+//! photon paths from the light, and Φ its power. The number of photons is Poisson distributed with the mean V·μ. With a
+//! gamma distribution of mean v₀ and shape a as the prior of V, the posterior mean is
+//!
+//! > V̂ = (c + a)/(μ + a/v₀)
+//!
+//! for c photons. V̂ is near 0 for a light with many expected photons and none present. V̂ is near v₀ for a light that
+//! is too far away, or has too few photon paths, to expect any.
+//!
+//! The density of light samples with the least variance is proportional to E·√V̂, as the second moment of a sample is
+//! E²·V̂/p. On a glossy surface E is weighted by the reflection to the viewer, but V̂ uses the unweighted E.
+//! [`LearnedVisibility::sample_unseen`] chooses lights without photons in this way. For a node of the light tree,
+//! Φ/(A·N) is the sum over its lights.
+//!
+//! A node may hold many visible lights with few expected photons each. By [Good 1953], the expected contribution of its
+//! lights without photons equals the contribution of its lights with exactly one photon. Their number is therefore the
+//! count c of a node. For example, if a distant room is visible through a door, single photons from a few of its lights
+//! indicate that the others are visible too.
+
+use super::visibility_cache::{ContributingLights, VisibilityCache};
+use crate::lights::tree::node::Node;
+use crate::lights::{Light, LightCtx, LightId, SampledLight, TreeChoice};
+use lumiris_numbers::math::ONE_MINUS_EPSILON;
+use lumiris_numbers::math::light_bound::Receiver;
+use std::f32::consts::PI;
+
+/// v₀ and a of the prior of V.
+const PRIOR_MEAN: f32 = 0.5;
+const PRIOR_SHAPE: f32 = 1.0;
+/// Minimum of V̂, which bounds the weight of a sample.
+pub const MIN_VISIBILITY: f32 = 1e-4;
+/// Minimum number of photon paths per light, for lights that have none.
+const MIN_PATHS: f32 = 0.5;
+
+/// The visibility of lights estimated from photons.
+#[derive(Clone, Debug)]
+pub struct LearnedVisibility {
+    choice: TreeChoice,
+    /// For each infinite light, the luminance of the irradiance on a surface facing it; 0 for others.
+    irradiances: Vec<f32>,
+    /// Φ/(A·N) of each light: the irradiance at which one photon is expected.
+    of_one_photon: Vec<f32>,
+    /// Sums of `of_one_photon` over the lights below each node of the tree.
+    of_nodes: Vec<f32>,
+}
+
+/// A light without photons in the visibility cache at a point.
+#[derive(Clone, Copy, Debug)]
+pub struct UnseenLight {
+    /// The light.
+    pub choice: SampledLight,
+    /// E, weighted by the reflection, up to a factor common to all lights.
+    pub importance: f32,
+    /// V̂ of a light without photons.
+    pub visibility: f32,
+}
+
+/// True if the importance of lights includes a glossy lobe.
+#[inline]
+fn is_glossy(ctx: &LightCtx) -> bool {
+    ctx.lobe.scale > 0.0
+}
+
+/// V̂ for a light of irradiance `importance` with `count` photons; `of_one_photon` is the irradiance per photon.
+#[inline]
+fn estimate(importance: f32, of_one_photon: f32, count: f32) -> f32 {
+    let v = (count + PRIOR_SHAPE) * of_one_photon / (importance + PRIOR_SHAPE / PRIOR_MEAN * of_one_photon);
+    v.clamp(MIN_VISIBILITY, 1.0)
+}
+
+/// Luminance of the irradiance on a surface that faces an infinite light; 0 for others.
+pub(super) fn facing_irradiance(light: &Light, scene_radius: f32) -> f32 {
+    let disk = PI * scene_radius * scene_radius;
+    match light {
+        Light::Distant { .. } => light.phi(scene_radius) / disk,
+        // π times the mean radiance
+        Light::InfiniteConstant { .. } | Light::InfiniteImage { .. } => light.phi(scene_radius) / (4.0 * disk),
+        // The mean over the scene
+        Light::Portal(_) => light.phi(scene_radius) / disk,
+        Light::Point { .. } | Light::Spot { .. } | Light::Image(_) | Light::Area(_) | Light::Glow(_) => 0.0,
+    }
+}
+
+impl LearnedVisibility {
+    /// The visibility of `lights` according to `cache`; `choice` holds the tree over the lights.
+    pub(in crate::lights) fn new(
+        choice: TreeChoice,
+        lights: &[Light],
+        scene_radius: f32,
+        cache: &VisibilityCache,
+    ) -> Self {
+        let of_one_photon: Vec<f32> = (0..)
+            .zip(lights)
+            .map(|(id, light)| light.phi(scene_radius) / (cache.area() * cache.paths(id).max(MIN_PATHS)))
+            .map(|irradiance| irradiance.clamp(f32::MIN_POSITIVE, 1e30))
+            .collect();
+        let of_nodes = choice.tree.sums(|light| of_one_photon[light as usize]);
+        let irradiances = lights.iter().map(|light| facing_irradiance(light, scene_radius)).collect();
+        LearnedVisibility { choice, irradiances, of_one_photon, of_nodes }
+    }
+
+    /// E of a light or an upper bound of it, up to a factor common to all lights; 0 if it cannot contribute.
+    #[inline]
+    pub fn importance(&self, ctx: &LightCtx, light: LightId) -> f32 {
+        if self.choice.tree.contains(light) {
+            self.choice.tree.light_importance(&ctx.diffuse(), light)
+        } else {
+            self.irradiances[light as usize]
+        }
+    }
+
+    /// E of a light, weighted by the reflection, and V̂ for its number of photons.
+    #[inline]
+    pub fn expect(&self, ctx: &LightCtx, light: LightId, count: u32) -> (f32, f32) {
+        let e = self.importance(ctx, light);
+        let is_by_lobe = is_glossy(ctx) && self.choice.tree.contains(light);
+        let reflected = if is_by_lobe { self.choice.tree.light_importance(ctx, light) } else { e };
+        (reflected, self.visibility(light, e, count))
+    }
+
+    /// V̂ of a light for its E and its number of photons, from [`MIN_VISIBILITY`] to 1.
+    #[inline]
+    pub fn visibility(&self, light: LightId, importance: f32, count: u32) -> f32 {
+        estimate(importance, self.of_one_photon[light as usize], count as f32)
+    }
+
+    /// The irradiance that `count` photons of a light stand for.
+    #[inline]
+    pub fn irradiance_of(&self, light: LightId, count: u32) -> f32 {
+        count as f32 * self.of_one_photon[light as usize]
+    }
+
+    /// Appends the tree indices, ascending, of the lights in `seen` with exactly one photon.
+    pub fn find_singles(&self, seen: &ContributingLights<'_>, singles: &mut Vec<u32>) {
+        let first = singles.len();
+        let once = seen.lights.iter().filter(|(_, count)| *count == 1);
+        singles.extend(once.filter_map(|&(light, _)| self.choice.tree.leaf(light)));
+        singles[first..].sort_unstable();
+    }
+
+    /// Chooses a light by `u` in [0, 1), nearly in proportion to E·√V̂ for lights without photons. Every light that can
+    /// contribute and is not in `seen` has a positive probability. Lights in `seen` may be chosen too; single-photon
+    /// lights are chosen only if no other light below their node can contribute. `singles` are the tree indices of
+    /// single-photon lights in `seen`. Returns `None` if there is no light.
+    #[inline]
+    pub fn sample_unseen(
+        &self,
+        ctx: &LightCtx,
+        (seen, singles): (&ContributingLights<'_>, &[u32]),
+        u: f32,
+    ) -> Option<UnseenLight> {
+        let TreeChoice { tree, infinite, .. } = &self.choice;
+        let unseen = || infinite.iter().filter(|&&light| seen.place(light).is_none());
+        let count = unseen().count();
+        let p_infinite = self.choice.probability_of_some(ctx, count);
+        if u < p_infinite {
+            let x = u / p_infinite * count as f32;
+            let i = (x as usize).min(count - 1);
+            let u = (x - i as f32).clamp(0.0, ONE_MINUS_EPSILON);
+            let light = *unseen().nth(i)?;
+            return Some(self.unseen(ctx, SampledLight { light, pmf: p_infinite / count as f32, u }));
+        }
+
+        // Lights in the tree
+        let u = ((u - p_infinite) / (1.0 - p_infinite)).min(ONE_MINUS_EPSILON);
+        let (light, pmf, u) = tree.sample_by(u, singles, self.by_visibility(ctx))?;
+        Some(self.unseen(ctx, SampledLight { light, pmf: pmf * (1.0 - p_infinite), u }))
+    }
+
+    /// Evaluates a light that is not in `seen`, with the probability that [`Self::sample_unseen`] chooses it.
+    #[inline]
+    pub fn unseen_light(
+        &self,
+        ctx: &LightCtx,
+        (seen, singles): (&ContributingLights<'_>, &[u32]),
+        light: LightId,
+    ) -> UnseenLight {
+        let TreeChoice { tree, infinite, .. } = &self.choice;
+        let count = infinite.iter().filter(|&&light| seen.place(light).is_none()).count();
+        let p_infinite = self.choice.probability_of_some(ctx, count);
+        let pmf = if tree.contains(light) {
+            tree.pmf_by(light, singles, self.by_visibility(ctx)) * (1.0 - p_infinite)
+        } else if infinite.binary_search(&light).is_ok() {
+            p_infinite / count as f32
+        } else {
+            0.0
+        };
+        self.unseen(ctx, SampledLight { light, pmf, u: 0.0 })
+    }
+
+    /// E·√V̂ of nodes at a point, as a function of the place, the node, and the number of lights below it with a single photon.
+    #[inline]
+    fn by_visibility(&self, ctx: &LightCtx) -> impl Fn(usize, &Node, usize) -> f32 {
+        let receiver = ctx.receiver();
+        let diffuse = Receiver { lobe: None, ..receiver };
+        move |place, node, singles| {
+            let e = node.bound.importance(&diffuse);
+            let reflected = if receiver.lobe.is_some() { node.bound.importance(&receiver) } else { e };
+            reflected * estimate(e, self.of_nodes[place], singles as f32).sqrt()
+        }
+    }
+
+    #[inline]
+    fn unseen(&self, ctx: &LightCtx, choice: SampledLight) -> UnseenLight {
+        let (importance, visibility) = self.expect(ctx, choice.light, 0);
+        UnseenLight { choice, importance, visibility }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use lumiris_numbers::math::{Rgb, Vec3};
+    use lumiris_test_support::random::{RngExt, pcg32};
+
+    const RADIUS: f32 = 20.0;
+    const AT: Vec3 = Vec3::new(0.5, 0.5, 0.0);
+
+    /// Lamps in a row above the floor, and two infinite lights.
+    fn lamps() -> Vec<Light> {
+        let lamp = |i: i32| Light::Point { p: Vec3::new(i as f32, 0.3, 2.0), intensity: Rgb::splat(1.0 + i as f32) };
+        let mut lights: Vec<Light> = (0..12).map(lamp).collect();
+        lights.push(Light::InfiniteConstant { l: Rgb::splat(0.1) });
+        lights.push(Light::Distant { wi_world: Vec3::Z, l: Rgb::splat(0.2) });
+        lights
+    }
+
+    /// A cache with `count` photons of each light of `seen` at the point, and `paths` photon paths of every light.
+    fn cache(seen: &[LightId], count: usize, paths: f32) -> VisibilityCache {
+        let photons = seen.iter().flat_map(|&light| vec![(AT, Vec3::Z, light); count]);
+        VisibilityCache::new(photons, 0.2).with_paths((0..14).map(|light| (light, paths)))
+    }
+
+    fn learned(cache: &VisibilityCache) -> LearnedVisibility {
+        let lights = lamps();
+        LearnedVisibility::new(TreeChoice::of_lights(&lights, RADIUS, None), &lights, RADIUS, cache)
+    }
+
+    #[test]
+    fn visibility_is_the_ratio_of_photons_to_those_expected_and_the_prior_without_any() {
+        // A lamp above a floor: the irradiance I/h² corresponds to N·A/(4π h²) photons.
+        let lights = [Light::Point { p: AT + Vec3::Z * 3.0, intensity: Rgb::splat(7.0) }];
+        let ctx = LightCtx::on(AT, Vec3::Z);
+        let of = |paths: f32| {
+            let cache = VisibilityCache::new(std::iter::once((AT, Vec3::Z, 0)), 0.1);
+            let cache = cache.with_paths(std::iter::once((0, paths)));
+            let learned = LearnedVisibility::new(TreeChoice::of_lights(&lights, RADIUS, None), &lights, RADIUS, &cache);
+            let importance = learned.importance(&ctx, 0);
+            move |count| learned.visibility(0, importance, count)
+        };
+        let many = 4.0 * PI * 9.0 / (16.0 * 0.01) * 1000.0;
+        for (count, expected) in [(0, 0.001), (250, 0.25), (1000, 1.0), (2000, 1.0)] {
+            let v = of(many)(count);
+            assert!((v - expected).abs() < 2e-3, "{count} photons: {v}");
+        }
+        assert!((of(1e-3 * many)(0) - PRIOR_SHAPE / (1.0 + PRIOR_SHAPE / PRIOR_MEAN)).abs() < 1e-3);
+        assert!((of(1e-9 * many)(0) - PRIOR_MEAN).abs() < 0.01 && of(0.0)(0) > 0.4);
+        assert_eq!(of(1e12 * many)(0), MIN_VISIBILITY);
+    }
+
+    #[test]
+    fn every_light_that_is_not_seen_is_chosen_with_the_probability_given() {
+        for (seen, count, paths) in
+            [(&[0, 3, 12][..], 5, 1e4), (&[12, 13], 1, 100.0), (&[1], 3, 0.0), (&[2, 5], 9, 1e12), (&[4, 5, 7], 1, 1e4)]
+        {
+            let cache = cache(seen, count, paths);
+            let learned = learned(&cache);
+            let ctx = LightCtx::on(AT, Vec3::Z);
+            let contributing = cache.lookup_with_sums(AT, Vec3::Z);
+            assert_eq!(contributing.lights.len(), seen.len());
+            let mut singles = Vec::new();
+            learned.find_singles(&contributing, &mut singles);
+
+            // The mean of 1/pmf over the samples of a light is 1
+            let draws = 200_000;
+            let mut s = pcg32([3, 1, 4]);
+            let (mut means, mut squares) = ([0.0_f64; 14], [0.0_f64; 14]);
+            for _ in 0..draws {
+                let unseen = learned.sample_unseen(&ctx, (&contributing, &singles), s.random::<f32>()).unwrap();
+                let SampledLight { light, pmf, u } = unseen.choice;
+                assert!((0.0..1.0).contains(&u) && pmf > 0.0);
+                assert_eq!(unseen.importance, learned.importance(&ctx, light));
+                if !seen.contains(&light) {
+                    assert_eq!(learned.unseen_light(&ctx, (&contributing, &singles), light).choice.pmf, pmf);
+                }
+                means[light as usize] += f64::from(1.0 / pmf) / f64::from(draws);
+                squares[light as usize] += f64::from(1.0 / pmf).powi(2) / f64::from(draws);
+            }
+            for light in (0..14).filter(|light| !seen.contains(light)) {
+                let (mean, square) = (means[light as usize], squares[light as usize]);
+                let sigma = ((square - mean * mean) / f64::from(draws)).sqrt();
+                assert!((mean - 1.0).abs() < 4.5 * sigma + 1e-4, "{seen:?}, light {light}: {mean} ± {sigma}");
+            }
+        }
+    }
+
+    #[test]
+    fn lights_whose_photons_were_expected_and_did_not_come_are_chosen_less() {
+        let ctx = LightCtx::on(AT, Vec3::Z);
+        let share_of_near = |paths: f32| {
+            let cache = cache(&[5], 1, paths);
+            let learned = learned(&cache);
+            let contributing = cache.lookup_with_sums(AT, Vec3::Z);
+            let near = |i: u32| learned.sample_unseen(&ctx, (&contributing, &[]), (i as f32 + 0.5) / 4096.0).unwrap();
+            (0..4096).filter(|&i| near(i).choice.light < 3).count()
+        };
+        let [few, many] = [1.0, 1e6].map(share_of_near);
+        assert!(few > many + 100, "{few} {many}");
+    }
+
+    #[test]
+    fn lights_beside_those_of_single_photons_are_chosen_more() {
+        let ctx = LightCtx::on(AT, Vec3::Z);
+        let share_of_far = |seen: &[LightId], count: usize| {
+            let cache = cache(seen, count, 1e5);
+            let learned = learned(&cache);
+            let contributing = cache.lookup_with_sums(AT, Vec3::Z);
+            let mut singles = Vec::new();
+            learned.find_singles(&contributing, &mut singles);
+            assert_eq!(singles.len(), if count == 1 { seen.len() } else { 0 });
+            let chosen =
+                |i: u32| learned.sample_unseen(&ctx, (&contributing, &singles), (i as f32 + 0.5) / 4096.0).unwrap();
+            (0..4096).filter(|&i| (8..12).contains(&chosen(i).choice.light)).count()
+        };
+        let [none, many, single] = [share_of_far(&[], 0), share_of_far(&[9, 11], 50), share_of_far(&[9, 11], 1)];
+        assert_eq!(none, many, "lights with photons enough tell nothing of others");
+        assert!(single as f64 > 1.2 * none as f64, "{single} {none}");
+    }
+}
