@@ -1,8 +1,8 @@
 //! Lights: their emission, the sampling of directions towards them, and the choice of one of many.
 //!
-//! Reading order: [`light_sample`] has arguments and results, [`kinds`] one file for each kind, [`light`] the type that
-//! stands for all of them, with [`emit`] (rays that leave it), [`lanes`] (many samples of an infinite light) and
-//! [`bounds`]. [`tree`], [`visibility`] and [`choice`] choose among the lights of a scene. [`layers`] are the light
+//! Reading order: [`light_sample`] has arguments and results, [`kinds`] the larger kinds, [`light`] the small ones and
+//! the type that stands for all of them, with [`emit`] (rays that leave it), [`lanes`] (many samples of an infinite
+//! light) and [`bounds`]. [`tree`], [`visibility`] and [`choice`] choose among the lights of a scene. [`layers`] are the light
 //! groups of the image, and [`irradiance`] has closed forms.
 
 pub mod bounds;

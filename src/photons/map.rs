@@ -2,7 +2,7 @@
 //!
 //! The irradiance at x is estimated from the photons around it, E ≈ Σ K(d_k) Φ_k, with the Epanechnikov kernel K(d) =
 //! 2/(πr²) (1 − d²/r²), whose integral over the disk of radius r is 1 [Epanechnikov 1969; Silverman 1986, §4.2]. r is
-//! r is fixed, or the distance of the k-th nearest photon [Jensen 1996], which is then excluded: for photons of
+//! fixed, or the distance of the k-th nearest photon [Jensen 1996], which is then excluded: for photons of
 //! constant density λ, E[(k − 1)/(πr²)] = λ, whereas k/(πr²) would be too large by the factor k/(k − 1). If the disk of
 //! the maximum radius has fewer than k photons, all of them count with that radius. The estimate is unbiased in both
 //! cases: λ P(N ≥ k − 1) + λ P(N ≤ k − 2), where N is the number of photons in the largest disk.

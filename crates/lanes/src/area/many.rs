@@ -1,4 +1,4 @@
-//! Directions from many points to one surface. The formulas are in the modules of `lights::area`.
+//! Directions from many points to one surface. The formulas are in the modules of `lights::kinds::area`.
 
 use super::spherical::SphericalSetup;
 use super::{Rectangle, barycentric};

@@ -1,4 +1,4 @@
-//! Area lights of constant emission, sampled from many points. The formulas are in the modules of `lights::area`.
+//! Area lights of constant emission, sampled from many points. The formulas are in the modules of `lights::kinds::area`.
 //!
 //! Reading order: [`spherical`], [`many`].
 

@@ -1,4 +1,4 @@
-//! Spherical rectangles [Ureña, Fajardo and King 2013] from many points at once; see `lights::area::rectangle`.
+//! Spherical rectangles [Ureña, Fajardo and King 2013] from many points at once; see `lights::kinds::area::rectangle`.
 
 use super::Rectangle;
 use fearless_simd::{Simd, f64x8, mask64x8, prelude::*};
