@@ -63,6 +63,17 @@ impl Instance {
     pub fn world_from_group_at(&self, time: f32) -> Affine3A {
         placement_at(&self.world_from_group, time)
     }
+
+    /// The inverse transform; `None` if the instance moves.
+    pub fn group_from_world(&self) -> Option<Affine3A> {
+        (self.world_from_group.len() == 1).then(|| self.world_from_group[0].inverse())
+    }
+
+    /// True if rays can be traced through it: its transforms are finite, and invertible if it is static.
+    pub fn is_usable(&self) -> bool {
+        let flat = self.group_from_world().is_some_and(|inverse| !inverse.is_finite());
+        !self.world_from_group.is_empty() && !flat && self.world_from_group.iter().all(Affine3A::is_finite)
+    }
 }
 
 /// All geometry of a scene. Ids are indices.

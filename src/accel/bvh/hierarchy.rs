@@ -3,7 +3,7 @@
 use super::build::{PrimRef, build_binary};
 use super::tree::Tree;
 use crate::accel::{AccelStats, AlphaTest};
-use crate::geometry::{AlphaSource, Geometry, GeometrySet, Group, Shape, Visibility};
+use crate::geometry::{AlphaSource, Geometry, GeometrySet, Group, Instance, Shape, Visibility};
 use lumiris_numbers::math::{Affine3A, Bounds3, Vec3};
 use rayon::prelude::*;
 use std::sync::Arc;
@@ -44,11 +44,8 @@ impl Bvh {
         let (root, root_peak) = build(prims);
 
         // Transforms and memory
-        let group_from_world: Vec<Option<Affine3A>> = geometry
-            .instances
-            .iter()
-            .map(|i| (i.world_from_group.len() == 1).then(|| i.world_from_group[0].inverse()))
-            .collect();
+        let group_from_world: Vec<Option<Affine3A>> =
+            geometry.instances.iter().map(Instance::group_from_world).collect();
         let group_bytes: u64 = built.iter().map(|(tree, _)| tree.bytes()).sum();
         let group_peak: u64 = built.iter().map(|(_, peak)| peak).sum();
         let bytes = group_bytes + root.bytes() + size_of_val(&group_from_world[..]) as u64;
@@ -114,8 +111,7 @@ fn instance_prims(set: &GeometrySet, group_bounds: &[Bounds3]) -> Vec<PrimRef> {
     let bounds_of = |i: usize| {
         let instance = &set.instances[i];
         let bounds = group_bounds[instance.group as usize];
-        let flat = instance.world_from_group.len() == 1 && !instance.world_from_group[0].inverse().is_finite();
-        if bounds.is_empty() || flat || !instance.world_from_group.iter().all(Affine3A::is_finite) {
+        if bounds.is_empty() || !instance.is_usable() {
             return None;
         }
         let placed = instance.world_from_group.iter().map(|m| bounds.transformed(m));

@@ -8,7 +8,7 @@ use rayon::prelude::*;
 
 /// Growth of every box, relative to its largest coordinate. Together with the same growth of the ray's origin it covers
 /// the rounding error of the triangle test, which moves corners by up to 5·2⁻²⁴ of their distance from the origin.
-const BOX_GROWTH: f32 = 1.0 / (1 << 20) as f32;
+pub(super) const BOX_GROWTH: f32 = 1.0 / (1 << 20) as f32;
 
 /// Reference to a child of a node: two bits of kind, thirty of index.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -1,7 +1,7 @@
 //! Traversal of both levels by a single ray.
 
 use super::hierarchy::{Bvh, TESTED};
-use super::tree::{Block, Child, ChildRef, Node, Other, Tree};
+use super::tree::{BOX_GROWTH, Block, Child, ChildRef, Node, Other, Tree};
 use crate::accel::{Accel, AccelStats, Coherence, Hit, RayBatch};
 use crate::geometry::triangle::{RayPrecomputed, intersect_triangle};
 use crate::geometry::{LocalHit, Visibility};
@@ -105,8 +105,7 @@ struct Slabs {
 
 impl Slabs {
     fn new(ray: &Ray) -> Self {
-        // See `BOX_GROWTH`
-        let growth = ray.o.abs().max_element() * (1.0 / (1 << 20) as f32);
+        let growth = ray.o.abs().max_element() * BOX_GROWTH;
         let smallest = ray.d.abs().max_element() * 1e-18;
         let mut slabs = Slabs {
             near_origin: [Vec4::ZERO; 3],

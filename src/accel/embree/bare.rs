@@ -10,7 +10,7 @@ use super::embree_accel::{Builder, checked_width, has_only_triangles};
 use super::error::EmbreeError;
 use super::kernels::{self, Mode, QueryKind, RayHitPacket, RayPacket, Valid};
 use super::query::{ANY_SINGLE, can_trace, load, single_ray};
-use super::scene::{self, EmbreeScene};
+use super::scene::EmbreeScene;
 use super::world::World;
 use crate::accel::RayBatch;
 use crate::geometry::{AlphaSource, GeometrySet, Shape, Visibility};
@@ -52,8 +52,7 @@ impl Bare {
         let device = Arc::new(Device::new(c"", None)?);
         let has_only_triangles = has_only_triangles(&set);
         let calls_back = set.geometries.iter().any(|g| !matches!(g.shape, Shape::Mesh(_)));
-        let of_world = Arc::clone(&set);
-        let world = Arc::new(World::new(set, |i| scene::can_place(&of_world.instances[i as usize])));
+        let world = Arc::new(World::new(set));
         let root = Builder { device: &device, world: &world, alpha, query_filter: false }.root()?;
         Ok(Bare { root, world, calls_back, has_only_triangles, build_time: start.elapsed() })
     }

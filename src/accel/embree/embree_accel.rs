@@ -43,7 +43,7 @@
 use super::callbacks::GeometryContext;
 use super::device::Device;
 use super::error::EmbreeError;
-use super::scene::{self, EmbreeScene};
+use super::scene::EmbreeScene;
 use super::world::World;
 use crate::accel::{Accel, AccelStats, AlphaTest, Coherence, Hit, RayBatch};
 use crate::geometry::{AlphaSource, GeometryId, GeometrySet, Shape};
@@ -116,7 +116,7 @@ impl EmbreeAccel {
         let device = Arc::new(Device::new(&options.config, options.memory_limit)?);
         let widths = packet_widths(&device, options.packet_width, has_only_triangles(&geometry))?;
         let set = Arc::clone(&geometry);
-        let world = Arc::new(World::new(geometry, |i| scene::can_place(&set.instances[i as usize])));
+        let world = Arc::new(World::new(geometry));
         let builder = Builder { device: &device, world: &world, alpha, query_filter: true };
         let root = Arc::new(builder.root()?);
 

@@ -7,7 +7,6 @@ use super::error::EmbreeError;
 use crate::geometry::{GeometryId, GeometrySet, Instance, Shape};
 use embree4_sys as sys;
 use embree4_sys::{RTCBufferType, RTCFormat, RTCGeometryType, RTCSceneFlags};
-use lumiris_numbers::math::Affine3A;
 use std::ffi::c_void;
 use std::sync::Arc;
 
@@ -222,11 +221,4 @@ impl Drop for EmbreeScene {
             unsafe { sys::rtcReleaseScene(self.raw) };
         }
     }
-}
-
-/// True if Embree supports the instance: its transforms are finite, and invertible if it is static.
-pub(super) fn can_place(instance: &Instance) -> bool {
-    let samples = &instance.world_from_group;
-    let flat = samples.len() == 1 && !samples[0].inverse().is_finite();
-    !samples.is_empty() && !flat && samples.iter().all(Affine3A::is_finite)
 }

@@ -397,7 +397,7 @@ fn a_memory_limit_is_an_error_that_says_so() {
 fn a_misaligned_buffer_is_an_error_that_says_so() {
     let device = Arc::new(Device::new(c"", None).unwrap());
     let kind = embree4_sys::RTCGeometryType::RTC_GEOMETRY_TYPE_TRIANGLE;
-    let geometry = scene::EmbreeGeometry::new(&device, kind).unwrap();
+    let geometry = crate::accel::embree::scene::EmbreeGeometry::new(&device, kind).unwrap();
     let positions = [[0.0_f32; 3]; 4];
     let askew = positions.as_ptr().wrapping_byte_add(1);
     let vertices = embree4_sys::RTCBufferType::RTC_BUFFER_TYPE_VERTEX;

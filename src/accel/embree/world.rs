@@ -2,7 +2,7 @@
 
 use crate::accel::Hit;
 use crate::geometry::triangle::{RayPrecomputed, intersect_triangle};
-use crate::geometry::{GeometryId, GeometrySet, Group, Shape};
+use crate::geometry::{GeometryId, GeometrySet, Group, Instance, Shape};
 use lumiris_numbers::math::{Affine3A, Ray, Vec3};
 use std::sync::Arc;
 
@@ -61,18 +61,15 @@ impl Refined {
 }
 
 impl World {
-    /// Assigns ids to everything that rays can hit. `can_place` is true for supported instances.
-    pub(super) fn new(set: Arc<GeometrySet>, can_place: impl Fn(u32) -> bool) -> World {
+    /// Assigns ids to everything that rays can hit.
+    pub(super) fn new(set: Arc<GeometrySet>) -> World {
         let members = |group: &Group| group.geometries.iter().copied().filter(|&id| can_be_met(&set, id)).collect();
         let groups: Vec<Vec<GeometryId>> = set.groups.iter().map(members).collect();
         let root = members(&set.root);
         let filled = |i: u32| !groups[set.instances[i as usize].group as usize].is_empty();
-        let instances = (0..set.instances.len() as u32).filter(|&i| filled(i) && can_place(i)).collect();
-        let group_from_world = set
-            .instances
-            .iter()
-            .map(|i| (i.world_from_group.len() == 1).then(|| i.world_from_group[0].inverse()))
-            .collect();
+        let instances =
+            (0..set.instances.len() as u32).filter(|&i| filled(i) && set.instances[i as usize].is_usable()).collect();
+        let group_from_world = set.instances.iter().map(Instance::group_from_world).collect();
         World { root, groups, instances, group_from_world, set }
     }
 
