@@ -1,8 +1,8 @@
 //! Common code of `ocv` and `optimal-mis`: samples of a mixture of densities, the component densities of each sample,
 //! and the sums of the normal equations.
 
-use super::candidates::{Candidate, Candidates, Drawn, SampleAllocation};
-use super::mixture::Mixture;
+use super::candidates::{Candidates, Drawn, SampleAllocation};
+use super::mixture::{Mixture, draw_groups};
 use super::point::ShadingPoint;
 use super::shadow_segments::Segments;
 use super::t1::{T1, choice_by_sampler};
@@ -12,8 +12,10 @@ use lumiris_numbers::estimators::ocv::NormalEquations;
 use lumiris_numbers::math::Rgb;
 
 /// The mixtures of a batch, and their normal equations.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub(super) struct Components {
+    /// Layout of `sums`.
+    pub equations: NormalEquations,
     /// The mixture of each point.
     pub mixtures: Vec<Mixture>,
     /// Normal equations of each point in the columns r_j, as sums over samples.
@@ -26,26 +28,30 @@ pub(super) struct Components {
     is_hidden: Vec<bool>,
 }
 
+impl Default for Components {
+    fn default() -> Self {
+        let (mixtures, sums, beta, is_free, hidden, hidden_of, is_hidden) = Default::default();
+        let equations = NormalEquations::new(0);
+        Components { equations, mixtures, sums, beta, is_free, hidden, hidden_of, is_hidden }
+    }
+}
+
 impl Components {
-    /// T1: light samples by `draw`, and BSDF samples.
-    pub(super) fn propose(
-        &mut self,
-        t1: &mut T1<'_>,
-        draw: impl Fn(&RenderJob, u32, &ShadingPoint<'_>, &SampleAllocation, &mut Vec<Candidate>) -> Mixture,
-        allocate: impl Fn(&ShadingPoint<'_>) -> SampleAllocation,
-    ) {
+    /// T1: light samples by group, and BSDF samples.
+    pub(super) fn propose(&mut self, t1: &mut T1<'_>, allocate: impl Fn(&ShadingPoint<'_>) -> SampleAllocation) {
         self.mixtures.clear();
         t1.draw_lights(&allocate, |job, index, point, allocation, records| {
-            self.mixtures.push(draw(job, index, point, allocation, records));
+            self.mixtures.push(draw_groups(job, index, point, allocation, records));
             allocation.light_draws
         });
         t1.draw_bsdf(allocate, &mut self.mixtures, choice_by_sampler(t1.job));
     }
 
     /// Accumulates the normal equations of each point from its traced candidates.
-    pub(super) fn sum(&mut self, job: &RenderJob, candidates: &mut Candidates, segments: &Segments) -> NormalEquations {
+    pub(super) fn sum(&mut self, job: &RenderJob, candidates: &mut Candidates, segments: &Segments) {
         self.find_hidden(job, candidates, segments);
         let equations = NormalEquations::new(job.components());
+        self.equations = equations;
         let (m, len) = (equations.components(), equations.len());
 
         // Candidates; y = 0 if occluded
@@ -55,8 +61,8 @@ impl Components {
         for ((c, contribution), &is_free) in traced {
             let mixture = &self.mixtures[c.point as usize];
             let y = if is_free { *contribution * mixture.n } else { Rgb::BLACK };
-            let (count, columns) = mixture.columns(c);
-            equations.add_sparse(&mut self.sums[c.point as usize * len..][..len], &columns[..count], y.to_array());
+            let sums = &mut self.sums[c.point as usize * len..][..len];
+            equations.add_sparse(sums, mixture.columns(c).as_slice(), y.to_array());
         }
 
         // Zero-valued and failed samples
@@ -66,7 +72,6 @@ impl Components {
             }
             equations.add_zeros(sums, (0, 0.0), mixture.failed);
         }
-        equations
     }
 
     /// Determines the visibility of the samples. Sets the density of BSDF sampling to zero for samples hidden by an

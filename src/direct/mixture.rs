@@ -27,6 +27,21 @@ const COUNT_ROUNDING: f32 = 1e-3;
 /// The columns of a sample.
 pub type Columns = [f32; MAX_COMPONENTS];
 
+/// The non-zero columns of a sample.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct NonZeroColumns {
+    count: usize,
+    columns: [(usize, f32); MAX_LOBES + 1],
+}
+
+impl NonZeroColumns {
+    /// Components with their r_j.
+    #[inline]
+    pub fn as_slice(&self) -> &[(usize, f32)] {
+        &self.columns[..self.count]
+    }
+}
+
 /// The mixture of the samples of a point, and counts of samples without contribution.
 #[derive(Clone, Copy, Debug)]
 pub struct Mixture {
@@ -102,23 +117,22 @@ impl Mixture {
         candidate
     }
 
-    /// The non-zero r_j of a sample with their components, and their number. None if the sum of the densities is zero
-    /// or not finite.
+    /// The non-zero r_j of a sample. None if the sum of the densities is zero or not finite.
     #[inline]
-    pub fn columns(&self, c: &Candidate) -> (usize, [(usize, f32); MAX_LOBES + 1]) {
+    pub fn columns(&self, c: &Candidate) -> NonZeroColumns {
         let scale = self.n / (c.n_light * c.p_light + c.n_bsdf * c.p_bsdf);
-        let (mut count, mut columns) = (0, [(0, 0.0); MAX_LOBES + 1]);
+        let mut found = NonZeroColumns::default();
         if !(scale.is_finite() && scale > 0.0) {
-            return (count, columns);
+            return found;
         }
         let group = self.component(usize::from(c.group));
         for (component, h) in [(0, c.p_lobe), (1, c.p_bsdf - c.p_lobe), (group, c.p_light)] {
             if h > 0.0 {
-                columns[count] = (component, h * scale);
-                count += 1;
+                found.columns[found.count] = (component, h * scale);
+                found.count += 1;
             }
         }
-        (count, columns)
+        found
     }
 
     /// r_j of a zero-valued sample of component j; the other columns are 0.
@@ -126,36 +140,6 @@ impl Mixture {
     pub fn zero_column(&self, component: usize) -> f32 {
         self.n / if component < self.lobes { self.n_bsdf } else { self.n_light }
     }
-}
-
-/// Draws the light samples of a point as `mis` does, with lights chosen by the light sampler. Returns the mixture at
-/// the point.
-pub(super) fn draw_together(
-    job: &RenderJob,
-    index: u32,
-    point: &ShadingPoint<'_>,
-    allocation: &SampleAllocation,
-    records: &mut Vec<Candidate>,
-) -> Mixture {
-    // Mixture
-    let lights = &job.lights;
-    let ctx = point.light_ctx();
-    let n = allocation.light_draws;
-    let pmfs = if allocation.n_light > 0.0 { lights.groups.pmfs(&lights.sampler, &ctx) } else { [0.0; MAX_GROUPS] };
-    let mut mixture = Mixture::new(job, point, allocation, &pmfs);
-
-    // Samples, counted by component
-    for i in 0..n {
-        let [u_choice, u0, u1] = point.stream.split(domain::LIGHT, n, i).draw::<3>();
-        let choice = lights.sampler.sample(&ctx, u_choice);
-        let Some((choice, group)) = choice.and_then(|c| Some((c, lights.groups.group_of(c.light)?))) else {
-            mixture.failed += 1;
-            continue;
-        };
-        let drawn = lights.sample_choice(&ctx, choice, [u0, u1]);
-        records.extend(mixture.candidate(job, index, point, allocation, group, drawn));
-    }
-    mixture
 }
 
 /// Draws the light samples of a point separately for each light group. A group gets N times its probability, rounded by
@@ -167,6 +151,7 @@ pub(super) fn draw_groups(
     allocation: &SampleAllocation,
     records: &mut Vec<Candidate>,
 ) -> Mixture {
+    // Mixture
     let lights = &job.lights;
     let ctx = point.light_ctx();
     let n = allocation.light_draws;

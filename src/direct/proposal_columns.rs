@@ -76,6 +76,17 @@ pub struct Techniques {
     pub target: Target,
 }
 
+/// The light samples of a point.
+#[derive(Clone, Copy, Debug)]
+pub struct LightProposals {
+    /// Number of samples.
+    pub draws: u32,
+    /// Their distribution over the lights.
+    pub points: ProposalPoints,
+    /// Uniform number, well distributed over the samples of a pixel.
+    pub phi: f32,
+}
+
 impl ProposalColumns {
     /// Removes all proposals.
     pub fn clear(&mut self) {
@@ -125,25 +136,25 @@ impl ProposalColumns {
         }
     }
 
-    /// Adds a point with the given BSDF samples and `light_draws` light samples; [`evaluate`](Self::evaluate) completes
-    /// the light samples. `phi` is a uniform number, well distributed over the samples of a pixel.
+    /// Adds a point with the given BSDF samples and light samples; [`evaluate`](Self::evaluate) completes the light
+    /// samples.
     pub fn add(
         &mut self,
         job: &RenderJob,
         point: &ShadingPoint<'_>,
         techniques: &Techniques,
-        (light_draws, positions, phi): (u32, ProposalPoints, f32),
+        light: LightProposals,
         bsdf_samples: &[Candidate],
     ) {
         // Light samples: positions and lights
         let start = self.count();
-        let bsdf_start = start + light_draws as usize;
+        let bsdf_start = start + light.draws as usize;
         let end = bsdf_start + bsdf_samples.len();
         self.grow(end);
         self.points.push(PointProposals { start, bsdf_start, end });
         self.chosen[start..end].fill((NO_LIGHT, 0.0));
-        if light_draws > 0 {
-            self.place(positions, phi, light_draws);
+        if light.draws > 0 {
+            self.place(light);
             self.choose_lights(job, point, start, bsdf_start);
         }
 
@@ -169,7 +180,7 @@ impl ProposalColumns {
     }
 
     /// Sets the positions along the curve, in ascending order.
-    fn place(&mut self, points: ProposalPoints, phi: f32, count: u32) {
+    fn place(&mut self, LightProposals { draws: count, points, phi }: LightProposals) {
         let phi = (f64::from(phi) * 4_294_967_296.0) as u32;
         self.positions.resize(count as usize, 0);
         self.jitter.resize(count as usize, 0);

@@ -7,7 +7,7 @@ use super::transmittance::{Crossing, Departure};
 use crate::accel::{Coherence, RayBatch};
 use crate::lights::LightId;
 use crate::scene::RenderJob;
-use lumiris_numbers::math::{Ray, Rgb, Vec3};
+use lumiris_numbers::math::{Ray, Rgb};
 
 /// True if a candidate with this contribution needs a shadow segment: the contribution is finite and not zero.
 #[inline]
@@ -26,6 +26,19 @@ pub struct Segments {
     crossing: Crossing,
     /// Number of segments per point so far.
     counts: Vec<u32>,
+}
+
+/// A shadow segment with its visibility.
+#[derive(Clone, Copy, Debug)]
+pub struct SegmentOutcome {
+    /// Index of the shading point.
+    pub point: u32,
+    /// The light at the end.
+    pub light: LightId,
+    /// Contribution if the segment is free.
+    pub unshadowed: Rgb,
+    /// True if the segment is unoccluded.
+    pub is_free: bool,
 }
 
 impl Segments {
@@ -107,26 +120,21 @@ impl Segments {
         contributions.iter().map(move |contribution| is_traced(contribution) && occluded.next() == Some(&false))
     }
 
-    /// Index of the point, unshadowed contribution, and visibility of each segment.
-    pub fn outcomes(&self) -> impl Iterator<Item = (u32, Rgb, bool)> {
-        let segments = self.points.iter().zip(&self.contributions).zip(&self.occluded);
-        segments.map(|((&point, &contribution), &occluded)| (point, contribution, !occluded))
-    }
-
-    /// Index of the point, light with the direction to it, and contribution of each unoccluded segment.
-    pub fn visible(&self) -> impl Iterator<Item = (u32, (LightId, Vec3), Rgb)> {
-        let free = self.outcomes().enumerate().filter(|(_, (_, _, is_free))| *is_free);
-        free.map(|(i, (point, contribution, _))| {
-            (point, (self.lights[i], self.rays.get(i).d.normalize_or_zero()), contribution)
+    /// The segments with their visibility, in the order of [`Self::rays`].
+    pub fn outcomes(&self) -> impl Iterator<Item = SegmentOutcome> {
+        let segments = self.points.iter().zip(&self.contributions).zip(&self.lights).zip(&self.occluded);
+        segments.map(|(((&point, &unshadowed), &light), &occluded)| SegmentOutcome {
+            point,
+            light,
+            unshadowed,
+            is_free: !occluded,
         })
     }
 
     /// Adds the contributions of the unoccluded segments to their points, in order.
     pub fn resolve(&self, out: &mut [Rgb]) {
-        for (point, contribution, is_free) in self.outcomes() {
-            if is_free {
-                out[point as usize] += contribution;
-            }
+        for SegmentOutcome { point, unshadowed, .. } in self.outcomes().filter(|outcome| outcome.is_free) {
+            out[point as usize] += unshadowed;
         }
     }
 }

@@ -3,10 +3,11 @@
 
 use super::path::{Outcome, PathTracer, Step};
 use super::vertices::VertexSearch;
-use crate::direct::columns::Sinks;
+use crate::direct::columns::{SampleOnLight, Sinks, VisibleSample, WeightAgainstLightPaths};
+use crate::direct::shadow_segments::SegmentOutcome;
 use crate::direct::{Fits, ShadingPoint, Techniques, Vertices};
 use crate::film::PixelSample;
-use lumiris_numbers::math::{Rgb, Vec3};
+use lumiris_numbers::math::Rgb;
 use std::time::Instant;
 
 impl PathTracer {
@@ -32,14 +33,14 @@ impl PathTracer {
         // Callbacks: the weight that light paths leave to a light sample, and the sums of light groups
         let VertexSearch { active, layers, guide, recording, .. } = &mut self.search;
         let path = |row: usize| &active[vertices.path[row] as usize];
-        let rest = guide.as_ref().map(|guide| {
-            move |row: usize, light, n, wi: Vec3| {
+        let against_light_paths = guide.as_ref().map(|guide| {
+            move |&SampleOnLight { row, light, n, wi }: &SampleOnLight| {
                 let chain = path(row).chain;
                 if chain.is_caustic() { chain.rest(guide.density(light, n, -wi)) } else { 1.0 }
             }
         });
         let are_kept = layers.are_kept();
-        let mut visible = |row: usize, light: Option<_>, wi, contribution| {
+        let mut visible = |&VisibleSample { row, light, wi, contribution }: &VisibleSample| {
             let (path, p) = (path(row), vertices.surface.p.vec3(row));
             match light {
                 Some(light) => layers.add(&job.lights, path.sample, light, p, wi, path.beta * contribution),
@@ -49,7 +50,7 @@ impl PathTracer {
 
         // Add β·L_d, and the control variates
         let mut sinks = Sinks {
-            rest: rest.as_ref().map(|rest| rest as _),
+            against_light_paths: against_light_paths.as_ref().map(|weight| weight as &WeightAgainstLightPaths<'_>),
             visible: if are_kept { Some(&mut visible) } else { None },
             segments: recording.as_mut().map(|r| r.segments_at(step.vertex)),
         };
@@ -89,7 +90,7 @@ impl PathTracer {
             r.segments_at(step.vertex).push(self.direct.segments().clone());
         }
         if let Some(outcomes) = self.outcomes.as_mut().filter(|_| step.vertex == 0) {
-            outcomes.extend(self.direct.outcomes().map(|(point, unshadowed, is_free)| {
+            outcomes.extend(self.direct.outcomes().map(|SegmentOutcome { point, unshadowed, is_free, .. }| {
                 let contribution = if is_free { unshadowed } else { Rgb::BLACK };
                 Outcome { sample: path(point as usize).sample, unshadowed, contribution }
             }));
@@ -100,9 +101,11 @@ impl PathTracer {
             out[path(point).sample as usize].radiance += path(point).beta * radiance;
         }
         if self.search.layers.are_kept() {
-            for (point, (light, wi), contribution) in self.direct.visible() {
-                let (path, p) = (path(point as usize), points[point as usize].light_ctx().p);
-                self.search.layers.add(&job.lights, path.sample, light, p, wi, path.beta * contribution);
+            let segments = self.direct.segments();
+            for (i, s) in self.direct.outcomes().enumerate().filter(|(_, s)| s.is_free) {
+                let (path, p) = (path(s.point as usize), points[s.point as usize].light_ctx().p);
+                let wi = segments.get(i).d.normalize_or_zero();
+                self.search.layers.add(&job.lights, path.sample, s.light, p, wi, path.beta * s.unshadowed);
             }
         }
     }

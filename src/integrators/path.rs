@@ -2,7 +2,7 @@
 //! bounce.
 //!
 //! The radiance along a camera ray is L_e(x₁) + Σ_k β_k L_direct(x_k). β_k = Π f_s |cos θ|/p is the throughput up to
-//! the k-th vertex. L_direct, estimated by [`DirectStage`], is the light that the vertex reflects and that comes
+//! the k-th vertex. L_direct, estimated by [`PointDirectLighting`], is the light that the vertex reflects and that comes
 //! straight from emitters. So emission is added at the hit of the camera ray, and never twice.
 //!
 //! If `mis` has one BSDF sample and the path continues, this sample is the next segment of the path, which hits the
@@ -21,7 +21,7 @@ use super::segment::{LastVertices, PathState};
 pub use super::vertices::Recording;
 use super::vertices::{Stage, VertexSearch};
 use super::{Integrator, Statistics, Tracer};
-use crate::direct::{ColumnStage, DirectStage, Estimator, Fits, ShadingPoint, Techniques, Vertices};
+use crate::direct::{ColumnDirectLighting, Estimator, Fits, PointDirectLighting, ShadingPoint, Techniques, Vertices};
 use crate::film::{FeatureSet, PixelSample};
 use crate::materials::SurfaceBsdf;
 use crate::photons::PhotonError;
@@ -145,8 +145,8 @@ pub struct PathTracer {
     next: Vec<PathState>,
     scatter: Scatter,
     pub(super) radiance: Vec<Rgb>,
-    pub(super) direct: DirectStage,
-    pub(super) columns: ColumnStage,
+    pub(super) direct: PointDirectLighting,
+    pub(super) columns: ColumnDirectLighting,
     /// Vertex columns of earlier batches, kept for their memory.
     spare: [Vertices<'static>; 4],
     /// Path sharing within a batch.

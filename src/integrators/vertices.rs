@@ -5,7 +5,7 @@ use super::light_paths::{Chain, Guide};
 use super::segment::{CameraSample, LastVertices, PathState, PathStats, domain};
 use crate::accel::{Coherence, Hit, RayBatch};
 use crate::direct::Vertices;
-use crate::direct::vertices::Single;
+use crate::direct::vertices::VertexData;
 use crate::film::{FeatureSet, Features, PixelSample};
 use crate::geometry::{GeometryId, Shape, SurfaceHit};
 use crate::lights::LightCtx;
@@ -198,7 +198,7 @@ impl VertexSearch {
     /// Sets the features of first vertices on plain meshes.
     fn set_plain_features(&self, at: &mut Stage<'_, '_>) {
         let Vertices { path, surface, .. } = &*at.vertices;
-        for (row, &(object, depth)) in at.vertices.plain().zip(&self.plain) {
+        for (row, &(object, depth)) in at.vertices.plain_rows().zip(&self.plain) {
             let (z, wo) = (surface.ns.vec3(row), surface.wo.vec3(row));
             at.out[self.active[path[row] as usize].sample as usize].features = Some(Features {
                 albedo: surface.rho.rgb(row),
@@ -242,7 +242,7 @@ impl VertexSearch {
         } else {
             Chain::NONE
         };
-        at.vertices.push_plain(index, mesh, hit.primitive, hit.uv, path.ray.d, rho);
+        at.vertices.push_plain_mesh(index, mesh, hit.primitive, hit.uv, path.ray.d, rho);
         true
     }
 
@@ -299,7 +299,7 @@ impl VertexSearch {
         let SurfaceInteraction { surface, wo, width, .. } = interaction;
         path.chain = self.chain(at, path, &interaction, &bsdf);
         path.width = width;
-        at.vertices.push(Single { path: index, p: surface.p, p_error: surface.p_error, wo, bsdf, media });
+        at.vertices.push(VertexData { path: index, p: surface.p, p_error: surface.p_error, wo, bsdf, media });
     }
 
     /// True if light paths may reach the vertex.
@@ -375,7 +375,7 @@ impl VertexSearch {
                     let SurfaceHit { p, p_error, .. } = SurfaceHit::in_space(o + d * t);
                     let bsdf = SurfaceBsdf::in_medium(medium.g(), -d);
                     let media = Sides::both(path.medium);
-                    at.vertices.push(Single { path: index, p, p_error, wo: bsdf.frame.z, bsdf, media });
+                    at.vertices.push(VertexData { path: index, p, p_error, wo: bsdf.frame.z, bsdf, media });
                 }
                 let wants_features = at.vertex == 0 && self.features != FeatureSet::None;
                 if wants_features { Flown::Ghost(ghost) } else { Flown::Ended }

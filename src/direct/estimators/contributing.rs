@@ -216,23 +216,32 @@ impl At<'_, '_> {
         self.lights.infinite.len() > 1 && self.lights.infinite.contains(&light)
     }
 
-    /// Expected number of samples of a contributing light, with the ideal number `wanted` and the drawn number `count`.
-    fn rate(&self, light: LightId, wanted: f32, count: u32) -> f32 {
+    /// Expected number of samples of a contributing light.
+    fn rate(&self, light: LightId, LightCounts { ideal, drawn }: LightCounts) -> f32 {
         // The counts of overlapping lights depend on the same random number, so their drawn numbers cannot be used
-        if wanted < 1.0 || self.n_bsdf > 0.0 && self.overlaps(light) { wanted } else { count as f32 }
+        if ideal < 1.0 || self.n_bsdf > 0.0 && self.overlaps(light) { ideal } else { drawn as f32 }
     }
 }
 
+/// Sample counts of a light.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct LightCounts {
+    /// m_l.
+    ideal: f32,
+    /// ⌊m_l⌋ or ⌈m_l⌉.
+    drawn: u32,
+}
+
 /// Ideal sample counts weight·`scale`, and the counts drawn by systematic resampling with `offset` in [0, 1).
-fn systematic(weights: &[f32], scale: f32, offset: f32) -> impl Iterator<Item = (f32, u32)> {
+fn systematic(weights: &[f32], scale: f32, offset: f32) -> impl Iterator<Item = LightCounts> {
     let (mut upto, mut given) = (offset, 0);
     weights.iter().map(move |&weight| {
-        let wanted = weight * scale;
-        upto += wanted;
+        let ideal = weight * scale;
+        upto += ideal;
         // Rounding must not remove the sample of a light with an ideal count of 1 or more
-        let count = (upto as u32).saturating_sub(given).max(u32::from(wanted >= 1.0));
+        let drawn = (upto as u32).saturating_sub(given).max(u32::from(ideal >= 1.0));
         given = upto as u32;
-        (wanted, count)
+        LightCounts { ideal, drawn }
     })
 }
 
@@ -338,14 +347,14 @@ impl Draws<'_, '_> {
         let scale = drawn.n as f32 / weights.iter().sum::<f32>();
         let lights = drawn.contributing.lights;
         let numbers = || systematic(weights, scale, offset).zip(lights);
-        rates.extend(numbers().map(|((wanted, count), &(light, _))| at.rate(light, wanted, count)));
+        rates.extend(numbers().map(|(counts, &(light, _))| at.rate(light, counts)));
         drawn.rates.end = rates.len();
 
         let buffers = &*self.buffers;
-        for (k, ((_, count), &(light, _))) in systematic(&buffers.weights, scale, offset).zip(lights).enumerate() {
+        for (k, (counts, &(light, _))) in systematic(&buffers.weights, scale, offset).zip(lights).enumerate() {
             let rate = buffers.rates[drawn.rates.start + k];
-            for i in 0..count {
-                let u = at.point.stream.split(domain::CONTRIBUTING + k as u32, count, i).draw::<2>();
+            for i in 0..counts.drawn {
+                let u = at.point.stream.split(domain::CONTRIBUTING + k as u32, counts.drawn, i).draw::<2>();
                 records.extend(at.sample(light, rate, u, drawn, buffers));
             }
         }

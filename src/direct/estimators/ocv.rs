@@ -5,14 +5,12 @@
 //! samples that β is fitted to.
 
 use super::mis::Mis;
-use crate::direct::candidates::Candidates;
 use crate::direct::components::Components;
 use crate::direct::fits::Fits;
 use crate::direct::point::ShadingPoint;
-use crate::direct::shadow_segments::Segments;
-use crate::scene::RenderJob;
+use crate::direct::stats::DirectStats;
 use crate::settings::OcvForm;
-use lumiris_numbers::estimators::ocv::{Form, MAX_COMPONENTS, NormalEquations};
+use lumiris_numbers::estimators::ocv::{Form, NormalEquations};
 use lumiris_numbers::math::Rgb;
 
 /// Control variates for the samples of `mis`.
@@ -25,20 +23,21 @@ pub struct Ocv {
 }
 
 impl Ocv {
-    /// Computes the estimates; `out[i]` belongs to `points[i]`.
+    /// Computes the estimates from the sums of `components`; `out[i]` belongs to `points[i]`.
+    ///
+    /// The form over pixels is the work of [`crate::direct::ColumnDirectLighting`].
     pub(super) fn resolve(
         &self,
-        job: &RenderJob,
         points: &[ShadingPoint<'_>],
-        (candidates, segments, components): (&mut Candidates, &Segments, &mut Components),
+        components: &mut Components,
+        stats: &mut DirectStats,
         fits: &mut Fits,
         out: &mut [Rgb],
     ) {
-        let equations = components.sum(job, candidates, segments);
-        let Components { mixtures, sums, beta, .. } = components;
+        let Components { equations, mixtures, sums, beta, .. } = components;
         let (form, len, width) = (numeric(self.form), equations.len(), equations.coefficients());
         for (mixture, sums) in mixtures.iter().zip(sums.chunks_mut(len)) {
-            form.finish(equations, sums, &mixture.integrals);
+            form.finish(*equations, sums, &mixture.integrals);
         }
 
         // The paper's form fits β to the same samples
@@ -46,27 +45,19 @@ impl Ocv {
             let systems = sums.len() / len;
             beta.clear();
             beta.resize(systems * width, 0.0);
-            candidates.stats.systems += systems as u64;
-            candidates.stats.ill_conditioned += equations.solve(form.system(), sums, beta) as u64;
+            stats.systems += systems as u64;
+            stats.ill_conditioned += equations.solve(form.system(), sums, beta) as u64;
         }
 
         // Estimates
         for (i, (out, sums)) in out.iter_mut().zip(sums.chunks(len)).enumerate() {
             let integrals = &mixtures[i].integrals;
             let estimate = match self.form {
-                OcvForm::Progressive => match fits.beta(points[i].fit) {
-                    Some(beta) => form.estimate(equations, sums, beta, integrals),
+                OcvForm::Progressive | OcvForm::Pixels => match fits.beta(points[i].fit) {
+                    Some(beta) => form.estimate(*equations, sums, beta, integrals),
                     None => equations.mean(sums),
                 },
-                OcvForm::Pixels => {
-                    let (value, mut controls) = (equations.mean(sums), means_of_columns(equations, sums));
-                    // Reorder: groups, then the first lobe
-                    controls[..equations.components()].rotate_left(job.lobes());
-                    let value = job.world.scene.film.balanced(Rgb::from_array(value)).to_array();
-                    fits.set_controls(points[i].sample, value, &controls[..job.controls()]);
-                    value
-                }
-                OcvForm::Paper => form.estimate(equations, sums, &beta[i * width..][..width], integrals),
+                OcvForm::Paper => form.estimate(*equations, sums, &beta[i * width..][..width], integrals),
             };
             if self.form == OcvForm::Progressive {
                 fits.add(points[i].fit, sums);
@@ -83,14 +74,6 @@ fn numeric(form: OcvForm) -> Form {
         OcvForm::Progressive => Form::Progressive,
         OcvForm::Pixels => Form::Pixels,
     }
-}
-
-/// c̄_j; 0 without samples.
-fn means_of_columns(equations: NormalEquations, sums: &[f32]) -> [f32; MAX_COMPONENTS] {
-    let n = f64::from(equations.samples(sums)).max(1.0);
-    std::array::from_fn(
-        |j| if j < equations.components() { (equations.sum_of_column(sums, j) / n) as f32 } else { 0.0 },
-    )
 }
 
 /// Fits the coefficients of all fits to their sums. Returns the number of ill-conditioned systems.

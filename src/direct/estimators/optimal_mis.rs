@@ -3,12 +3,10 @@
 //! The linear systems use the columns r_j = h_j/p_α, where the paper uses r_j/I_j.
 
 use super::mis::Mis;
-use crate::direct::candidates::Candidates;
 use crate::direct::components::Components;
 use crate::direct::fits::Fits;
 use crate::direct::point::ShadingPoint;
-use crate::direct::shadow_segments::Segments;
-use crate::scene::RenderJob;
+use crate::direct::stats::DirectStats;
 use crate::settings::OptimalForm;
 use lumiris_numbers::estimators::ocv::NormalEquations;
 use lumiris_numbers::estimators::optimal_mis;
@@ -24,16 +22,16 @@ pub struct OptimalMis {
 }
 
 impl OptimalMis {
+    /// Computes the estimates from the sums of `components`; `out[i]` belongs to `points[i]`.
     pub(super) fn resolve(
         &self,
-        job: &RenderJob,
         points: &[ShadingPoint<'_>],
-        (candidates, segments, components): (&mut Candidates, &Segments, &mut Components),
+        components: &mut Components,
+        stats: &mut DirectStats,
         fits: &mut Fits,
         out: &mut [Rgb],
     ) {
-        // Normal equations
-        let equations = components.sum(job, candidates, segments);
+        let equations = components.equations;
         let sums = components.sums.chunks(equations.len());
 
         // Solve them, or use the coefficients of the fit
@@ -45,8 +43,8 @@ impl OptimalMis {
                 }
                 (OptimalForm::Direct, _) => {
                     let outcome = optimal_mis::direct(equations, sums, &mixture.integrals);
-                    candidates.stats.systems += 1;
-                    candidates.stats.ill_conditioned += u64::from(outcome.is_ill_conditioned);
+                    stats.systems += 1;
+                    stats.ill_conditioned += u64::from(outcome.is_ill_conditioned);
                     outcome.estimate
                 }
             };

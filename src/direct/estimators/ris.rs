@@ -22,7 +22,7 @@ use crate::direct::candidates::{Candidate, Candidates, SampleAllocation};
 use crate::direct::domain;
 use crate::direct::light_samples::unshadowed_candidate;
 use crate::direct::point::ShadingPoint;
-use crate::direct::proposal_columns::{PointProposals, ProposalColumns, Techniques};
+use crate::direct::proposal_columns::{LightProposals, PointProposals, ProposalColumns, Techniques};
 use crate::direct::shadow_segments::Segments;
 use crate::direct::t1::T1;
 use crate::scene::RenderJob;
@@ -113,8 +113,9 @@ impl Ris {
             }
             let numbers = point.stream.domain(domain::RESAMPLE).draw::<2>();
             b.numbers.push(numbers);
-            let positions = (allocation(point).light_draws, self.points, numbers[0]);
-            b.proposals.add(job, point, &self.techniques(point), positions, &bsdf[begin..next]);
+            let draws = allocation(point).light_draws;
+            let light = LightProposals { draws, points: self.points, phi: numbers[0] };
+            b.proposals.add(job, point, &self.techniques(point), light, &bsdf[begin..next]);
             count += 1;
         }
 

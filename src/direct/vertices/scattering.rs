@@ -1,6 +1,6 @@
 //! Scattering at all rows: values and densities for one direction per row, and BSDF sampling.
 
-use super::Vertices;
+use super::vertex_columns::{Run, Vertices};
 use lumiris_lanes::columns::{Column, Columns3, reserve};
 use lumiris_lanes::kernels::{self, Directions, Kernel, MAX_PARAMS, Rows, Values};
 use lumiris_lanes::level;
@@ -58,24 +58,24 @@ impl Vertices<'_> {
     }
 
     /// The runs among the first `n` rows.
-    fn runs(&self, n: usize) -> impl Iterator<Item = (Option<Kernel>, Range<usize>)> {
-        self.runs.iter().filter(move |run| run.rows.start < n).map(|run| (run.kernel, run.rows.clone()))
+    fn runs(&self, n: usize) -> impl Iterator<Item = &Run> {
+        self.runs.iter().filter(move |run| run.rows.start < n)
     }
 
     /// f·|cos θ| and the density of BSDF sampling (1/sr) for one direction at each of the first `n` rows.
     pub fn evaluate(&self, n: usize, wi: &Columns3, f_cos: &mut Columns3, pdf: &mut Column) {
-        for (kernel, rows) in self.runs(n) {
+        for Run { kernel, rows } in self.runs(n) {
             let Some(kernel) = kernel else {
-                for i in rows {
+                for i in rows.clone() {
                     let (value, density) = self.bsdfs[i].f_cos_and_pdf(self.surface.wo.vec3(i), wi.vec3(i));
                     f_cos.set_rgb(i, value);
                     pdf[i] = density;
                 }
                 continue;
             };
-            self.with_rows(&rows, kernel, |of| {
-                let mut values = Values { f_cos: part_mut(f_cos, &rows), pdf: &mut pdf[rows.clone()] };
-                kernels::evaluate(level(), kernel, of, part(wi, &rows), &mut values);
+            self.with_rows(rows, *kernel, |of| {
+                let mut values = Values { f_cos: part_mut(f_cos, rows), pdf: &mut pdf[rows.clone()] };
+                kernels::evaluate(level(), *kernel, of, part(wi, rows), &mut values);
             });
         }
     }
@@ -83,10 +83,10 @@ impl Vertices<'_> {
     /// Draws a BSDF sample at each of the first `n` rows by three random numbers.
     pub fn sample(&self, n: usize, u: &[Column; 3], out: &mut BsdfSamples) {
         let BsdfSamples { wi, f_cos, pdf, lobe, eta } = out;
-        for (kernel, rows) in self.runs(n) {
+        for Run { kernel, rows } in self.runs(n) {
             // BSDFs without a kernel, one by one
             let Some(kernel) = kernel else {
-                for i in rows {
+                for i in rows.clone() {
                     let drawn = self.bsdfs[i].sample(self.surface.wo.vec3(i), u[0][i], [u[1][i], u[2][i]]);
                     pdf[i] = drawn.map_or(0.0, |s| s.pdf);
                     let Some(s) = drawn else { continue };
@@ -98,15 +98,15 @@ impl Vertices<'_> {
             };
 
             // Kernel
-            self.with_rows(&rows, kernel, |of| {
+            self.with_rows(rows, *kernel, |of| {
                 let mut directions = Directions {
-                    wi: part_mut(wi, &rows),
-                    f_cos: part_mut(f_cos, &rows),
+                    wi: part_mut(wi, rows),
+                    f_cos: part_mut(f_cos, rows),
                     pdf: &mut pdf[rows.clone()],
                     lobe: &mut lobe[rows.clone()],
                     eta: &mut eta[rows.clone()],
                 };
-                kernels::sample(level(), kernel, of, u.each_ref().map(|u| &u[rows.clone()]), &mut directions);
+                kernels::sample(level(), *kernel, of, u.each_ref().map(|u| &u[rows.clone()]), &mut directions);
             });
         }
     }

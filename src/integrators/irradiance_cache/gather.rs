@@ -13,7 +13,7 @@ use super::record::Record;
 use crate::accel::{Hit, RayBatch};
 use crate::bsdfs::{Bsdf, Diffuse};
 use crate::cameras::CameraRay;
-use crate::direct::{DirectStage, Estimator, Fits, ShadingPoint};
+use crate::direct::{Estimator, Fits, PointDirectLighting, ShadingPoint};
 use crate::film::PixelSample;
 use crate::integrators::Tracer;
 use crate::integrators::path::{CameraSample, PathStats, PathTracer};
@@ -67,7 +67,7 @@ pub struct RecordRequest {
 #[derive(Default)]
 pub struct Gatherer {
     paths: PathTracer,
-    direct: DirectStage,
+    direct: PointDirectLighting,
     samples: Vec<CameraSample>,
     results: Vec<PixelSample>,
     radiance: Vec<Rgb>,
@@ -175,12 +175,10 @@ impl Gatherer {
         let segments = self.direct.segments();
         self.rays.clear();
         let mut free = Vec::new();
-        for (i, (point, l, is_free)) in self.direct.outcomes().enumerate() {
-            if is_free {
-                let segment = segments.get(i);
-                self.rays.push(&Ray { t_max: f32::INFINITY, ..segment });
-                free.push((point as usize, l * scale, segment.t_max.is_finite()));
-            }
+        for (i, outcome) in self.direct.outcomes().enumerate().filter(|(_, outcome)| outcome.is_free) {
+            let segment = segments.get(i);
+            self.rays.push(&Ray { t_max: f32::INFINITY, ..segment });
+            free.push((outcome.point as usize, outcome.unshadowed * scale, segment.t_max.is_finite()));
         }
         job.world.intersect_emitters(&self.rays, &mut self.hits, &mut self.emitters);
 
