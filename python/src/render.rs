@@ -17,8 +17,9 @@ use lumiris::planning::preparation::{complete_for_time, pilot_deadline};
 use lumiris::planning::{PlanError, Preparation, prepare};
 use lumiris::render::cryptomatte::{Cryptomatte, cryptomattes};
 use lumiris::render::output::{self, Aov};
-use lumiris::render::parts::{Asked, FilmFile, PartError, Storage, Stored};
-use lumiris::render::{Continuation, Progress, RenderError, RenderSettings, Rendering, go_on};
+use lumiris::render::parts::{Asked, PartError, Stored};
+use lumiris::render::{Continuation, Progress, RenderError, RenderSettings, Rendering, resume};
+use lumiris::render::{FilmFile, Storage};
 use lumiris::scene::RenderJob;
 use lumiris::settings::value::{Kind, Value};
 use lumiris_formats::diagnostic::Report;
@@ -389,7 +390,7 @@ fn observed(
     events: Option<Sender<Event>>,
     continuation: Continuation<'_>,
 ) -> Result<Rendering, RenderError> {
-    let Some(events) = events else { return go_on(job, settings, stop, &|_| (), continuation) };
+    let Some(events) = events else { return resume(job, settings, stop, &|_| (), continuation) };
     let film = &job.world.scene.film;
     let canvas = Arc::new(Canvas::new(film.resolution, film.bounds, settings.with_features));
     // Nobody receives once the rendering is to stop: that is no error
@@ -403,7 +404,7 @@ fn observed(
         }
     };
     let hooks = Continuation { watch: Some(&set_tile), passes: Some(&passed), ..continuation };
-    go_on(job, settings, stop, &observe, hooks)
+    resume(job, settings, stop, &observe, hooks)
 }
 
 /// The exception for a failure.

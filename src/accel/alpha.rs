@@ -24,7 +24,7 @@ impl AlphaTest {
     ///
     /// The decision is a hash of the ray and of the hit. It is therefore independent of the number and order of calls,
     /// and independent between the hits along a ray.
-    pub fn stops(&self, (hit, crossing): (&Hit, usize), world_ray: &Ray) -> bool {
+    pub fn stops(&self, hit: &Hit, crossing: usize, world_ray: &Ray) -> bool {
         let geometry = &self.geometry.geometries[hit.geometry as usize];
         let Some(texture) = geometry.alpha else { return true };
         let uv = geometry.shape.texture_coordinates(hit.primitive, hit.uv);

@@ -48,7 +48,6 @@ pub struct CameraBase {
     /// Transforms at equidistant times 0..=1, interpolated linearly; a single one if the camera does not move.
     pub(super) world_from_camera: Arc<[Affine3A]>,
     resolution: Vec2,
-    shutter: [f32; 2],
 }
 
 /// A thin lens of a perspective or orthographic camera.
@@ -113,22 +112,15 @@ pub fn default_screen_window(frame_aspect: f32) -> [f32; 4] {
 impl CameraBase {
     fn new(world_from_camera: Affine3A, resolution: [u32; 2]) -> Self {
         let resolution = Vec2::new(resolution[0].max(1) as f32, resolution[1].max(1) as f32);
-        CameraBase { world_from_camera: Arc::new([world_from_camera]), resolution, shutter: [0.0, 1.0] }
+        CameraBase { world_from_camera: Arc::new([world_from_camera]), resolution }
     }
 
     /// The ray of a point and a direction given in camera space.
     #[inline]
-    fn ray(&self, o: Vec3, d: Vec3, time_u: f32) -> Ray {
-        let time = self.time(time_u);
+    fn ray(&self, o: Vec3, d: Vec3, time: f32) -> Ray {
         let world_from_camera = placement_at(&self.world_from_camera, time);
         let d = world_from_camera.transform_vector3(d).normalize();
         Ray { o: world_from_camera.transform_point3(o), d, t_max: f32::INFINITY, time }
-    }
-
-    /// Time for the random number `time_u` in 0..1.
-    #[inline]
-    fn time(&self, time_u: f32) -> f32 {
-        self.shutter[0] + time_u * (self.shutter[1] - self.shutter[0])
     }
 
     /// Film coordinates to screen coordinates.
@@ -225,14 +217,6 @@ impl Camera {
         Camera::Realistic { base, film_size, lens: Arc::new(lens) }
     }
 
-    /// Sets the shutter interval from `open` to `close`, in the time unit in which instances move from 0 to 1. The
-    /// default is from 0 to 1.
-    #[must_use]
-    pub fn with_shutter(mut self, open: f32, close: f32) -> Self {
-        self.base_mut().shutter = [open, close];
-        self
-    }
-
     /// Sets the transforms at equidistant times 0..=1, in the time unit in which instances move from 0 to 1. The camera
     /// moves linearly between them. There must be at least one.
     #[must_use]
@@ -278,27 +262,21 @@ impl Camera {
         (lens.radius <= 0.0).then(|| (pinhole, world_from_camera.transform_point3(Vec3::ZERO)))
     }
 
-    /// Time for the random number `time_u` in 0..1.
-    pub fn time(&self, time_u: f32) -> f32 {
-        self.base().time(time_u)
-    }
-
-    /// The ray of the raster point `film_xy`, through the point `u_lens` of the lens, at `time_u` of the shutter
-    /// interval.
+    /// The ray of the raster point `film_xy`, through the point `u_lens` of the lens, at `time` (0 to 1).
     #[inline]
-    pub fn ray(&self, film_xy: Vec2, u_lens: [f32; 2], time_u: f32) -> CameraRay {
+    pub fn ray(&self, film_xy: Vec2, u_lens: [f32; 2], time: f32) -> CameraRay {
         match self {
             Camera::Perspective { base, screen_window, tan_half_fov, lens } => {
                 let d = (base.screen_point(screen_window, film_xy) * *tan_half_fov).extend(1.0);
                 let (o, through) = lens.through(Vec3::ZERO, d, u_lens);
                 let spread = base.perspective_spread(screen_window, *tan_half_fov, 1.0 / d.length());
-                CameraRay { ray: base.ray(o, through, time_u), spread, width0: 0.0, weight: 1.0 }
+                CameraRay { ray: base.ray(o, through, time), spread, width0: 0.0, weight: 1.0 }
             }
             Camera::Orthographic { base, screen_window, lens } => {
                 let o = base.screen_point(screen_window, film_xy).extend(0.0);
                 let (o, d) = lens.through(o, Vec3::Z, u_lens);
-                let width0 = base.parallel_width(screen_window, base.time(time_u));
-                CameraRay { ray: base.ray(o, d, time_u), spread: 0.0, width0, weight: 1.0 }
+                let width0 = base.parallel_width(screen_window, time);
+                CameraRay { ray: base.ray(o, d, time), spread: 0.0, width0, weight: 1.0 }
             }
             Camera::Spherical { base, mapping } => {
                 let p = film_xy / base.resolution;
@@ -308,14 +286,14 @@ impl Camera {
                 };
                 let spread = base.spherical_spread(*mapping, d.truncate().length());
                 let d = Vec3::new(d.x, d.z, d.y);
-                CameraRay { ray: base.ray(Vec3::ZERO, d, time_u), spread, width0: 0.0, weight: 1.0 }
+                CameraRay { ray: base.ray(Vec3::ZERO, d, time), spread, width0: 0.0, weight: 1.0 }
             }
             Camera::Realistic { base, film_size, lens } => {
                 // The image on the film is upside down and mirrored: its upper left corner is at the lower right
                 let p = (film_xy / base.resolution - 0.5) * *film_size * Vec2::new(-1.0, 1.0);
                 let s = lens.sample(p, u_lens);
                 let spread = lens.spread(p) * film_size.x / base.resolution.x;
-                CameraRay { ray: base.ray(s.o, s.d, time_u), spread, width0: 0.0, weight: s.weight }
+                CameraRay { ray: base.ray(s.o, s.d, time), spread, width0: 0.0, weight: s.weight }
             }
         }
     }
@@ -355,12 +333,11 @@ impl Camera {
         matches!(self, Camera::Perspective { .. })
     }
 
-    /// Projects the point `p` of world space through the point `u_lens` of the lens at `time_u` of the shutter
-    /// interval, onto the film or beyond its edges. `None` for points behind the camera, and for cameras that are not
+    /// Projects the point `p` of world space through the point `u_lens` of the lens at `time` (0 to 1), onto the film or beyond its edges. `None` for points behind the camera, and for cameras that are not
     /// perspective.
-    pub fn project(&self, p: Vec3, u_lens: [f32; 2], time_u: f32) -> Option<Projection> {
+    pub fn project(&self, p: Vec3, u_lens: [f32; 2], time: f32) -> Option<Projection> {
         let Camera::Perspective { base, screen_window, tan_half_fov, lens } = self else { return None };
-        let world_from_camera = placement_at(&base.world_from_camera, base.time(time_u));
+        let world_from_camera = placement_at(&base.world_from_camera, time);
         let on_lens = if lens.radius > 0.0 { sample_uniform_disk_concentric(u_lens) * lens.radius } else { Vec2::ZERO };
         let on_lens = on_lens.extend(0.0);
         let d = world_from_camera.inverse().transform_point3(p) - on_lens;
@@ -606,20 +583,13 @@ mod tests {
         let samples = [0.0, 1.0, 4.0].map(|x| Affine3A::from_translation(Vec3::X * x));
         let camera = perspective(Affine3A::IDENTITY, 50.0, PINHOLE);
         assert!(!camera.is_moving() && camera.pinhole().is_some());
-        let camera = camera.moving(&samples).with_shutter(0.5, 1.0);
+        let camera = camera.moving(&samples);
         assert!(camera.is_moving() && camera.pinhole().is_none());
         let o = |u| camera.ray(Vec2::new(100.0, 50.0), [0.5; 2], u).ray.o;
-        near(o(0.0), Vec3::X);
-        near(o(0.5), Vec3::X * 2.5);
+        near(o(0.0), Vec3::ZERO);
+        near(o(0.5), Vec3::X);
+        near(o(0.75), Vec3::X * 2.5);
         near(o(1.0), Vec3::X * 4.0);
-    }
-
-    #[test]
-    fn the_shutter_spans_its_interval() {
-        let camera = perspective(Affine3A::IDENTITY, 50.0, PINHOLE);
-        let time = |c: &Camera, u| c.ray(Vec2::ZERO, [0.5; 2], u).ray.time;
-        assert_eq!((time(&camera, 0.0), time(&camera, 0.75)), (0.0, 0.75));
-        let slow = camera.with_shutter(0.25, 0.75);
-        assert_eq!((time(&slow, 0.0), time(&slow, 0.5), time(&slow, 1.0)), (0.25, 0.5, 0.75));
+        assert_eq!(camera.ray(Vec2::ZERO, [0.5; 2], 0.75).ray.time, 0.75);
     }
 }

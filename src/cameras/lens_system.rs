@@ -82,6 +82,24 @@ pub struct LensSystem {
     pupils: Vec<Pupil>,
 }
 
+/// Light that a lens system transmits along a ray.
+struct Transmitted {
+    /// The ray in front of the lenses, with weight 0.
+    ray: LensRay,
+    /// cos⁴θ/s² of the ray behind the lenses.
+    form_factor: f64,
+    /// Transmission of the stop.
+    transmission: f64,
+}
+
+/// A ray that leaves the front surface.
+struct Exit {
+    p: DVec3,
+    d: DVec3,
+    /// Transmission of the stop.
+    transmission: f64,
+}
+
 impl LensSystem {
     /// Positions the film such that points at `focus_distance` (m, from the film) are in focus near the axis.
     /// `diagonal` is the diagonal of the film (m).
@@ -143,11 +161,11 @@ impl LensSystem {
         let pupil = &self.pupils[((r / self.film_radius * RINGS as f64) as usize).min(RINGS - 1)];
         let u = DVec2::from(u.map(f64::from));
         let size = pupil.max - pupil.min;
-        if let Some((ray, through)) = self.through(film, pupil.min + u * size) {
-            let weight = ray.1 * size.x * size.y * through;
-            return LensRay { o: ray.0.o, d: ray.0.d, weight: weight as f32 };
+        if let Some(Transmitted { ray, form_factor, transmission }) = self.through(film, pupil.min + u * size) {
+            let weight = form_factor * size.x * size.y * transmission;
+            return LensRay { weight: weight as f32, ..ray };
         }
-        let middle = self.through(film, pupil.middle).map(|((ray, _), _)| ray);
+        let middle = self.through(film, pupil.middle).map(|transmitted| transmitted.ray);
         middle.unwrap_or(LensRay { o: Vec3::Z * self.z[0] as f32, d: Vec3::Z, weight: 0.0 })
     }
 
@@ -162,16 +180,16 @@ impl LensSystem {
         (f64::from(cos).powf(1.5) / self.image_distance) as f32
     }
 
-    /// The ray (with weight 0) from a film point through a point of the rear plane; cos⁴θ/s²; and the transmission of
-    /// the stop. `rear` is given for film points on the x axis and is rotated to this one.
-    fn through(&self, film: DVec2, rear: DVec2) -> Option<((LensRay, f64), f64)> {
+    /// The light from a film point through a point of the rear plane. `rear` is given for film points on the x axis and
+    /// is rotated to this one.
+    fn through(&self, film: DVec2, rear: DVec2) -> Option<Transmitted> {
         let r = film.length();
         let axis = if r > 0.0 { film / r } else { DVec2::X };
         let (o, rear) = (film.extend(0.0), axis.rotate(rear).extend(self.rear()));
         let d = (rear - o).normalize();
-        let (p, out, through) = self.trace(o, d)?;
+        let Exit { p, d: out, transmission } = self.trace(o, d)?;
         let ray = LensRay { o: p.as_vec3(), d: out.as_vec3().normalize(), weight: 0.0 };
-        Some(((ray, d.z.powi(4) / (self.rear() * self.rear())), through))
+        Some(Transmitted { ray, form_factor: d.z.powi(4) / (self.rear() * self.rear()), transmission })
     }
 
     /// Distance of the rear surface's vertex from the film.
@@ -179,10 +197,9 @@ impl LensSystem {
         self.z[self.z.len() - 1]
     }
 
-    /// Traces a ray from the film to the front surface. Returns its exit point, its direction, and the transmission of
-    /// the stop.
-    fn trace(&self, mut o: DVec3, mut d: DVec3) -> Option<(DVec3, DVec3, f64)> {
-        let mut through = 1.0;
+    /// Traces a ray from the film to the front surface.
+    fn trace(&self, mut o: DVec3, mut d: DVec3) -> Option<Exit> {
+        let mut transmission = 1.0;
         for (i, element) in self.elements.iter().enumerate().rev() {
             let (z, radius) = (self.z[i], element.curvature_radius);
             let t = if radius == 0.0 { (z - o.z) / d.z } else { at_sphere(o, d, z - radius, radius)? };
@@ -196,8 +213,8 @@ impl LensSystem {
                 return None;
             }
             if radius == 0.0 {
-                through *= self.aperture.at(o.truncate() / element.aperture_radius) * self.aperture_scale;
-                if through == 0.0 {
+                transmission *= self.aperture.at(o.truncate() / element.aperture_radius) * self.aperture_scale;
+                if transmission == 0.0 {
                     return None;
                 }
                 continue;
@@ -208,7 +225,7 @@ impl LensSystem {
             let [from, to] = [element.eta, self.eta_before(i)];
             d = refract(d, if n.dot(d) < 0.0 { n } else { -n }, from.max(1.0) / to)?;
         }
-        Some((o, d, through))
+        Some(Exit { p: o, d, transmission })
     }
 
     /// Index of refraction on the scene side of a surface.

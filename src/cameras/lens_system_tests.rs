@@ -70,7 +70,7 @@ fn samples_have_the_irradiance_of_all_directions() {
             let place = |i: i32| (f64::from(i) + 0.5) * cell - half;
             let points =
                 (0..n * n).filter_map(|k| lens.through(film.as_dvec2(), DVec2::new(place(k % n), place(k / n))));
-            let expected: f64 = points.map(|((_, e), through)| e * through * cell * cell).sum();
+            let expected: f64 = points.map(|t| t.form_factor * t.transmission * cell * cell).sum();
             let mut stream = pcg32([4, 5, film.x.to_bits()]);
             let samples = 100_000;
             let of = |_| f64::from(lens.sample(film, stream.random::<[f32; 2]>()).weight);

@@ -135,3 +135,27 @@ impl Candidates {
         self.contributions.extend(self.records.iter().map(|c| c.f * factor(c)));
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use lumiris_numbers::math::Vec3;
+
+    fn candidate(drawn: Drawn) -> Candidate {
+        let segment = Ray { o: Vec3::ZERO, d: Vec3::Z, t_max: 1.0, time: 0.0 };
+        let (f, li, light) = (Rgb::WHITE, Rgb::WHITE, 0);
+        let (p_light, p_bsdf, n_light, n_bsdf) = (0.5, 2.0, 3.0, 1.0);
+        Candidate { point: 0, drawn, f, li, light, p_light, p_bsdf, n_light, n_bsdf, p_lobe: 0.0, group: 0, segment }
+    }
+
+    #[test]
+    fn mis_weights_of_both_techniques_sum_to_one_and_delta_samples_have_the_weight_one() {
+        for heuristic in [Heuristic::Balance, Heuristic::Power] {
+            // A factor is w/(n·p)
+            let [light, bsdf] = [Drawn::Light, Drawn::Bsdf].map(|drawn| candidate(drawn).factor(heuristic));
+            assert!((light * 3.0 * 0.5 + bsdf * 1.0 * 2.0 - 1.0).abs() < 1e-6, "{heuristic:?}");
+            assert!((candidate(Drawn::DeltaLight).factor(heuristic) - 1.0 / 1.5).abs() < 1e-6);
+            assert!((candidate(Drawn::DeltaBsdf).factor(heuristic) - 1.0 / 2.0).abs() < 1e-6);
+        }
+    }
+}

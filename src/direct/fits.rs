@@ -1,6 +1,6 @@
 //! Per-pixel state of estimators: coefficients fitted to earlier estimates, or sums of control variates.
 
-use crate::film::exact::FixedSum;
+use crate::film::fixed_sums::FixedSum;
 use crate::film::packed::PackedRows;
 use lumiris_numbers::estimators::ocv::NormalEquations;
 

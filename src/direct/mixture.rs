@@ -178,3 +178,52 @@ pub(super) fn draw_groups(
     mixture.failed = n - first;
     mixture
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::direct::candidates::Drawn;
+    use lumiris_numbers::math::{Ray, Rgb};
+
+    /// Two lobes, and two light groups with 3 light samples.
+    fn mixture() -> Mixture {
+        let mut integrals = [0.0; MAX_COMPONENTS];
+        integrals[..4].copy_from_slice(&[0.25, 0.75, 0.5, 0.5]);
+        let zero_valued = [0; MAX_COMPONENTS];
+        Mixture { integrals, zero_valued, failed: 0, n: 4.0, n_light: 3.0, n_bsdf: 1.0, lobes: MAX_LOBES }
+    }
+
+    #[test]
+    fn columns_weighted_by_their_shares_sum_to_one() {
+        let mixture = mixture();
+        assert_eq!([mixture.lobe(0.2), mixture.lobe(0.3), mixture.component(1)], [0, 1, 3]);
+        let candidate = |p_light, p_bsdf, p_lobe| Candidate {
+            point: 0,
+            drawn: Drawn::Light,
+            f: Rgb::WHITE,
+            li: Rgb::WHITE,
+            light: 0,
+            p_light,
+            p_bsdf,
+            n_light: 3.0,
+            n_bsdf: 1.0,
+            p_lobe,
+            group: 1,
+            segment: Ray { o: Vec3::ZERO, d: Vec3::Z, t_max: 1.0, time: 0.0 },
+        };
+
+        // (n_B/N) Σ_lobes r_j + (n_L/N) Σ_groups r_j = 1
+        for (p_light, p_bsdf, p_lobe, components) in
+            [(0.5, 2.0, 0.5, &[0, 1, 3][..]), (0.5, 2.0, 2.0, &[0, 3]), (0.0, 2.0, 0.0, &[1]), (0.5, 0.0, 0.0, &[3])]
+        {
+            let columns = mixture.columns(&candidate(p_light, p_bsdf, p_lobe));
+            let share = |component: usize| if component < MAX_LOBES { 0.25 } else { 0.75 };
+            let sum: f32 = columns.as_slice().iter().map(|&(component, r)| share(component) * r).sum();
+            assert!((sum - 1.0).abs() < 1e-6, "{columns:?}");
+            let found: Vec<usize> = columns.as_slice().iter().map(|(component, _)| *component).collect();
+            assert_eq!(found, components);
+        }
+        assert!(mixture.columns(&candidate(0.0, 0.0, 0.0)).as_slice().is_empty());
+        assert_eq!([0, 3].map(|component| mixture.zero_column(component)), [4.0, 4.0 / 3.0]);
+    }
+}

@@ -138,3 +138,27 @@ impl Segments {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use lumiris_numbers::math::Vec3;
+
+    #[test]
+    fn free_segments_add_their_contributions_to_their_points() {
+        let mut segments = Segments::default();
+        let ray = Ray { o: Vec3::ZERO, d: Vec3::Z, t_max: 1.0, time: 0.0 };
+        for (point, value) in [(0, 1.0), (0, 2.0), (2, 4.0)] {
+            segments.push(&ray, point, 0, Rgb::splat(value));
+        }
+        segments.occluded = vec![false, true, false];
+        let mut out = [Rgb::BLACK; 3];
+        segments.resolve(&mut out);
+        assert_eq!(out.map(|l| l.r), [1.0, 0.0, 4.0]);
+
+        // Candidates without a contribution have no segment, and are not free
+        let contributions = [0.0, 1.0, f32::NAN, 2.0, 4.0].map(Rgb::splat);
+        let are_free: Vec<bool> = segments.are_free(&contributions).collect();
+        assert_eq!(are_free, [false, true, false, false, true]);
+    }
+}

@@ -1,7 +1,7 @@
 //! Exact sums over the samples of a pixel. They do not depend, bit for bit, on the order of the samples and their
 //! division over passes, processes and machines. [`PixelSums`] has their values as floating-point numbers.
 
-use super::exact::{FixedSum, LIMIT, SquareSum, UnitSum};
+use super::fixed_sums::{FixedSum, LIMIT, SquareSum, UnitSum};
 use super::pixel::{PixelSample, PixelSums};
 use lumiris_lanes::level;
 use lumiris_lanes::sums::{self, Sums, TERM, Term};

@@ -5,8 +5,8 @@
 //! number of pairs of zero bytes below them. A signed number is doubled, and odd if negative.
 
 use super::accumulator::{PixelAccumulator, RadianceAccumulator};
-use super::exact::{FixedSum, SquareSum, UnitSum};
-use super::layers::LightSums;
+use super::fixed_sums::{FixedSum, SquareSum, UnitSum};
+use super::layers::PixelLight;
 use super::replicas::ReplicaAccumulator;
 
 /// Appends numbers to a byte vector.
@@ -78,9 +78,9 @@ impl Encoder {
     }
 
     /// The pixels of a layer that have light, in order.
-    pub fn light(&mut self, pixels: &[(u32, LightSums)]) {
+    pub fn light(&mut self, pixels: &[PixelLight]) {
         self.count(pixels.len() as u32);
-        for (pixel, sums) in pixels {
+        for PixelLight { pixel, sums } in pixels {
             self.count(*pixel);
             sums.iter().for_each(|sum| self.fixed(sum));
         }
@@ -149,12 +149,13 @@ impl<'a> Decoder<'a> {
     }
 
     /// The pixels of a layer that have light, in order; a tile has `area` pixels.
-    pub fn light(&mut self, area: usize) -> Option<Vec<(u32, LightSums)>> {
+    pub fn light(&mut self, area: usize) -> Option<Vec<PixelLight>> {
         let count = self.count().filter(|&count| count as usize <= area)?;
-        let mut pixel = || Some((self.count()?, [self.fixed()?, self.fixed()?, self.fixed()?]));
+        let mut pixel =
+            || Some(PixelLight { pixel: self.count()?, sums: [self.fixed()?, self.fixed()?, self.fixed()?] });
         let pixels = (0..count).map(|_| pixel()).collect::<Option<Vec<_>>>()?;
-        let is_in_order = pixels.windows(2).all(|pair| pair[0].0 < pair[1].0);
-        (is_in_order && pixels.last().is_none_or(|(last, _)| (*last as usize) < area)).then_some(pixels)
+        let is_in_order = pixels.windows(2).all(|pair| pair[0].pixel < pair[1].pixel);
+        (is_in_order && pixels.last().is_none_or(|last| (last.pixel as usize) < area)).then_some(pixels)
     }
 
     fn unit(&mut self) -> Option<UnitSum> {

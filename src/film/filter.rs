@@ -165,23 +165,30 @@ enum AxisSampler {
     Table { r: f32, distribution: PiecewiseConstant1D, is_negative: Vec<bool>, weight: f32 },
 }
 
-impl AxisSampler {
-    /// Offset and weight.
-    #[inline]
-    fn sample(&self, u: f32) -> (f32, f32) {
-        match self {
-            AxisSampler::Point => (0.0, 1.0),
-            AxisSampler::Box { r } => ((2.0 * u - 1.0) * r, 1.0),
-            AxisSampler::Tent { r } => (sample_tent(u, *r), 1.0),
-            AxisSampler::Table { r, distribution, is_negative, weight } => match distribution.sample(u) {
-                Some(s) => ((2.0 * s.x - 1.0) * r, if is_negative[s.index] { -weight } else { *weight }),
-                None => (0.0, 1.0),
-            },
-        }
-    }
+/// A sample of a filter along one axis.
+struct AxisSample {
+    offset: f32,
+    weight: f32,
 }
 
 impl AxisSampler {
+    #[inline]
+    fn sample(&self, u: f32) -> AxisSample {
+        let with_weight_one = |offset| AxisSample { offset, weight: 1.0 };
+        match self {
+            AxisSampler::Point => with_weight_one(0.0),
+            AxisSampler::Box { r } => with_weight_one((2.0 * u - 1.0) * r),
+            AxisSampler::Tent { r } => with_weight_one(sample_tent(u, *r)),
+            AxisSampler::Table { r, distribution, is_negative, weight } => match distribution.sample(u) {
+                Some(s) => AxisSample {
+                    offset: (2.0 * s.x - 1.0) * r,
+                    weight: if is_negative[s.index] { -weight } else { *weight },
+                },
+                None => with_weight_one(0.0),
+            },
+        }
+    }
+
     fn radius(&self) -> f32 {
         match self {
             AxisSampler::Point => 0.0,
@@ -220,8 +227,8 @@ impl FilterSampler {
     /// The position for two uniform numbers in [0, 1).
     #[inline]
     pub fn sample(&self, u: [f32; 2]) -> FilterSample {
-        let ((x, wx), (y, wy)) = (self.x.sample(u[0]), self.y.sample(u[1]));
-        FilterSample { offset: Vec2::new(x, y), weight: wx * wy }
+        let (x, y) = (self.x.sample(u[0]), self.y.sample(u[1]));
+        FilterSample { offset: Vec2::new(x.offset, y.offset), weight: x.weight * y.weight }
     }
 
     /// The filter sampled by [`Self::sample`], normalised, at an offset from the centre of the pixel. For filters

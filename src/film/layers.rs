@@ -4,13 +4,37 @@
 //! Any other is a block: a bit per pixel that tells if there is light, then the columns of these pixels as in
 //! [`super::packed`].
 
-use super::exact::{FixedSum, LIMIT};
+use super::fixed_sums::{FixedSum, LIMIT};
 use super::packed::{PADDING, Reader, pack_column, replace};
 use lumiris_numbers::math::Rgb;
 use std::ops::Range;
 
 /// Σ radiance of a pixel.
 pub type LightSums = [FixedSum; 3];
+
+/// The radiance of a layer in a sample.
+#[derive(Clone, Copy, Debug)]
+pub struct LayerSample {
+    /// Index of the pixel.
+    pub pixel: u32,
+    /// Radiance.
+    pub radiance: Rgb,
+}
+
+/// The sums of a layer in a pixel.
+#[derive(Clone, Copy, Debug)]
+pub struct PixelLight {
+    /// Index of the pixel.
+    pub pixel: u32,
+    /// Sums of the radiance.
+    pub sums: LightSums,
+}
+
+impl PixelLight {
+    fn black(pixel: usize) -> Self {
+        PixelLight { pixel: pixel as u32, sums: LightSums::default() }
+    }
+}
 
 /// Packed layers of a tile; see the module.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -50,11 +74,10 @@ impl PackedLayers {
         size_of_val(&self.blocks[..]) + self.blocks.iter().map(Vec::capacity).sum::<usize>()
     }
 
-    /// Adds the radiance of samples, given with the indices of their pixels. Radiance that is not finite, or beyond
-    /// [`LIMIT`], counts as black.
-    pub fn add(&mut self, layer: usize, samples: &[(u32, Rgb)], scratch: &mut LayerScratch) {
+    /// Adds the radiance of samples. Radiance that is not finite, or beyond [`LIMIT`], counts as black.
+    pub fn add(&mut self, layer: usize, samples: &[LayerSample], scratch: &mut LayerScratch) {
         self.change(layer, scratch, |sums| {
-            for &(pixel, radiance) in samples {
+            for &LayerSample { pixel, radiance } in samples {
                 let channels = radiance.to_array();
                 // False for NaN
                 if channels.iter().all(|value| value.abs() < LIMIT) {
@@ -65,9 +88,9 @@ impl PackedLayers {
     }
 
     /// Adds the sums of some pixels.
-    pub fn merge(&mut self, layer: usize, pixels: &[(u32, LightSums)], scratch: &mut LayerScratch) {
+    pub fn merge(&mut self, layer: usize, pixels: &[PixelLight], scratch: &mut LayerScratch) {
         self.change(layer, scratch, |sums| {
-            for (pixel, more) in pixels {
+            for PixelLight { pixel, sums: more } in pixels {
                 sums[*pixel as usize].iter_mut().zip(more).for_each(|(sum, more)| sum.merge(more));
             }
         });
@@ -101,24 +124,24 @@ impl PackedLayers {
     pub fn read(&self, layer: usize, pixels: Range<usize>, out: &mut [LightSums]) {
         out.fill(LightSums::default());
         let start = pixels.start;
-        self.lit(layer, pixels).into_iter().for_each(|(pixel, sums)| out[pixel as usize - start] = sums);
+        self.lit(layer, pixels).into_iter().for_each(|lit| out[lit.pixel as usize - start] = lit.sums);
     }
 
     /// Those of the given pixels that have light in a layer, in order.
-    pub fn lit(&self, layer: usize, pixels: Range<usize>) -> Vec<(u32, LightSums)> {
+    pub fn lit(&self, layer: usize, pixels: Range<usize>) -> Vec<PixelLight> {
         // Their bits
         let block = &self.blocks[layer];
         let Some((mask, _)) = block.split_at_checked(mask_bytes(self.pixels)).filter(|_| !block.is_empty()) else {
             return Vec::new();
         };
         let is_lit = |pixel: &usize| mask[pixel / 8] >> (pixel % 8) & 1 == 1;
-        let mut lit: Vec<_> = pixels.clone().filter(is_lit).map(|pixel| (pixel as u32, LightSums::default())).collect();
+        let mut lit: Vec<_> = pixels.clone().filter(is_lit).map(PixelLight::black).collect();
 
         // Their sums
         let count: usize = mask.iter().map(|bits| bits.count_ones() as usize).sum();
         let first = (0..pixels.start).filter(is_lit).count();
         let mut reader = Reader { bytes: block, len: count, pixels: first..first + lit.len(), at: mask.len() };
-        (0..3).for_each(|c| reader.column(|i, bits| lit[i].1[c] = FixedSum::from_bits(bits)));
+        (0..3).for_each(|c| reader.column(|i, bits| lit[i].sums[c] = FixedSum::from_bits(bits)));
         lit
     }
 }
@@ -149,9 +172,10 @@ mod tests {
             };
             let values: Vec<Rgb> = (0..300).map(|_| Rgb::new(value(), value(), value())).collect();
             let samples = values.into_iter().take(1 + s.random::<u32>() as usize % 300);
-            let samples: Vec<_> = samples.map(|value| (s.random::<u32>() % pixels as u32, value)).collect();
-            samples.iter().for_each(|&(pixel, value)| {
-                dense[layer][pixel as usize].add(value);
+            let samples: Vec<_> =
+                samples.map(|radiance| LayerSample { pixel: s.random::<u32>() % pixels as u32, radiance }).collect();
+            samples.iter().for_each(|sample| {
+                dense[layer][sample.pixel as usize].add(sample.radiance);
             });
             layers.add(layer, &samples, &mut scratch);
 
@@ -182,10 +206,11 @@ mod tests {
         assert!(least <= 100 * 256 / 8, "{least} bytes");
         let mut scratch = LayerScratch::default();
         let light = Rgb::splat(0.5);
-        layers.add(3, &[(9, Rgb::BLACK), (9, Rgb::splat(f32::NAN))], &mut scratch);
-        layers.add(5, &[(9, light), (9, light * -1.0)], &mut scratch);
+        let at_9 = |radiance| LayerSample { pixel: 9, radiance };
+        layers.add(3, &[at_9(Rgb::BLACK), at_9(Rgb::splat(f32::NAN))], &mut scratch);
+        layers.add(5, &[at_9(light), at_9(light * -1.0)], &mut scratch);
         assert_eq!(layers, PackedLayers::new(100, 256));
-        layers.add(7, &[(9, light)], &mut scratch);
+        layers.add(7, &[at_9(light)], &mut scratch);
         assert!(layers.bytes() < least + 200);
         assert!((0..100).all(|layer| layers.lit(layer, 0..256).len() == usize::from(layer == 7)));
     }

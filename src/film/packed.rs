@@ -8,7 +8,7 @@
 //! A tile is unpacked while samples are added to it, and packed again afterwards.
 
 use super::accumulator::PixelAccumulator;
-use super::exact::{FixedSum, SquareSum, UnitSum};
+use super::fixed_sums::{FixedSum, SquareSum, UnitSum};
 use std::ops::Range;
 
 /// Padding after the last column (bytes), since values are read eight or sixteen bytes at a time.
@@ -286,26 +286,38 @@ pub(super) struct Reader<'a> {
     pub(super) at: usize,
 }
 
+/// Header of a column.
+struct ColumnHead {
+    /// Number of common trailing zeros.
+    zeros: usize,
+    /// Bytes per value.
+    width: usize,
+    /// Minimum.
+    least: i128,
+    /// Position of the first value.
+    start: usize,
+}
+
 impl Reader<'_> {
     fn byte(&mut self) -> usize {
         self.at += 1;
         self.bytes[self.at - 1].into()
     }
 
-    /// Header of a column: number of common trailing zeros, bytes per value, minimum, and position of the first value.
-    fn head(&mut self) -> (usize, usize, i128, usize) {
+    /// Reads the header of a column, and continues after the column.
+    fn head(&mut self) -> ColumnHead {
         let (zeros, width, head) = (self.byte(), self.byte(), self.byte());
         let mut least = [0; 16];
         least[..head].copy_from_slice(&self.bytes[self.at..self.at + head]);
         let start = self.at + head + width * self.pixels.start;
         self.at += head + width * self.len;
-        (zeros, width, i128::from_le_bytes(least), start)
+        ColumnHead { zeros, width, least: i128::from_le_bytes(least), start }
     }
 
     /// Passes the values of a column of 64-bit numbers to `set`.
     #[inline(always)]
     fn narrow(&mut self, mut set: impl FnMut(usize, i64)) {
-        let (zeros, width, least, start) = self.head();
+        let ColumnHead { zeros, width, least, start } = self.head();
         let least = least as i64;
         if width == 0 {
             return (0..self.pixels.len()).for_each(|i| set(i, least));
@@ -319,7 +331,7 @@ impl Reader<'_> {
     /// Passes the values of a column of 128-bit numbers to `set`.
     #[inline(always)]
     pub(super) fn column(&mut self, mut set: impl FnMut(usize, i128)) {
-        let (zeros, width, least, start) = self.head();
+        let ColumnHead { zeros, width, least, start } = self.head();
         let count = self.pixels.len();
         let value = |rest: u128| least.wrapping_add((rest << zeros) as i128);
 

@@ -62,7 +62,7 @@ pub struct PixelSums {
     pub material: u32,
     /// Geometry index of that sample, plus one; 0 if there is none.
     pub object: u32,
-    /// Samples with a radiance that is not finite, or beyond [`LIMIT`](super::exact::LIMIT). They count as black.
+    /// Samples with a radiance that is not finite, or beyond [`LIMIT`](super::fixed_sums::LIMIT). They count as black.
     pub invalid: u64,
     /// Records of the irradiance cache requested by this pixel.
     pub records: u32,

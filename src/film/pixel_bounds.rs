@@ -70,7 +70,7 @@ impl PixelBounds {
 
     /// Ranges of indices of the common pixels of two rectangles, in each of them, a row at a time. Indices count row by
     /// row.
-    pub fn common_rows(&self, other: &PixelBounds) -> impl Iterator<Item = (Range<usize>, Range<usize>)> + use<> {
+    pub fn common_rows(&self, other: &PixelBounds) -> impl Iterator<Item = [Range<usize>; 2]> + use<> {
         let (a, b) = (*self, *other);
         let (x0, x1) = (a.x0.max(b.x0), a.x1.min(b.x1));
         let row = move |of: &PixelBounds, y: u32| {
@@ -78,7 +78,7 @@ impl PixelBounds {
             first + (x0 - of.x0) as usize..first + (x1 - of.x0) as usize
         };
         let rows = if x0 < x1 { a.y0.max(b.y0)..a.y1.min(b.y1) } else { 0..0 };
-        rows.map(move |y| (row(&a, y), row(&b, y)))
+        rows.map(move |y| [row(&a, y), row(&b, y)])
     }
 }
 

@@ -9,7 +9,7 @@
 //! the spread of its samples.
 
 use super::accumulator::RadianceAccumulator;
-use super::exact::{LIMIT, SquareSum};
+use super::fixed_sums::{LIMIT, SquareSum};
 use super::pixel::{PixelSample, PixelSums};
 use super::pixel_bounds::PixelBounds;
 use lumiris_numbers::math::hash::pcg4d;

@@ -1,6 +1,6 @@
 //! Statistics of a film, joined from bands of rows.
 
-use super::noise::{Block, Noise};
+use super::image_noise::{Block, Noise};
 use super::pixel::PixelSums;
 
 /// Statistics of a film.

@@ -1,9 +1,9 @@
 //! The film: tiles of packed sums, read by rows.
 
 use super::accumulator::PixelAccumulator;
-use super::exact::FixedSum;
+use super::fixed_sums::FixedSum;
+use super::image_noise;
 use super::layers::{LightSums, PackedLayers};
-use super::noise;
 use super::packed::PackedSums;
 use super::pixel::PixelSums;
 use super::pixel_bounds::PixelBounds;
@@ -15,7 +15,7 @@ use std::ops::Range;
 use std::sync::{Arc, OnceLock};
 
 /// Number of rows that are read together: the height of a noise block.
-pub const BAND: u32 = noise::BLOCK;
+pub const BAND: u32 = image_noise::BLOCK;
 
 /// A tile of a film: its pixels, row by row.
 #[derive(Clone, Debug)]
@@ -201,8 +201,11 @@ impl Film {
             self.variance_scale();
             let bands = self.bands().map_init(Default::default, |(pixels, variances), rows| {
                 self.read_rows_with_variances(rows.clone(), pixels, variances);
-                let blocks =
-                    noise::of_blocks(&PixelBounds { y0: rows.start, y1: rows.end, ..self.bounds }, pixels, variances);
+                let blocks = image_noise::of_blocks(
+                    &PixelBounds { y0: rows.start, y1: rows.end, ..self.bounds },
+                    pixels,
+                    variances,
+                );
                 BandSummary::new(pixels, blocks)
             });
             BandSummary::of_all(&bands.collect::<Vec<_>>())

@@ -1,6 +1,6 @@
 //! Camera samples: film positions with their rays and random numbers.
 
-use super::path::CameraSample;
+use super::camera_sample::CameraSample;
 use super::{light_paths, reuse};
 use crate::cameras::CameraRay;
 use crate::direct::Estimator;
@@ -195,7 +195,7 @@ impl<'a> CameraSampler<'a> {
     fn append(&self, o: Vec3, seed: u32, scratch: &Scratch, out: &mut Vec<CameraSample>) {
         let Scratch { pixels, streams, weight, d, spread, .. } = scratch;
         let scene = &self.job.world.scene;
-        let ray = Ray { o, d: Vec3::ZERO, t_max: f32::INFINITY, time: scene.camera.time(0.0) };
+        let ray = Ray { o, d: Vec3::ZERO, t_max: f32::INFINITY, time: 0.0 };
         let ray = CameraRay { ray, spread: 0.0, width0: 0.0, weight: 1.0 };
         let (mut first, [dx, dy, dz]) = (0, d.get(padded(streams.len())));
         for &PixelSampleRange { fit, pixel, ref samples } in pixels {

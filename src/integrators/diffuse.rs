@@ -21,11 +21,11 @@ pub(super) fn shade<'w>(
     let shading = |v: PathVertex<'_, 'w>| {
         let (path, bsdf) = (v.path, v.point.bsdf);
         let all = Some(bsdf);
-        let known = bsdf.lambertian(v.point.wo).and_then(|part| Some((reflected(&v, &part)?, part.rest)));
-        let Some((known, rest)) = known else { return Shading { lit: all, next: all } };
-        out[path.sample as usize].radiance += path.beta * known;
+        let looked_up = bsdf.lambertian(v.point.wo).and_then(|part| Some((reflected(&v, &part)?, part.rest)));
+        let Some((reflected, rest)) = looked_up else { return Shading { direct: all, next: all } };
+        out[path.sample as usize].radiance += path.beta * reflected;
         let rest = rest.map(|rest| SurfaceBsdf { bsdf: rest, ..bsdf });
-        Shading { lit: if includes_direct { rest } else { all }, next: rest }
+        Shading { direct: if includes_direct { rest } else { all }, next: rest }
     };
     found.each().map(shading).collect()
 }

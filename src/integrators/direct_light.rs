@@ -1,8 +1,8 @@
 //! Direct light at path vertices: in columns for `mc`, `mis` and `ocv --ocv pixels`, in stages for all other
 //! estimators.
 
-use super::path::{Outcome, PathTracer, Step};
-use super::vertices::VertexSearch;
+use super::path::{Outcome, PathTracer, ShadeStep};
+use super::vertex_search::VertexSearch;
 use crate::direct::columns::{SampleOnLight, Sinks, VisibleSample, WeightAgainstLightPaths};
 use crate::direct::shadow_segments::SegmentOutcome;
 use crate::direct::{Fits, ShadingPoint, Techniques, Vertices};
@@ -12,17 +12,23 @@ use std::time::Instant;
 
 impl PathTracer {
     /// Adds the direct light at vertices.
-    pub(super) fn light(&mut self, step: &Step<'_>, vertices: &Vertices<'_>, fits: &mut Fits, out: &mut [PixelSample]) {
+    pub(super) fn add_direct_light(
+        &mut self,
+        step: &ShadeStep<'_>,
+        vertices: &Vertices<'_>,
+        fits: &mut Fits,
+        out: &mut [PixelSample],
+    ) {
         match &step.techniques {
-            Some(techniques) => self.light_columns(step, techniques, vertices, fits, out),
-            None => self.light_points(step, vertices, fits, out),
+            Some(techniques) => self.add_in_columns(step, techniques, vertices, fits, out),
+            None => self.add_at_points(step, vertices, fits, out),
         }
     }
 
     /// Adds the direct light by estimators that trace all their samples.
-    fn light_columns(
+    fn add_in_columns(
         &mut self,
-        step: &Step<'_>,
+        step: &ShadeStep<'_>,
         techniques: &Techniques,
         vertices: &Vertices<'_>,
         fits: &mut Fits,
@@ -36,7 +42,7 @@ impl PathTracer {
         let against_light_paths = guide.as_ref().map(|guide| {
             move |&SampleOnLight { row, light, n, wi }: &SampleOnLight| {
                 let chain = path(row).chain;
-                if chain.is_caustic() { chain.rest(guide.density(light, n, -wi)) } else { 1.0 }
+                if chain.is_caustic() { chain.camera_weight(guide.density(light, n, -wi)) } else { 1.0 }
             }
         });
         let are_kept = layers.are_kept();
@@ -69,7 +75,13 @@ impl PathTracer {
     }
 
     /// Adds the direct light by estimators that select among their samples.
-    fn light_points(&mut self, step: &Step<'_>, vertices: &Vertices<'_>, fits: &mut Fits, out: &mut [PixelSample]) {
+    fn add_at_points(
+        &mut self,
+        step: &ShadeStep<'_>,
+        vertices: &Vertices<'_>,
+        fits: &mut Fits,
+        out: &mut [PixelSample],
+    ) {
         let (job, active) = (step.job, &self.search.active);
         // Points in the order of the paths, since fits are sums over the points of a pixel
         let mut rows = vec![u32::MAX; active.len()];

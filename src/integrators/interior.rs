@@ -13,8 +13,9 @@
 //! continues from event n to n + 1 with probability √(1 − 1/n) balances cost and weight: the means of both grow like
 //! log n.
 
-use super::segment::{BsdfTechnique, PathState, domain};
-use super::vertices::{Flown, Stage, VertexSearch};
+use super::domain;
+use super::segment::{BsdfTechnique, PathState};
+use super::vertex_search::{FlightOutcome, TraceStep, VertexSearch};
 use crate::accel::Hit;
 use crate::bsdfs::dielectric::{Select, Transport};
 use crate::bsdfs::fresnel::fr_dielectric;
@@ -42,12 +43,12 @@ impl VertexSearch {
     /// Samples the free flight of a path through an interior, up to the hit of its ray.
     pub(super) fn walk(
         &mut self,
-        at: &Stage<'_, '_>,
+        at: &TraceStep<'_, '_>,
         medium: &Medium,
         index: u32,
         path: &mut PathState,
         hit: Option<&Hit>,
-    ) -> Flown {
+    ) -> FlightOutcome {
         let scale = path.ray.d.length();
         let (o, d) = (path.ray.o, path.ray.d / scale);
         let segment = Segment { o, d, length: hit.map_or(f32::INFINITY, |hit| hit.t * scale) };
@@ -57,7 +58,7 @@ impl VertexSearch {
         let (t, weight) = match end {
             End::Through { weight } => {
                 path.weaken(weight);
-                return Flown::Through;
+                return FlightOutcome::Through;
             }
             End::Scattered { t, weight } => (t, weight),
         };
@@ -69,14 +70,14 @@ impl VertexSearch {
             *path = next;
             self.passing.push(index);
         }
-        Flown::Ended
+        FlightOutcome::Ended
     }
 
     /// Scatters a path in an interior, after the distance `t` in the direction `d` and with the throughput factor
     /// `weight`.
     fn scatter_inside(
         &self,
-        at: &Stage<'_, '_>,
+        at: &TraceStep<'_, '_>,
         path: &PathState,
         d: Vec3,
         t: f32,
@@ -92,9 +93,9 @@ impl VertexSearch {
 
     /// The BSDF of a path at a surface; the throughput is divided by the probability of the choice. Returns `None` if the
     /// boundary reflects a path back into its interior; the path is then queued for the next trace.
-    pub(super) fn leave<'w>(
+    pub(super) fn exit_or_reflect<'w>(
         &mut self,
-        at: &Stage<'_, '_>,
+        at: &TraceStep<'_, '_>,
         index: u32,
         path: &mut PathState,
         interaction: &SurfaceInteraction,
@@ -135,7 +136,7 @@ impl VertexSearch {
     }
 
     /// Random numbers of the event at the end of a flight.
-    fn walk_numbers(&self, at: &Stage<'_, '_>, path: &PathState) -> [f32; 3] {
+    fn walk_numbers(&self, at: &TraceStep<'_, '_>, path: &PathState) -> [f32; 3] {
         let stream = at.samples[path.sample as usize].stream;
         stream.domain(domain::WALK + at.vertex).domain(path.passed).draw::<3>()
     }
@@ -165,4 +166,44 @@ fn survive(beta: Rgb, path: &PathState, u: f32) -> Option<Rgb> {
     let by_number = if events < MANY_EVENTS { 1.0 } else { (1.0 - 1.0 / events as f32).sqrt() };
     let survival = by_throughput.min(1.0) * by_number;
     (u < survival).then(|| beta / survival)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::integrators::light_paths::Chain;
+
+    #[test]
+    fn roulette_of_walks_keeps_the_mean_of_the_throughput() {
+        let ray = Ray { o: Vec3::ZERO, d: Vec3::Z, t_max: f32::INFINITY, time: 0.0 };
+        let path = |passed| PathState {
+            sample: 0,
+            ray,
+            beta: Rgb::WHITE,
+            eta_scale: 2.0,
+            width: 0.0,
+            spread: 0.0,
+            passed,
+            travelled: 0.0,
+            technique: None,
+            medium: None,
+            wavelength: None,
+            is_ghost: false,
+            chain: Chain::NONE,
+        };
+        let mean = |beta: Rgb, passed| {
+            let survivors = (0..1000).filter_map(|i| survive(beta, &path(passed), (i as f32 + 0.5) / 1000.0));
+            survivors.fold([0.0, 0.0], |[count, sum], survivor| [count + 1.0, sum + survivor.r / 1000.0])
+        };
+
+        // No roulette in the first events, then by 2·β, then also by the number of events
+        let dim = Rgb::splat(0.1);
+        for (passed, share) in
+            [(FREE_EVENTS - 1, 1.0), (FREE_EVENTS, 0.2), (MANY_EVENTS, 0.2 * (1.0 - 1.0 / 1024.0_f32).sqrt())]
+        {
+            let [count, sum] = mean(dim, passed);
+            assert!((count / 1000.0 - share).abs() <= 1e-3 && (sum / 0.1 - 1.0).abs() < 0.01, "{passed} {count} {sum}");
+        }
+        assert_eq!(survive(Rgb::BLACK, &path(0), 0.0), None);
+    }
 }

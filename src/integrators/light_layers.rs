@@ -4,7 +4,7 @@
 //! exception is a ray that escapes, which receives the sum of all infinite lights; this radiance is divided among them
 //! in proportion to their emission.
 
-use super::features::{self, Feature};
+use super::exclusions::{self, Feature};
 use crate::accel::Hit;
 use crate::lights::{LightId, LightSampling};
 use crate::scene::RenderJob;
@@ -12,7 +12,7 @@ use lumiris_numbers::math::{Rgb, Vec3};
 
 /// Names of the light-group layers of the image.
 pub fn names(job: &RenderJob) -> &[String] {
-    let is_kept = job.settings().integrator.light_groups && features::allows(job, Feature::LightGroups);
+    let is_kept = job.settings().integrator.light_groups && exclusions::allows(job, Feature::LightGroups);
     if is_kept { job.lights.layers.names() } else { &[] }
 }
 
@@ -68,26 +68,31 @@ impl LayerSums {
         &self.entries
     }
 
-    /// The index of a sum, and the sum unless it is black.
+    /// Position of a sum in `indices`.
     #[inline]
-    fn find(&self, sample: u32, layer: u32) -> (usize, Option<usize>) {
-        let at = sample as usize * self.layers + layer as usize;
-        let index = self.indices[at] as usize;
-        let is_here = self.entries.get(index).is_some_and(|entry| (entry.sample, entry.layer) == (sample, layer));
-        (at, is_here.then_some(index))
+    fn position(&self, sample: u32, layer: u32) -> usize {
+        sample as usize * self.layers + layer as usize
+    }
+
+    /// Index of the entry of a sum, unless it is black.
+    #[inline]
+    fn find(&self, sample: u32, layer: u32) -> Option<usize> {
+        let index = self.indices[self.position(sample, layer)] as usize;
+        let is_here = |entry: &LayerSum| (entry.sample, entry.layer) == (sample, layer);
+        self.entries.get(index).is_some_and(is_here).then_some(index)
     }
 
     /// The sum of a layer in a sample.
     pub fn of(&self, sample: u32, layer: u32) -> Rgb {
-        self.find(sample, layer).1.map_or(Rgb::BLACK, |index| self.entries[index].radiance)
+        self.find(sample, layer).map_or(Rgb::BLACK, |index| self.entries[index].radiance)
     }
 
     /// The sum of a layer in a sample, to be changed.
     #[inline]
     pub fn at(&mut self, sample: u32, layer: u32) -> &mut Rgb {
-        let (at, index) = self.find(sample, layer);
-        let index = index.unwrap_or_else(|| {
-            self.indices[at] = self.entries.len() as u32;
+        let index = self.find(sample, layer).unwrap_or_else(|| {
+            let position = self.position(sample, layer);
+            self.indices[position] = self.entries.len() as u32;
             self.entries.push(LayerSum { sample, layer, radiance: Rgb::BLACK });
             self.entries.len() - 1
         });

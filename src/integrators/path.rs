@@ -11,16 +11,17 @@
 //!
 //! All integrators use this path loop. [`AtVertices`] is the hook for their own work at vertices.
 
+use super::camera_sample::CameraSample;
 use super::cells::Blocks;
+use super::integrator::{Integrator, Tracer};
 use super::light_layers::LayerSums;
 use super::light_paths::{LightImage, LightPilot};
+pub use super::recording::Recording;
 use super::reuse::{self, LambertianVertex, Reuse};
 use super::scatter::{Continuation, Scatter};
-pub use super::segment::{CameraSample, PathStats};
 use super::segment::{LastVertices, PathState};
-pub use super::vertices::Recording;
-use super::vertices::{Stage, VertexSearch};
-use super::{Integrator, Statistics, Tracer};
+use super::statistics::{PathStats, Statistics};
+use super::vertex_search::{TraceStep, VertexSearch};
 use crate::direct::{ColumnDirectLighting, Estimator, Fits, PointDirectLighting, ShadingPoint, Techniques, Vertices};
 use crate::film::{FeatureSet, PixelSample};
 use crate::materials::SurfaceBsdf;
@@ -74,7 +75,7 @@ struct WithLightPaths<'a> {
 impl Tracer for WithLightPaths<'_> {
     fn trace(&mut self, job: &RenderJob, samples: &[CameraSample], fits: &mut Fits, out: &mut Vec<PixelSample>) {
         Tracer::trace(&mut self.paths, job, samples, fits, out);
-        self.light.add(samples.iter().map(|s| (s.pixel, s.share_group, s.is_replica)), out);
+        self.light.add(samples, out);
     }
 
     fn take_stats(&mut self) -> PathStats {
@@ -118,7 +119,7 @@ pub(super) type AtVertices<'s> = dyn for<'w> FnMut(&BatchVertices<'_, 'w>, &mut 
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Shading<'w> {
     /// BSDF of the direct light.
-    pub(super) lit: Option<SurfaceBsdf<'w>>,
+    pub(super) direct: Option<SurfaceBsdf<'w>>,
     /// BSDF of the next segment.
     pub(super) next: Option<SurfaceBsdf<'w>>,
 }
@@ -160,7 +161,7 @@ pub struct PathTracer {
 }
 
 /// Common input of the steps at the vertices of a batch.
-pub(super) struct Step<'s> {
+pub(super) struct ShadeStep<'s> {
     pub(super) job: &'s RenderJob,
     pub(super) settings: &'s IntegratorSettings,
     pub(super) samples: &'s [CameraSample],
@@ -186,13 +187,11 @@ impl PathTracer {
         PathTracer { reuse: Reuse::of(blocks), ..PathTracer::new(features) }
     }
 
-    /// Leaves to light paths their share of the light from now on. `light` gives the pilot and the number of light
-    /// paths per camera sample. The estimates are then less than the radiance. `None`: nothing is left to light paths.
-    pub fn leave(&mut self, job: &RenderJob, light: Option<(&LightPilot, f64)>) {
-        self.search.guide = light.map(|(pilot, per_sample)| {
-            let paths = per_sample * job.world.scene.film.bounds.area() as f64;
-            Arc::new(pilot.guide().with_paths(paths.clamp(1.0, f64::from(u32::MAX)) as u32))
-        });
+    /// Weights the camera paths against light paths from now on, with `per_sample` light paths per camera sample. The
+    /// estimates then lack the contributions of light paths.
+    pub fn weigh_against_light_paths(&mut self, job: &RenderJob, pilot: &LightPilot, per_sample: f64) {
+        let paths = per_sample * job.world.scene.film.bounds.area() as f64;
+        self.search.guide = Some(Arc::new(pilot.guide().with_paths(paths.clamp(1.0, f64::from(u32::MAX)) as u32)));
     }
 
     /// Copies the rays that are traced from now on, for measurements.
@@ -229,7 +228,8 @@ impl PathTracer {
         fits: &mut Fits,
         out: &mut [PixelSample],
     ) {
-        let [mut vertices, mut left, mut lit, mut next] = std::mem::take(&mut self.spare).map(Vertices::emptied);
+        let [mut vertices, mut left, mut of_direct, mut of_next] =
+            std::mem::take(&mut self.spare).map(Vertices::emptied);
         let mut drawn = None;
         let depth = settings.depth();
         // Paths of an integrator with its own work do not carry all light, so they cannot be shared
@@ -243,31 +243,31 @@ impl PathTracer {
 
             // Trace to the vertices, and add β·L_e·w of the emitters that are hit
             let from = LastVertices { vertices: &left, techniques: drawn };
-            self.search.find(Stage { job, vertex, depth, samples, left: from, out, vertices: &mut vertices });
+            self.search.find(TraceStep { job, vertex, depth, samples, left: from, out, vertices: &mut vertices });
             let step = self.step(job, settings, vertex, samples, own.is_some());
 
             // The integrator's own work, and path sharing
-            let (lit, next) = match &mut own {
+            let (of_direct, of_next) = match &mut own {
                 Some(own) => {
-                    self.leave_to_integrator(*own, job, vertex, &vertices, [&mut lit, &mut next], out);
-                    (&lit, &next)
+                    self.leave_to_integrator(*own, job, vertex, &vertices, [&mut of_direct, &mut of_next], out);
+                    (&of_direct, &of_next)
                 }
                 None => (&vertices, &vertices),
             };
             self.share(vertex, &vertices, out);
 
             // Add β·L_d
-            self.light(&step, lit, fits, out);
+            self.add_direct_light(&step, of_direct, fits, out);
 
             // Scatter
-            self.scatter(&step, next);
+            self.scatter(&step, of_next);
             std::mem::swap(&mut left, &mut vertices);
             vertices.clear();
             drawn = step.techniques;
         }
         self.resolve_shared(job, samples, out);
         fits.end_batch(samples.iter().map(|s| (s.fit, s.weight)));
-        self.spare = [vertices, left, lit, next].map(Vertices::emptied);
+        self.spare = [vertices, left, of_direct, of_next].map(Vertices::emptied);
     }
 
     /// The direct-light estimator at vertices of this index, and the continuation of paths.
@@ -278,41 +278,40 @@ impl PathTracer {
         vertex: u32,
         samples: &'s [CameraSample],
         has_own: bool,
-    ) -> Step<'s> {
+    ) -> ShadeStep<'s> {
         let estimator = Estimator::at_vertex(settings, self.estimator_of.unwrap_or(vertex));
         // Light samples do not cover all emission of media: beyond the last vertex it takes another segment
         let beyond_last = job.world.scene.media.is_emissive() && vertex < settings.depth();
         let continues = vertex + 1 < settings.depth() || beyond_last;
         // Only the stages provide outcomes
         let techniques = Techniques::of(&estimator, continues && !has_own).filter(|_| self.outcomes.is_none());
-        Step { job, settings, samples, vertex, estimator, techniques, continues }
+        ShadeStep { job, settings, samples, vertex, estimator, techniques, continues }
     }
 
-    /// Calls the integrator's own work. `rest` becomes the vertices at which direct light is estimated, and the
-    /// vertices from which paths continue.
+    /// Calls the integrator's own work. `of_direct` becomes the vertices at which direct light is estimated, `of_next`
+    /// the vertices from which paths continue.
     fn leave_to_integrator<'w>(
         &self,
         own: &mut AtVertices<'_>,
         job: &'w RenderJob,
         vertex: u32,
         vertices: &Vertices<'w>,
-        rest: [&mut Vertices<'w>; 2],
+        [of_direct, of_next]: [&mut Vertices<'w>; 2],
         out: &mut [PixelSample],
     ) {
-        let [lit, next] = rest;
         let shadings = own(&BatchVertices { vertex, paths: &self.search.active, vertices }, out);
-        lit.clear();
-        lit.select(vertices, &job.lights, |i| shadings[i].lit);
-        next.clear();
-        next.select(vertices, &job.lights, |i| shadings[i].next);
+        of_direct.clear();
+        of_direct.select(vertices, &job.lights, |i| shadings[i].direct);
+        of_next.clear();
+        of_next.select(vertices, &job.lights, |i| shadings[i].next);
     }
 
     /// Samples the next segments of paths.
-    fn scatter(&mut self, step: &Step<'_>, vertices: &Vertices<'_>) {
+    fn scatter(&mut self, step: &ShadeStep<'_>, vertices: &Vertices<'_>) {
         let start = Instant::now();
         self.next.clear();
         if step.continues {
-            let Step { settings, vertex, techniques, .. } = *step;
+            let ShadeStep { settings, vertex, techniques, .. } = *step;
             let how = Continuation { settings, vertex, techniques, only_specular: self.only_specular };
             self.scatter.extend(&how, vertices, &self.search.active, &mut self.next);
         }

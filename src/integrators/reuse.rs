@@ -17,9 +17,10 @@
 //! within [cells](super::cells), which are always rendered together. The sample counts of pixels are independent of the
 //! samples, and so are share groups and blocks.
 
+use super::camera_sample::CameraSample;
 use super::cells::Blocks;
-use super::features::{self, Feature};
-use super::segment::{CameraSample, PathState};
+use super::exclusions::{self, Feature};
+use super::segment::PathState;
 use crate::accel::{Coherence, RayBatch};
 use crate::film::PixelSample;
 use crate::scene::RenderJob;
@@ -36,7 +37,7 @@ const TOGETHER: usize = 16;
 
 /// Edge of the blocks of pixels that share paths; 1 if paths are not shared.
 pub fn edge(job: &RenderJob) -> u32 {
-    if features::allows(job, Feature::Sharing) { job.settings().integrator.path_reuse.unwrap_or(1) } else { 1 }
+    if exclusions::allows(job, Feature::Sharing) { job.settings().integrator.path_reuse.unwrap_or(1) } else { 1 }
 }
 
 /// A Lambertian vertex: point, bound of its rounding error, and geometric and shading normals on the side of the

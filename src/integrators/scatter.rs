@@ -1,6 +1,7 @@
 //! BSDF sampling of the next path segments.
 
-use super::segment::{BsdfTechnique, PathState, domain, survive};
+use super::domain;
+use super::segment::{BsdfTechnique, PathState, survive};
 use crate::bsdfs::Lobe;
 use crate::direct::vertices::BsdfSamples;
 use crate::direct::{Techniques, Vertices};

@@ -1,144 +1,18 @@
 //! The state of a path between two vertices.
 
+use super::domain;
 use super::light_paths::{Chain, Guide};
 use crate::accel::Hit;
-use crate::cameras::CameraRay;
-use crate::direct::{DirectStats, Techniques, Vertices};
+use crate::direct::{Techniques, Vertices};
 use crate::film::{FeatureSet, Features};
 use crate::lights::{LightCtx, LightHit};
 use crate::materials::SurfaceBsdf;
 use crate::media::MediumId;
 use crate::scene::{RenderJob, SurfaceInteraction};
-use crate::settings::{IntegratorSettings, SampleCounts};
+use crate::settings::IntegratorSettings;
 use lumiris_numbers::estimators::mis::Technique;
 use lumiris_numbers::math::{Ray, Rgb};
 use lumiris_numbers::samplers::SampleStream;
-use std::iter::Sum;
-use std::time::Duration;
-
-/// Random-number domains of a path vertex.
-pub(super) mod domain {
-    pub(crate) const DIRECT: u32 = 0;
-    pub(crate) const BSDF: u32 = 1;
-    pub(crate) const ROULETTE: u32 = 2;
-    pub(crate) const RESAMPLE: u32 = 3;
-    pub(crate) const ALBEDO: u32 = 4;
-    /// Vertex k uses the domain `VERTEX + k` of the camera sample.
-    pub(crate) const VERTEX: u32 = 16;
-    /// The segment to vertex k, through media, uses the domain `FLIGHT + k`.
-    pub(crate) const FLIGHT: u32 = 1 << 19;
-    /// The light for equiangular distance sampling in media.
-    pub(crate) const FOCUS: u32 = 1 << 18;
-    /// The walk through an interior before vertex k uses the domain `WALK + k`.
-    pub(crate) const WALK: u32 = 1 << 17;
-    /// The wavelength of the path.
-    pub(crate) const WAVELENGTH: u32 = 1 << 16;
-}
-
-/// Counts and times.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct PathStats {
-    /// Camera rays.
-    pub camera_rays: u64,
-    /// Rays of later path segments.
-    pub bounce_rays: u64,
-    /// Time in tracing camera rays.
-    pub camera_time: Duration,
-    /// Time in tracing later segments.
-    pub bounce_time: Duration,
-    /// Time in hits, textures and materials.
-    pub shade_time: Duration,
-    /// Approximate number of tentative collisions in media.
-    pub collisions: u64,
-    /// Direct light.
-    pub direct: DirectStats,
-    /// Lookups in an irradiance cache.
-    pub lookups: LookupStats,
-}
-
-/// Lookups and cache misses.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct LookupStats {
-    /// Diffuse vertices of camera paths.
-    pub lookups: u64,
-    /// Cache misses: lookups without a usable record, where path tracing takes over.
-    pub misses: u64,
-}
-
-impl PathStats {
-    /// Times of the stages of tracing, without overlap.
-    pub fn stages(&self) -> [(&'static str, Duration); 6] {
-        [
-            ("camera_rays", self.camera_time),
-            ("bounce_rays", self.bounce_time),
-            ("shade", self.shade_time),
-            ("t1_propose", self.direct.t1),
-            ("select_resolve", self.direct.select),
-            ("t2_trace", self.direct.t2),
-        ]
-    }
-
-    /// The part of the time `tracing` outside all stages.
-    pub fn beside_stages(&self, tracing: Duration) -> Duration {
-        tracing.saturating_sub(self.stages().iter().map(|(_, time)| *time).sum())
-    }
-
-    /// Adds the counts of another worker.
-    pub fn merge(&mut self, other: &PathStats) {
-        self.camera_rays += other.camera_rays;
-        self.bounce_rays += other.bounce_rays;
-        self.camera_time += other.camera_time;
-        self.bounce_time += other.bounce_time;
-        self.shade_time += other.shade_time;
-        self.collisions += other.collisions;
-        self.direct.merge(&other.direct);
-        self.lookups.lookups += other.lookups.lookups;
-        self.lookups.misses += other.lookups.misses;
-    }
-}
-
-impl Sum for PathStats {
-    fn sum<I: Iterator<Item = PathStats>>(all: I) -> Self {
-        all.fold(PathStats::default(), |mut sum, stats| {
-            sum.merge(&stats);
-            sum
-        })
-    }
-}
-
-/// A camera sample to be traced.
-#[derive(Clone, Copy, Debug)]
-pub struct CameraSample {
-    /// Its ray.
-    pub ray: CameraRay,
-    /// Weight of the pixel filter times weight of the camera.
-    pub weight: f32,
-    /// Its random numbers.
-    pub stream: SampleStream,
-    /// Random numbers of direct light. Progressive estimators use a new stream for every block of samples, so that a
-    /// block is independent of earlier blocks.
-    pub direct: SampleStream,
-    /// Sample counts at its first vertex.
-    pub sample_counts: SampleCounts,
-    /// Share group ([`crate::scene::PixelSamples::share_group`]). Samples with the same group may share paths, and use the
-    /// same light paths.
-    pub share_group: u32,
-    /// Index of the fit of its pixel.
-    pub fit: u32,
-    /// Its pixel; arbitrary for rays that belong to no pixel.
-    pub pixel: [u32; 2],
-    /// True if the sample belongs to a replica: a second estimate of its pixel, used to estimate the variance.
-    pub is_replica: bool,
-}
-
-impl CameraSample {
-    /// The sample of a ray that belongs to no pixel.
-    #[inline]
-    pub fn of_ray(ray: CameraRay, weight: f32, stream: SampleStream, sample_counts: SampleCounts) -> Self {
-        let (share_group, fit, pixel, is_replica) = (0, 0, [0; 2], false);
-        CameraSample { ray, weight, stream, direct: stream, sample_counts, share_group, fit, pixel, is_replica }
-    }
-}
 
 /// The state of a path.
 #[derive(Clone, Copy, Debug)]
@@ -193,7 +67,7 @@ impl PathState {
         let hit = LightHit { t: self.depth(interaction), p: s.p, n: s.n, uv: s.uv };
         let mut l = self.beta * lights.lights[light as usize].l(&hit, interaction.wo);
         if let Some(guide) = guide.filter(|_| self.chain.is_caustic() && !l.is_black()) {
-            l *= self.chain.rest(guide.density(light, s.n, interaction.wo));
+            l *= self.chain.camera_weight(guide.density(light, s.n, interaction.wo));
         }
         match &self.technique {
             Some(_) if !l.is_black() => l * left.weight(self, |ctx| lights.pdf(ctx, light, self.ray.d, &hit)),
@@ -325,7 +199,62 @@ pub(super) fn survive(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use lumiris_numbers::math::Vec3;
     use lumiris_numbers::samplers::SamplerKind;
+
+    fn path(technique: Option<BsdfTechnique>) -> PathState {
+        let ray = Ray { o: Vec3::ZERO, d: Vec3::Z, t_max: f32::INFINITY, time: 0.0 };
+        let (beta, chain) = (Rgb::splat(0.5), Chain::NONE);
+        let (sample, eta_scale, width, spread, passed, travelled) = (0, 1.0, 0.0, 0.0, 0, 0.0);
+        let (medium, wavelength, is_ghost) = (None, None, false);
+        PathState {
+            sample,
+            ray,
+            beta,
+            eta_scale,
+            width,
+            spread,
+            passed,
+            travelled,
+            technique,
+            medium,
+            wavelength,
+            is_ghost,
+            chain,
+        }
+    }
+
+    #[test]
+    fn a_medium_weakens_the_path_before_and_beyond_an_emitter() {
+        let technique = BsdfTechnique { row: 0, pdf: Some(1.0), survivor: Some(Rgb::splat(2.0)) };
+        let mut through = path(Some(technique));
+        through.weaken(Rgb::splat(0.25));
+        assert_eq!((through.beta.r, through.beta_beyond_emitter().unwrap().r), (0.125, 0.5));
+
+        // Roulette has ended the path beyond its first surface, and counts once
+        let ended = path(Some(BsdfTechnique { survivor: None, ..technique }));
+        assert_eq!(ended.beta_beyond_emitter(), None);
+        assert_eq!(PathState { passed: 1, ..ended }.beta_beyond_emitter(), Some(ended.beta));
+        assert_eq!(path(None).beta_beyond_emitter().unwrap().r, 0.5);
+    }
+
+    #[test]
+    fn an_emitter_hit_has_the_weight_that_light_samples_leave() {
+        use crate::direct::Estimator;
+        let settings = IntegratorSettings { samples: Some(4), ..IntegratorSettings::default() };
+        let techniques = Techniques::of(&Estimator::at_vertex(&settings, 0), true);
+        let (vertices, n) = (Vertices::default(), techniques.unwrap().light_samples());
+        let last = LastVertices { vertices: &vertices, techniques };
+        let technique = |pdf| BsdfTechnique { row: BsdfTechnique::NO_ROW, pdf, survivor: None };
+        let sampled = path(Some(technique(Some(2.0))));
+        let (light, bsdf) = (Technique { n, p: 0.5 }, Technique { n: 1.0, p: 2.0 });
+        let of_light = techniques.unwrap().heuristic.weight(light, bsdf);
+        assert!(of_light > 0.0 && (last.weight(&sampled, |_| 0.5) + of_light - 1.0).abs() < 1e-6);
+
+        // Only BSDF sampling finds emitters in specular directions, and where no light is sampled
+        assert_eq!(last.weight(&path(Some(technique(None))), |_| 0.5), 1.0);
+        assert_eq!(LastVertices { vertices: &vertices, techniques: None }.weight(&sampled, |_| 0.5), 1.0);
+    }
 
     #[test]
     fn roulette_keeps_the_mean_of_the_throughput() {

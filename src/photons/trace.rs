@@ -320,7 +320,7 @@ impl<'a> Run<'a> {
         let s = scene.lights.lights[light as usize].sample_le(sphere, [p0, p1], [d0, d1])?;
         let o = if s.n == glam::Vec3::ZERO { s.p } else { offset_origin(s.p, s.p_error, s.n, s.d) };
         let [u_time] = stream.domain(domain::TIME).draw::<1>();
-        let ray = Ray { o, d: s.d, t_max: f32::INFINITY, time: scene.camera.time(u_time) };
+        let ray = Ray { o, d: s.d, t_max: f32::INFINITY, time: u_time };
         Some(Particle::new(index, ray, s.power / pmf, Origin::Primary(light), stream))
     }
 

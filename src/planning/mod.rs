@@ -23,7 +23,7 @@ pub mod visibility_cache;
 
 pub use preparation::{PlanError, Preparation};
 
-use crate::integrators::features::{self, OPTIONAL};
+use crate::integrators::exclusions::{self, OPTIONAL};
 use crate::scene::RenderJob;
 use crate::settings::table::rows;
 use crate::settings::{Allocation, EstimatorKind, Settings};
@@ -42,7 +42,7 @@ pub struct Plan {
 
 /// Completes the open settings of `job`. Fails if no image is possible.
 pub fn prepare(job: &mut RenderJob, how: &Preparation<'_>) -> Result<Plan, PlanError> {
-    if let Some(conflict) = features::refusal(job, &job.settings().integrator) {
+    if let Some(conflict) = exclusions::refusal(job, &job.settings().integrator) {
         return Err(conflict.into());
     }
     let open = *job.settings();
@@ -93,7 +93,7 @@ fn warnings(job: &RenderJob) -> Vec<String> {
     let applies = |flag: &str| rows().any(|row| row.flag == flag && row.applies.to(job.settings()));
     let wanted = OPTIONAL.iter().filter(|(feature, flag, _)| feature.is_wanted(job, settings) && applies(flag));
     let warning =
-        |(feature, _, without): &_| Some(format!("{without}: {}", features::conflict(job, settings, *feature)?));
+        |(feature, _, without): &_| Some(format!("{without}: {}", exclusions::conflict(job, settings, *feature)?));
     wanted.filter_map(warning).collect()
 }
 

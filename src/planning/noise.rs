@@ -1,6 +1,6 @@
 //! `--noise`: numbers of camera samples for a given noise, block by block.
 //!
-//! The noise of a block is defined in [`crate::film::noise`]. A *pilot* estimates its mean and variance. It renders
+//! The noise of a block is defined in [`crate::film::image_noise`]. A *pilot* estimates its mean and variance. It renders
 //! each pixel twice with n samples, with two seeds of its own. Half the squared difference is the variance of n
 //! samples, including the gain of the sampler over independent samples. This variance falls at least as fast as 1/n,
 //! which gives the number of samples that the block needs. The pilot starts with n = 2. It doubles n for blocks that
@@ -17,7 +17,7 @@ use super::constants::{EMISSION_RAY_COST, FIRST, MAX_EMISSION_RAYS, MAX_RAYS_PER
 use super::preparation::{PlanError, Preparation, Stage};
 use super::probe::{LeftToLightPaths, Probe, around};
 use crate::direct::Estimator;
-use crate::film::noise::{BLOCK, of_block};
+use crate::film::image_noise::{BLOCK, of_block};
 use crate::film::{FeatureSet, PixelBounds};
 use crate::scene::{PixelSamples, RenderJob};
 use crate::settings::{IntegratorSettings, Settings};

@@ -1,6 +1,6 @@
 //! Parameters of the preparation of an image: threads, deadline, observers, errors.
 
-use crate::integrators::features::Conflict;
+use crate::integrators::exclusions::Conflict;
 use crate::settings::Settings;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::time::{Duration, Instant};

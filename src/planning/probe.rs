@@ -3,11 +3,12 @@
 use crate::direct::Fits;
 use crate::film::accumulator::RadianceAccumulator;
 use crate::film::{FeatureSet, PixelSample};
+use crate::integrators::CameraSample;
 use crate::integrators::camera_samples::{CameraSampler, PixelSampleRange, Scratch};
 use crate::integrators::cells::Blocks;
-use crate::integrators::features::{self, Feature};
+use crate::integrators::exclusions::{self, Feature};
 use crate::integrators::light_paths::{self, LightPilot};
-use crate::integrators::path::{BATCH_PATHS, CameraSample};
+use crate::integrators::path::BATCH_PATHS;
 use crate::integrators::{PathStats, PathTracer};
 use crate::scene::RenderJob;
 use crate::settings::IntegratorSettings;
@@ -49,9 +50,11 @@ pub(super) struct Probe<'a> {
 impl<'a> Probe<'a> {
     /// A probe of an image. It leaves out the light of `left`, and pixels share paths as in the image.
     pub(super) fn new(job: &'a RenderJob, left: &LeftToLightPaths, features: FeatureSet) -> Self {
-        let blocks = if features::allows(job, Feature::Sharing) { Blocks::Grid } else { Blocks::None };
+        let blocks = if exclusions::allows(job, Feature::Sharing) { Blocks::Grid } else { Blocks::None };
         let mut tracer = PathTracer::sharing(blocks, features);
-        tracer.leave(job, left.0.as_ref().map(|(pilot, per_sample)| (pilot, *per_sample)));
+        if let Some((pilot, per_sample)) = &left.0 {
+            tracer.weigh_against_light_paths(job, pilot, *per_sample);
+        }
         let camera = CameraSampler::new(job, 0);
         Probe { job, camera, tracer, samples: Vec::new(), scratch: Scratch::default(), results: Vec::new() }
     }

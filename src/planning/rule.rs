@@ -20,7 +20,7 @@ use super::constants::{
 };
 use super::facts::Facts;
 use super::visibility_cache::{build_visibility_cache, visible_points};
-use crate::integrators::features::{self, Feature};
+use crate::integrators::exclusions::{self, Feature};
 use crate::lights::{LightCtx, LightId};
 use crate::scene::RenderJob;
 use crate::settings::{Allocation, ContributingSettings, EstimatorKind, IntegratorKind, IntegratorSettings, Settings};
@@ -45,14 +45,14 @@ pub(super) fn apply(job: &mut RenderJob) -> Option<Facts> {
         job.change(|s| s.integrator.bsdf_fraction = Some(0.0));
     }
     let facts = Facts::of(job);
-    let shares = sampling.allocation == Allocation::Auto && features::allows(job, Feature::Sharing);
+    let shares = sampling.allocation == Allocation::Auto && exclusions::allows(job, Feature::Sharing);
     job.change(|s| s.integrator = with_numbers(&s.integrator, &facts, shares));
     if facts.lights >= MANY_LIGHTS && !job.lights.find_glows() {
         choose_contributing(job, &facts);
     }
     if base.light_paths.is_none()
         && job.world.scene.materials.make_caustics()
-        && features::allows(job, Feature::LightPaths)
+        && exclusions::allows(job, Feature::LightPaths)
     {
         job.change(|s| s.integrator.light_paths = Some(LIGHT_PATHS));
     }
@@ -100,7 +100,7 @@ fn choose_contributing(job: &mut RenderJob, facts: &Facts) {
     let before = job.settings().integrator;
     let depth = before.depth();
     let s = IntegratorSettings { estimator: EstimatorKind::Contributing, ..before };
-    if s.leaves_lights_out() || features::refusal(job, &s).is_some() {
+    if s.leaves_lights_out() || exclusions::refusal(job, &s).is_some() {
         return;
     }
     let Some((cache, _)) = build_visibility_cache(job) else { return };

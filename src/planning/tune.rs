@@ -10,7 +10,7 @@ use super::preparation::{PlanError, Preparation};
 use super::processor_time;
 use super::trials::{Measured, Trials};
 use super::visibility_cache::build_visibility_cache;
-use crate::integrators::features::{self, Feature};
+use crate::integrators::exclusions::{self, Feature};
 use crate::scene::RenderJob;
 use crate::settings::{Allocation, ContributingSettings, EstimatorKind, IntegratorSettings, Settings, bsdf_samples};
 use serde::{Deserialize, Serialize};
@@ -83,7 +83,7 @@ fn steps(open: &Settings, facts: &Facts, job: &RenderJob) -> Vec<Vec<Change>> {
     // Lights
     let i = open.integrator;
     let mut steps: Vec<Vec<Change>> = Vec::new();
-    let is_possible = |estimator| features::refusal(job, &IntegratorSettings { estimator, ..i }).is_none();
+    let is_possible = |estimator| exclusions::refusal(job, &IntegratorSettings { estimator, ..i }).is_none();
     if facts.lights >= MANY_LIGHTS && is_possible(EstimatorKind::Contributing) && !job.lights.find_glows() {
         steps.push(vec![Change::Contributing]);
     }
@@ -99,7 +99,7 @@ fn steps(open: &Settings, facts: &Facts, job: &RenderJob) -> Vec<Vec<Change>> {
     ];
 
     // Shared paths
-    let may_share = open.sampling.allocation == Allocation::Auto && features::allows(job, Feature::Sharing);
+    let may_share = open.sampling.allocation == Allocation::Auto && exclusions::allows(job, Feature::Sharing);
     let is_of = |(is_open, changes): &(bool, Vec<Change>)| is_open.then(|| changes.clone());
     steps.extend(numbers.iter().filter_map(is_of));
     if i.path_reuse.is_none() && may_share {

@@ -1,9 +1,11 @@
 //! Batches of camera samples as in the first pass of the renderer, spread over the image. Used for measurements.
 
-use super::{BATCH_PATHS, RenderSettings, Run};
+use super::render_settings::RenderSettings;
+use super::run::Run;
 use crate::film::PixelBounds;
+use crate::integrators::CameraSample;
 use crate::integrators::camera_samples;
-use crate::integrators::path::CameraSample;
+use crate::integrators::path::BATCH_PATHS;
 use crate::scene::RenderJob;
 use std::ops::Range;
 use std::sync::atomic::AtomicBool;

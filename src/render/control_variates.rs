@@ -8,7 +8,7 @@
 //! corrections are kept for the whole image.
 
 use super::tiles::Tile;
-use crate::film::exact::FixedSum;
+use crate::film::fixed_sums::FixedSum;
 use crate::film::replicas::Replica;
 use crate::film::{Film, PixelBounds, PixelSums};
 use lumiris_numbers::estimators::ocv::pixels::{MARGIN, Memory, Picture, Pixel, correction};

@@ -8,10 +8,12 @@
 //! An id is the 32-bit MurmurHash3 of a name, reinterpreted as a float. A pixel stores the [`RANKS`] ids with the
 //! largest coverage, two in each group of four channels.
 
-use super::{BATCH_PATHS, RenderSettings, ThreadError, thread_pool};
+use super::render_settings::RenderSettings;
 use crate::accel::{Coherence, Hit, RayBatch};
 use crate::film::{Film, PixelBounds};
 use crate::integrators::camera_samples::{CameraSampler, PixelSampleRange, Scratch};
+use crate::integrators::path::BATCH_PATHS;
+use crate::planning::preparation::{ThreadError, thread_pool};
 use crate::scene::{RenderJob, Scene};
 use rayon::prelude::*;
 use std::collections::{BTreeMap, HashSet};

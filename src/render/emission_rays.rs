@@ -9,13 +9,15 @@
 
 use super::tiles::batches;
 use crate::film::{FeatureSet, PixelSample};
+use crate::integrators::CameraSample;
 use crate::integrators::camera_samples::{CameraSampler, PixelSampleRange, Scratch};
-use crate::integrators::light_layers::LayerSums;
-use crate::integrators::path::CameraSample;
+use crate::integrators::light_layers::{LayerSum, LayerSums};
 use crate::integrators::{PathStats, PathTracer, Tracer};
+use crate::scene::PixelSamples;
 use crate::settings::IntegratorSettings;
 use lumiris_numbers::math::Rgb;
 use lumiris_numbers::math::hash::pcg4d;
+use std::collections::BTreeSet;
 use std::ops::Range;
 
 /// Combined with the seed of the samples to give the seed of emission rays.
@@ -25,7 +27,6 @@ const SEED: u32 = 0x6c_6f_6f_6b;
 #[derive(Default)]
 pub(super) struct EmissionRays {
     tracer: PathTracer,
-    split: Vec<Split>,
     samples: Vec<CameraSample>,
     results: Vec<PixelSample>,
     scratch: Scratch,
@@ -74,24 +75,12 @@ impl EmissionRays {
             return;
         };
 
-        // List the samples with additional rays
+        // Trace the rays of the samples with additional rays, in batches
         let settings = IntegratorSettings { max_depth: 0, ..job.settings().integrator };
         let seed = pcg4d([seed, SEED, 0, 0])[0];
-        self.split.clear();
-        let mut first = 0;
-        for PixelSampleRange { pixel, samples, .. } in pixels {
-            let (rays, count) = (of_pixels.emission_rays(pixel), samples.len());
-            if rays > 1 {
-                let split = |(k, sample)| Split { of_batch: first + k, pixel, sample, rays };
-                self.split.extend(samples.enumerate().map(split));
-            }
-            first += count;
-        }
-
-        // Trace their rays in batches: additional rays first, then each sample's own
-        let all = std::mem::take(&mut self.split);
-        for part in batches(0..all.len() as u32, |i| all[i as usize].rays as usize) {
-            let part = &all[part.start as usize..part.end as usize];
+        let split = split_samples(of_pixels, pixels);
+        for part in batches(0..split.len() as u32, |i| split[i as usize].rays as usize) {
+            let part = &split[part.start as usize..part.end as usize];
             self.samples.clear();
             let others =
                 part.iter().map(|split| PixelSampleRange { fit: 0, pixel: split.pixel, samples: split.others() });
@@ -100,30 +89,14 @@ impl EmissionRays {
             self.tracer.trace(job, &settings, &self.samples, &mut Default::default(), &mut self.results);
 
             // Replace the emission in the results
-            let results = &self.results;
             let rays = rays(part);
-            for (split, (own, others)) in part.iter().zip(&rays) {
-                let radiance = &mut out[split.of_batch].radiance;
-                *radiance = exchanged(*radiance, (*own, others), |ray| results[ray as usize].radiance);
+            for (split, rays) in part.iter().zip(&rays) {
+                rays.exchange(&mut out[split.of_batch].radiance, |ray| self.results[ray as usize].radiance);
             }
-
-            // Replace it in the layers that any ray of a sample meets
-            let (Some(layers), Some(seen)) = (layers.as_deref_mut(), self.tracer.light_layers()) else { continue };
-            let mut split_of_ray = vec![0; samples_of(part)];
-            for (i, (own, others)) in rays.iter().enumerate() {
-                others.clone().chain([*own]).for_each(|ray| split_of_ray[ray as usize] = i);
-            }
-            let mut met: Vec<(usize, u32)> =
-                seen.entries().iter().map(|sum| (split_of_ray[sum.sample as usize], sum.layer)).collect();
-            met.sort_unstable();
-            met.dedup();
-            for (i, layer) in met {
-                let (own, others) = &rays[i];
-                let radiance = layers.at(part[i].of_batch as u32, layer);
-                *radiance = exchanged(*radiance, (*own, others), |ray| seen.of(ray, layer));
+            if let (Some(layers), Some(met)) = (layers.as_deref_mut(), self.tracer.light_layers()) {
+                replace_in_layers(part, &rays, met, layers);
             }
         }
-        self.split = all;
     }
 
     /// Counts and times since the last call.
@@ -137,22 +110,56 @@ fn samples_of(part: &[Split]) -> usize {
     part.iter().map(|split| split.rays as usize).sum()
 }
 
-/// The emission rays of some samples: the sample's own, and the additional ones. A batch has the additional rays first,
-/// sample by sample, then each sample's own.
-fn rays(part: &[Split]) -> Vec<(u32, Range<u32>)> {
+/// Replaces the emission in each layer that any ray of a sample meets. `met` has the layers of the rays.
+fn replace_in_layers(part: &[Split], rays: &[Rays], met: &LayerSums, layers: &mut LayerSums) {
+    let mut split_of_ray = vec![0; samples_of(part)];
+    for (i, Rays { own, others }) in rays.iter().enumerate() {
+        others.clone().chain([*own]).for_each(|ray| split_of_ray[ray as usize] = i);
+    }
+    let layer_of_split = |sum: &LayerSum| (split_of_ray[sum.sample as usize], sum.layer);
+    let met_layers: BTreeSet<(usize, u32)> = met.entries().iter().map(layer_of_split).collect();
+    for (i, layer) in met_layers {
+        rays[i].exchange(layers.at(part[i].of_batch as u32, layer), |ray| met.of(ray, layer));
+    }
+}
+
+/// The samples with more than one emission ray.
+fn split_samples(of_pixels: &PixelSamples, pixels: impl Iterator<Item = PixelSampleRange>) -> Vec<Split> {
+    let (mut split, mut first) = (Vec::new(), 0);
+    for PixelSampleRange { pixel, samples, .. } in pixels {
+        let (rays, count) = (of_pixels.emission_rays(pixel), samples.len());
+        if rays > 1 {
+            split.extend(samples.zip(first..).map(|(sample, of_batch)| Split { of_batch, pixel, sample, rays }));
+        }
+        first += count;
+    }
+    split
+}
+
+/// The emission rays of a sample, by their indices in a batch.
+struct Rays {
+    /// The ray that continues as a path.
+    own: u32,
+    /// The additional rays.
+    others: Range<u32>,
+}
+
+impl Rays {
+    /// Replaces the emission of the own ray in a radiance by the mean over all rays, given the emission of a ray.
+    fn exchange(&self, radiance: &mut Rgb, emission_of: impl Fn(u32) -> Rgb) {
+        let (emission, rays) = (emission_of(self.own), 1 + self.others.len());
+        let sum = self.others.clone().fold(emission, |sum, ray| sum + emission_of(ray));
+        *radiance = *radiance - emission + sum / rays as f32;
+    }
+}
+
+/// The emission rays of some samples. A batch has the additional rays first, sample by sample, then each sample's own.
+fn rays(part: &[Split]) -> Vec<Rays> {
     let (mut first, own) = (0, (samples_of(part) - part.len()) as u32);
     let of_split = |(split, own): (&Split, u32)| {
         let others = first..first + split.rays - 1;
         first = others.end;
-        (own, others)
+        Rays { own, others }
     };
     part.iter().zip(own..).map(of_split).collect()
-}
-
-/// The radiance of a sample with the mean over its emission rays in place of the emission of its own. `seen` is the
-/// emission of a ray.
-fn exchanged(radiance: Rgb, (own, others): (u32, &Range<u32>), seen: impl Fn(u32) -> Rgb) -> Rgb {
-    let (emission, rays) = (seen(own), 1 + others.len());
-    let sum = others.clone().fold(emission, |sum, ray| sum + seen(ray));
-    radiance - emission + sum / rays as f32
 }

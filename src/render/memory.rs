@@ -6,12 +6,13 @@
 
 use super::control_variates::ROWS;
 use super::cryptomatte::Cryptomatte;
+use super::render_settings::RenderSettings;
 use super::tiles::replica_choice;
-use super::{RenderSettings, thread_pool};
 use crate::direct::Estimator;
 use crate::film::BAND;
 use crate::imaging::oiio::{ROWS_AT_ONCE, is_loaded};
 use crate::integrators::light_layers;
+use crate::planning::preparation::thread_pool;
 use crate::scene::RenderJob;
 use lumiris_numbers::estimators::ocv::pixels::MARGIN;
 

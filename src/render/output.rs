@@ -1,6 +1,6 @@
 //! Conversion of films to images: named channels and metadata.
 
-use super::Rendering;
+use super::rendering::Rendering;
 use crate::film::{BAND, Film, PixelSums};
 use crate::imaging::{IMAGE_LAYER, Image};
 use crate::scene::{FilmSettings, SampleCountMap};
@@ -165,7 +165,7 @@ impl<'a> Layers<'a> {
         }
         if self.aovs.contains(&Aov::LightGroups) {
             for layer in 0..self.film.light_layers().len() {
-                let means = light_means(self.film, layer, (rows.clone(), &pixels));
+                let means = light_means(self.film, layer, rows.clone(), &pixels);
                 for (pixel, mean) in data.chunks_exact_mut(stride).zip(means) {
                     pixel[first_of_groups + 3 * layer..][..3].copy_from_slice(&mean);
                 }
@@ -176,11 +176,7 @@ impl<'a> Layers<'a> {
 }
 
 /// Mean radiance of a light-group layer in some rows, whose pixels are given.
-fn light_means(
-    film: &Film,
-    layer: usize,
-    (rows, pixels): (Range<u32>, &[PixelSums]),
-) -> impl Iterator<Item = [f32; 3]> {
+fn light_means(film: &Film, layer: usize, rows: Range<u32>, pixels: &[PixelSums]) -> impl Iterator<Item = [f32; 3]> {
     let mut light = Vec::new();
     film.read_light(layer, rows, &mut light);
     let mean = |(sum, pixel): ([f64; 3], &PixelSums)| sum.map(|v| (v / pixel.count.max(1) as f64) as f32);
@@ -206,7 +202,7 @@ pub fn layers(film: &Film, aovs: &[Aov], sample_count_map: Option<&SampleCountMa
         let band = |rows: Range<u32>| {
             let mut pixels = Vec::new();
             film.read_rows(rows.clone(), &mut pixels);
-            light_means(film, layer, (rows, &pixels)).flatten().collect()
+            light_means(film, layer, rows, &pixels).flatten().collect()
         };
         let data = film.bands().map(band).collect::<Vec<Vec<f32>>>().concat();
         (light_layer_name(name), Image { width, height, channels: COLOUR.map(str::to_owned).to_vec(), data })

@@ -1,12 +1,15 @@
 //! A rendering in progress: passes over all tiles, interrupted by checkpoints.
 
 use super::cell_progress::CellProgress;
+use super::continuation::{Continuation, TileObserver};
 use super::control_variates;
 use super::parts::{Checkpoints, PartError, StoredTile};
 use super::phases::WorkerTimes;
+use super::render_error::RenderError;
+use super::render_settings::RenderSettings;
+use super::rendering::{Progress, Rendering};
 use super::tiles::{Tile, Tiles, add_records, bounds_of_tiles, film, replica_choice};
 use super::worker::Workers;
-use super::{Continuation, Progress, RenderError, RenderSettings, Rendering, TileObserver};
 use crate::direct::Estimator;
 use crate::film::layers::PackedLayers;
 use crate::film::packed::PackedSums;
@@ -312,8 +315,8 @@ mod tests {
     use crate::imaging::oiio::{Part, write_image};
     use crate::import::cache::FileCache;
     use crate::import::{LoadOptions, load_text};
-    use crate::render::go_on;
     use crate::render::parts::FilmHeader;
+    use crate::render::resume;
     use crate::scene::AccelKind;
 
     const FLOOR: &str = r#"
@@ -349,7 +352,7 @@ Shape "bilinearmesh" "point3 P" [ -9 -9 0  9 -9 0  -9 9 0  9 9 0 ]
                 (folder.path().join("c.film"), FilmHeader::new(&job, &settings, 16, 0, [Vec::new(), Vec::new()]));
             let mut checkpoints = Checkpoints::new(path.clone(), Duration::ZERO, header, |_| ());
             let continuation = Continuation { checkpoints: Some(&mut checkpoints), ..Continuation::default() };
-            let outcome = go_on(&job, &settings, &AtomicBool::new(false), &|_| (), continuation);
+            let outcome = resume(&job, &settings, &AtomicBool::new(false), &|_| (), continuation);
             assert_eq!(matches!(outcome, Err(RenderError::Texels(_))), is_lost);
             assert_eq!((outcome.is_ok(), path.exists()), (!is_lost, !is_lost));
             let _ = std::fs::remove_file(path);

@@ -9,7 +9,7 @@ use super::run::{Pass, Run};
 use super::tiles::{Tile, Tiles};
 use super::worker::{AnyWorker, Workers};
 use crate::direct::{Estimator, Fits};
-use crate::film::exact::FixedSum;
+use crate::film::fixed_sums::FixedSum;
 use crate::film::replicas::ReplicaAccumulator;
 use crate::film::{Film, PixelBounds};
 use crate::integrators::PathStats;
@@ -204,7 +204,7 @@ fn merge_controls(tile: &mut Tile, cell: &PixelBounds, controls: &[FixedSum]) {
         return;
     }
     let bounds = tile.bounds;
-    for (of_tile, of_cell) in bounds.common_rows(cell) {
+    for [of_tile, of_cell] in bounds.common_rows(cell) {
         for (to, from) in of_tile.zip(of_cell) {
             tile.fits.merge_sums(to as u32, &controls[from * row..][..row]);
         }

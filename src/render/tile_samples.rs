@@ -1,16 +1,16 @@
 //! Samples of tiles and cells: drawn and traced in batches, and added to the sums of their pixels and replicas.
 
-use super::BATCH_PATHS;
 use super::run::Run;
 use super::tiles::{Tile, batches};
 use super::worker::AnyWorker;
 use crate::direct::{Estimator, Fits};
 use crate::film::PixelBounds;
 use crate::film::replicas::ReplicaAccumulator;
+use crate::integrators::CameraSample;
 use crate::integrators::PathStats;
 use crate::integrators::camera_samples::{self, PixelSampleRange};
 use crate::integrators::cells::{self, REPLICA_CELL};
-use crate::integrators::path::CameraSample;
+use crate::integrators::path::BATCH_PATHS;
 use lumiris_numbers::estimators::ocv::block_of;
 use lumiris_numbers::math::hash::pcg4d;
 use std::ops::Range;
@@ -21,6 +21,14 @@ const _: () = assert!(BATCH_PATHS >= cells::CELL.pow(2) as usize && BATCH_PATHS 
 
 /// Combined with the seed of the image to give the seed of replicas.
 const REPLICA_SEED: u32 = 0x72_65_70_73;
+
+/// Samples that are traced together.
+struct Batch {
+    /// Indices of the pixels.
+    pixels: Range<usize>,
+    /// The part of the pass.
+    pass: Range<u32>,
+}
 
 impl Run<'_> {
     /// Adds a range of samples to one tile.
@@ -67,7 +75,7 @@ impl Run<'_> {
     ) {
         let seed = self.job.settings().sampling.seed;
         let of_pixel = |index: usize| bounds.pixel_at(index as u32);
-        for (pixels, samples) in self.batches(bounds.area(), of_pixel, pass) {
+        for Batch { pixels, pass: samples } in self.batches(bounds.area(), of_pixel, pass) {
             let start = Instant::now();
             self.camera_samples(bounds, pixels.clone(), &samples, &mut worker.scratch, &mut worker.samples);
             worker.times.camera_samples += start.elapsed();
@@ -77,19 +85,15 @@ impl Run<'_> {
     }
 
     /// Splits a pass over some pixels into batches: ranges of pixels, or ranges of the pass where pixels share paths.
-    fn batches(
-        &self,
-        pixels: usize,
-        pixel: impl Fn(usize) -> [u32; 2],
-        pass: &Range<u32>,
-    ) -> Vec<(Range<usize>, Range<u32>)> {
+    fn batches(&self, pixels: usize, pixel: impl Fn(usize) -> [u32; 2], pass: &Range<u32>) -> Vec<Batch> {
         let of = |index: usize, pass: &Range<u32>| self.samples_of(pixel(index), pass).len();
         if self.shares_paths {
             let paths = |i: u32| (0..pixels).map(|index| of(index, &(i..i + 1))).sum();
-            return batches(pass.clone(), paths).into_iter().map(|part| (0..pixels, part)).collect();
+            return batches(pass.clone(), paths).into_iter().map(|pass| Batch { pixels: 0..pixels, pass }).collect();
         }
         let parts = batches(0..pixels as u32, |index| of(index as usize, pass));
-        parts.into_iter().map(|part| (part.start as usize..part.end as usize, pass.clone())).collect()
+        let batch = |part: Range<u32>| Batch { pixels: part.start as usize..part.end as usize, pass: pass.clone() };
+        parts.into_iter().map(batch).collect()
     }
 
     /// Adds the samples of a pass to the replicas of a tile.
@@ -107,7 +111,7 @@ impl Run<'_> {
         if pixels.is_empty() {
             return;
         }
-        for (replicas, pass) in self.batches(pixels.len(), |i| pixels[i], pass) {
+        for Batch { pixels: replicas, pass } in self.batches(pixels.len(), |i| pixels[i], pass) {
             let range = |i: usize| {
                 let (fit, pixel) = ((bounds.area() + i) as u32, pixels[i]);
                 PixelSampleRange { fit, pixel, samples: self.samples_of(pixel, &pass) }

@@ -1,7 +1,8 @@
-//! Tiles: pixels that are rendered together, with their exact sums, and the assignment of tiles to parts of an image.
+//! Tiles: pixels that are rendered together, with their exact sums.
 
 use super::cell_progress::CellProgress;
-use super::{BATCH_PATHS, RenderSettings};
+use super::render_settings::RenderSettings;
+use super::tile_share::TileShare;
 use crate::direct::{Estimator, Fits};
 use crate::film::accumulator::PixelAccumulator;
 use crate::film::layers::PackedLayers;
@@ -9,6 +10,7 @@ use crate::film::packed::PackedSums;
 use crate::film::replicas::{ReplicaAccumulator, ReplicaChoice};
 use crate::film::{Film, FilmTile, PixelBounds};
 use crate::integrators::cells::REPLICA_CELL;
+use crate::integrators::path::BATCH_PATHS;
 use crate::integrators::{light_paths, reuse};
 use crate::scene::RenderJob;
 use crate::settings::IntegratorKind;
@@ -16,32 +18,6 @@ use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::ops::Range;
 use std::sync::Arc;
-
-/// Edge of the tiles that are dealt to parts (pixels).
-pub(super) const SHARE_TILE: u32 = 16;
-
-/// The pixels of one of several parts. Tiles are dealt round-robin, row by row, so that every part gets some of all
-/// regions.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct TileShare {
-    /// Index of the part, from 0.
-    pub index: u32,
-    /// Number of parts.
-    pub count: u32,
-}
-
-impl TileShare {
-    /// True if the part has the tile with this index.
-    pub fn has(&self, tile: usize) -> bool {
-        tile % self.count.max(1) as usize == self.index as usize
-    }
-
-    /// The tiles of the part.
-    pub fn tiles(&self, image: &PixelBounds) -> impl Iterator<Item = PixelBounds> + use<> {
-        let share = *self;
-        image.tiles(SHARE_TILE).into_iter().enumerate().filter(move |(i, _)| share.has(*i)).map(|(_, tile)| tile)
-    }
-}
 
 /// A tile with the sums of its pixels.
 #[derive(Debug)]

@@ -5,13 +5,12 @@ use super::phases::WorkerTimes;
 use super::tiles::Tile;
 use crate::direct::Fits;
 use crate::film::accumulator::PixelAccumulator;
-use crate::film::layers::LayerScratch;
+use crate::film::layers::{LayerSample, LayerScratch};
 use crate::film::{FeatureSet, PixelBounds, PixelSample};
+use crate::integrators::CameraSample;
 use crate::integrators::camera_samples::{CameraSampler, PixelSampleRange, Scratch};
-use crate::integrators::path::CameraSample;
 use crate::integrators::{Integrator, PathStats, Tracer};
 use crate::scene::FilmSettings;
-use lumiris_numbers::math::Rgb;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
@@ -24,33 +23,33 @@ pub(super) struct Worker<T> {
     /// Sums of the traced pixels, while samples are added to them.
     pub(super) sums: Vec<PixelAccumulator>,
     /// Sums of a tile that receives the sums of a cell, where cells are traced instead of tiles.
-    of_tile: Vec<PixelAccumulator>,
+    tile_sums: Vec<PixelAccumulator>,
     /// Samples of each light-group layer with their pixels, until they are added to a tile.
-    light: Vec<Vec<(u32, Rgb)>>,
+    light: Vec<Vec<LayerSample>>,
     /// Pixel of each sample of a batch.
     pixels: Vec<u32>,
     /// Buffer for packing sums.
     pub(super) packing: Vec<u8>,
-    of_layers: LayerScratch,
+    layer_scratch: LayerScratch,
     emission_rays: EmissionRays,
     pub(super) times: WorkerTimes,
 }
 
 impl<T> Worker<T> {
     pub(super) fn new(tracer: T) -> Self {
-        let (samples, scratch, results, sums, of_tile, light, pixels) = Default::default();
-        let (packing, of_layers, emission_rays, times) = Default::default();
+        let (samples, scratch, results, sums, tile_sums, light, pixels) = Default::default();
+        let (packing, layer_scratch, emission_rays, times) = Default::default();
         Worker {
             tracer,
             samples,
             scratch,
             results,
             sums,
-            of_tile,
+            tile_sums,
             light,
             pixels,
             packing,
-            of_layers,
+            layer_scratch,
             emission_rays,
             times,
         }
@@ -77,13 +76,13 @@ impl AnyWorker<'_> {
     /// Adds the sums of the pixels within `bounds` to a tile, where they overlap.
     pub(super) fn add_to(&mut self, tile: &mut Tile, bounds: &PixelBounds) {
         let start = Instant::now();
-        let Worker { sums, of_tile, packing, .. } = self;
-        of_tile.resize(tile.bounds.area(), PixelAccumulator::default());
-        tile.sums.read(0..tile.bounds.area(), of_tile);
-        for (to, from) in tile.bounds.common_rows(bounds) {
-            of_tile[to].iter_mut().zip(&sums[from]).for_each(|(sum, more)| sum.merge(more));
+        let Worker { sums, tile_sums, packing, .. } = self;
+        tile_sums.resize(tile.bounds.area(), PixelAccumulator::default());
+        tile.sums.read(0..tile.bounds.area(), tile_sums);
+        for [to, from] in tile.bounds.common_rows(bounds) {
+            tile_sums[to].iter_mut().zip(&sums[from]).for_each(|(sum, more)| sum.merge(more));
         }
-        tile.set_sums(of_tile, packing);
+        tile.set_sums(tile_sums, packing);
         self.times.film += start.elapsed();
     }
 
@@ -133,7 +132,8 @@ impl AnyWorker<'_> {
             pixel_of.resize(first, fit);
         }
         for sum in tracer.light_layers().iter().flat_map(|layers| layers.entries()) {
-            light[sum.layer as usize].push((pixel_of[sum.sample as usize], film.balanced(sum.radiance)));
+            let (pixel, radiance) = (pixel_of[sum.sample as usize], film.balanced(sum.radiance));
+            light[sum.layer as usize].push(LayerSample { pixel, radiance });
         }
         self.times.film += start.elapsed();
     }
@@ -144,7 +144,7 @@ impl AnyWorker<'_> {
         tile.set_sums(&self.sums, &mut self.packing);
         for (layer, samples) in self.light.iter_mut().enumerate().filter(|(_, samples)| !samples.is_empty()) {
             // Sums that a film shares stay unchanged
-            Arc::make_mut(&mut tile.layers).add(layer, samples, &mut self.of_layers);
+            Arc::make_mut(&mut tile.layers).add(layer, samples, &mut self.layer_scratch);
             samples.clear();
         }
         self.times.film += start.elapsed();

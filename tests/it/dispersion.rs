@@ -8,7 +8,7 @@ use lumiris::bsdfs::fresnel::fr_dielectric;
 use lumiris::imaging::oiio::{Part, write_image};
 use lumiris::import::cache::FileCache;
 use lumiris::import::{LoadOptions, load_text};
-use lumiris::integrators::features::{Feature, allows};
+use lumiris::integrators::exclusions::{Feature, allows};
 use lumiris::lights::{EnvironmentFilter, EnvironmentMap, EnvironmentMapping};
 use lumiris::materials::Dispersion;
 use lumiris::scene::{AccelKind, RenderJob};

@@ -4,7 +4,7 @@
 use lumiris::film::Film;
 use lumiris::import::cache::FileCache;
 use lumiris::import::{LoadOptions, load_text};
-use lumiris::integrators::features::{Feature, OPTIONAL, TABLE, between, conflict, refusal};
+use lumiris::integrators::exclusions::{Feature, OPTIONAL, TABLE, between, conflict, refusal};
 use lumiris::integrators::{light_layers, light_paths, reuse};
 use lumiris::planning::{Preparation, prepare};
 use lumiris::render::output::{Aov, layers};

@@ -4,7 +4,7 @@ use lumiris::film::{Film, PixelBounds};
 use lumiris::imaging::Image;
 use lumiris::import::cache::FileCache;
 use lumiris::import::{LoadOptions, load_text};
-use lumiris::integrators::features::{Feature, allows};
+use lumiris::integrators::exclusions::{Feature, allows};
 use lumiris::integrators::light_layers;
 use lumiris::render::output::{Aov, channels, layers};
 use lumiris::render::{RenderSettings, render};

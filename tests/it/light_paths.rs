@@ -5,7 +5,7 @@ use crate::same_light::assert_same_light;
 use lumiris::imaging::oiio::{Part, write_image};
 use lumiris::import::cache::FileCache;
 use lumiris::import::{LoadOptions, load_text};
-use lumiris::integrators::features::{Feature, allows};
+use lumiris::integrators::exclusions::{Feature, allows};
 use lumiris::integrators::light_paths::per_sample;
 use lumiris::render::RenderSettings;
 use lumiris::scene::{AccelKind, PixelSamples, RenderJob};

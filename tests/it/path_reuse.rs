@@ -5,7 +5,7 @@ use crate::same_light::assert_same_light;
 use lumiris::film::{Film, PixelSums};
 use lumiris::import::cache::FileCache;
 use lumiris::import::{LoadOptions, load, load_text};
-use lumiris::integrators::features::{Feature, allows};
+use lumiris::integrators::exclusions::{Feature, allows};
 use lumiris::integrators::reuse;
 use lumiris::render::{RenderSettings, render};
 use lumiris::scene::{AccelKind, PixelSamples, RenderJob};

@@ -3,8 +3,8 @@
 use lumiris::direct::Fits;
 use lumiris::film::PixelSample;
 use lumiris::import::{LoadOptions, load};
+use lumiris::integrators::CameraSample;
 use lumiris::integrators::PathTracer;
-use lumiris::integrators::path::CameraSample;
 use lumiris::scene::{AccelKind, RenderJob};
 use lumiris::settings::{EstimatorKind, IntegratorKind};
 use lumiris_numbers::math::Vec2;

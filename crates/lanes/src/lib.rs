@@ -6,7 +6,7 @@
 //! closures and no `map` over arrays: these would be compiled without vector instructions.
 //!
 //! Reading order: [`lane`], [`wide`], [`columns`], [`curve`], [`sampler`], [`light`], [`area`], [`environment`],
-//! [`kernels`], [`combine`], [`camera`], [`hits`], [`triangles`], [`vertex`], [`connections`], [`light_choice`],
+//! [`kernels`], [`combine`], [`camera`], [`hits`], [`triangles`], [`vertex`], [`connections`], [`light_tree`],
 //! [`sums`].
 
 pub mod area;
@@ -20,7 +20,7 @@ pub mod hits;
 pub mod kernels;
 pub mod lane;
 pub mod light;
-pub mod light_choice;
+pub mod light_tree;
 pub mod sampler;
 pub mod sums;
 pub mod triangles;

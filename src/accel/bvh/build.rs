@@ -222,10 +222,9 @@ impl Bins {
         self
     }
 
-    /// The cheapest split between bins: axis and last bin of the left side. The cost is area times number of triangle
-    /// blocks, summed over both sides.
-    fn best_split(&self, bin_count: usize) -> Option<(usize, usize)> {
-        let mut best: Option<(f32, usize, usize)> = None;
+    /// The cheapest split between bins. The cost is area times number of triangle blocks, summed over both sides.
+    fn best_split(&self, bin_count: usize) -> Option<Split> {
+        let mut best: Option<Split> = None;
         for axis in 0..3 {
             let (bounds, counts) = (&self.bounds[axis], &self.counts[axis]);
             // Costs of all right sides
@@ -244,13 +243,22 @@ impl Bins {
                 range = range.union(bounds[i]);
                 n += counts[i];
                 let cost = side_cost(&range, n) + right_cost[i];
-                if n > 0 && n < total && best.is_none_or(|(min, ..)| cost < min) {
-                    best = Some((cost, axis, i));
+                if n > 0 && n < total && best.is_none_or(|best| cost < best.cost) {
+                    best = Some(Split { axis, last_bin: i, cost });
                 }
             }
         }
-        best.map(|(_, axis, bin)| (axis, bin))
+        best
     }
+}
+
+/// A split between bins.
+#[derive(Clone, Copy)]
+struct Split {
+    axis: usize,
+    /// Last bin of the left side.
+    last_bin: usize,
+    cost: f32,
 }
 
 #[inline]
@@ -268,14 +276,14 @@ fn split(prims: &mut [PrimRef], extent: &Extent) -> usize {
         let parts: Vec<Bins> = prims.par_chunks(PARALLEL_BINNING / 4).map(|chunk| Bins::of(chunk, &binning)).collect();
         parts.into_iter().reduce(Bins::union).expect("the range is not empty")
     };
-    let Some((axis, last)) = bins.best_split(binning.count) else {
+    let Some(Split { axis, last_bin, .. }) = bins.best_split(binning.count) else {
         return prims.len() / 2;
     };
 
     // Partition
     let (mut i, mut j) = (0, prims.len());
     while i < j {
-        if binning.bins_of(&prims[i])[axis] <= last {
+        if binning.bins_of(&prims[i])[axis] <= last_bin {
             i += 1;
         } else {
             j -= 1;

@@ -62,7 +62,7 @@ fn brute_force(set: &Arc<GeometrySet>, alpha: Option<&AlphaTest>, ray: &Ray) -> 
     }
 
     // Apply the interval and the alpha test
-    hits.retain(|(h, crossing)| h.t < ray.t_max && alpha.is_none_or(|a| a.stops((h, *crossing), ray)));
+    hits.retain(|(h, crossing)| h.t < ray.t_max && alpha.is_none_or(|a| a.stops(h, *crossing, ray)));
     let hits: Vec<Hit> = hits.into_iter().map(|(h, _)| h).collect();
 
     // First hit on the path, any hit of shadow rays

@@ -301,7 +301,7 @@ impl<'a, Q: Query> Walk<'a, Q> {
     #[inline]
     fn accepts(&self, hit: &Hit, crossing: usize) -> bool {
         let flags = self.bvh.flags[hit.geometry as usize];
-        let is_stopped = || self.bvh.alpha.as_ref().is_none_or(|test| test.stops((hit, crossing), self.world_ray));
+        let is_stopped = || self.bvh.alpha.as_ref().is_none_or(|test| test.stops(hit, crossing, self.world_ray));
         flags & Q::MASK != 0 && self.query.wants(hit) && (flags & TESTED == 0 || is_stopped())
     }
 }

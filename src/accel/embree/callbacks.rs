@@ -32,8 +32,8 @@ impl GeometryContext {
     }
 
     /// True if the hit stops the ray. `crossing` distinguishes hits on the same primitive.
-    fn stops(&self, (hit, crossing): (&Hit, usize), world_ray: &Ray) -> bool {
-        self.alpha.as_ref().is_none_or(|alpha| alpha.stops((hit, crossing), world_ray))
+    fn stops(&self, hit: &Hit, crossing: usize, world_ray: &Ray) -> bool {
+        self.alpha.as_ref().is_none_or(|alpha| alpha.stops(hit, crossing, world_ray))
     }
 
     /// True if there is an exact hit on a quadric or patch with `start` < t < `end`.
@@ -52,7 +52,7 @@ impl GeometryContext {
         let ray = Ray { t_max: end, ..self.world.group_ray(world_ray, instance) };
         self.world.set.geometries[self.id as usize].shape.intersect(primitive, &ray, |hit, crossing| {
             let found = Hit { t: hit.t, uv: hit.uv, geometry: self.id, primitive, instance };
-            hit.t > start && self.stops((&found, crossing), world_ray)
+            hit.t > start && self.stops(&found, crossing, world_ray)
         })
     }
 }
@@ -145,7 +145,7 @@ pub(super) unsafe extern "C" fn alpha_filter(arguments: *const sys::RTCFilterFun
                 let ray = query.rays.get(id as usize);
                 let instance = geometry.world.instance(reported.instance);
                 stops = match geometry.world.refine_primitive(&ray, geometry.id, instance, &reported) {
-                    Refined::Hit(hit) => geometry.stops((&hit, 0), &ray),
+                    Refined::Hit(hit) => geometry.stops(&hit, 0, &ray),
                     Refined::Behind | Refined::Beyond => false,
                 };
             });
@@ -232,7 +232,7 @@ pub(super) unsafe extern "C" fn intersect(arguments: *const sys::RTCIntersectFun
         let inst_id = query.rtc.instID[0];
         for lane in active(arguments.valid, n) {
             let intersect = |ray: &Ray, instance, range| geometry.intersect(ray, arguments.primID, instance, range);
-            let found = lane_hit(geometry, query, (rays, lane), inst_id, intersect);
+            let found = lane_hit(geometry, query, rays, lane, inst_id, intersect);
             let end = found.and_then(|hit| {
                 let (geometry, primitive, instance) = (arguments.geomID, arguments.primID, inst_id);
                 let hit = Reported { geometry, primitive, instance, t: hit.t, uv: hit.uv };
@@ -263,7 +263,7 @@ pub(super) unsafe extern "C" fn occluded(arguments: *const sys::RTCOccludedFunct
         for lane in active(arguments.valid, n) {
             let occludes =
                 |ray: &Ray, instance, range| geometry.occludes(ray, arguments.primID, instance, range).then_some(());
-            let found = lane_hit(geometry, query, (rays, lane), inst_id, occludes).is_some();
+            let found = lane_hit(geometry, query, rays, lane, inst_id, occludes).is_some();
             *arguments.valid.add(lane) = if found { -1 } else { 0 };
             if found {
                 rays.set(TFAR, lane, f32::NEG_INFINITY);
@@ -280,7 +280,8 @@ pub(super) unsafe extern "C" fn occluded(arguments: *const sys::RTCOccludedFunct
 unsafe fn lane_hit<T>(
     geometry: &GeometryContext,
     query: &mut QueryContext<'_>,
-    (rays, lane): (Lanes, usize),
+    rays: Lanes,
+    lane: usize,
     inst_id: u32,
     intersect: impl Fn(&Ray, u32, [f32; 2]) -> Option<T>,
 ) -> Option<T> {

@@ -11,7 +11,7 @@ mod context;
 mod device;
 mod embree_accel;
 mod error;
-mod exact;
+mod exact_hits;
 mod kernels;
 mod query;
 mod scene;

@@ -3,7 +3,7 @@
 
 use super::context::{QueryContext, Ties};
 use super::embree_accel::EmbreeAccel;
-use super::exact::ExactHits;
+use super::exact_hits::ExactHits;
 use super::kernels::{self, Mode, QueryKind, RayHitPacket, RayPacket, Valid};
 use super::world::{Refined, Reported};
 use crate::accel::{Coherence, Hit, RayBatch};

@@ -100,3 +100,35 @@ impl Techniques {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::bsdfs::microfacet::TrowbridgeReitz;
+    use crate::bsdfs::{Dielectric, Diffuse};
+    use lumiris_numbers::math::Rgb;
+    use lumiris_numbers::samplers::SamplerKind;
+
+    #[test]
+    fn the_bsdf_sample_is_left_to_the_path_and_specular_bsdfs_get_no_light_samples() {
+        let diffuse = Bsdf::Diffuse(Diffuse { reflectance: Rgb::WHITE });
+        let distribution = TrowbridgeReitz::new(0.0, 0.0);
+        let mirror = Bsdf::Dielectric(Dielectric { eta: 1.5, distribution });
+        let stream = SampleStream::new(SamplerKind::Sobol, [0, 0], 0, 1);
+        let mis = Estimator::Mis(Mis { samples: 4, heuristic: Heuristic::Power, bsdf_fraction: 0.25 });
+        let draws = |estimator: &Estimator, continues: bool, bsdf: &Bsdf<'_>| {
+            let allocation = Techniques::of(estimator, continues).unwrap().allocation(bsdf, &stream);
+            let SampleAllocation { light_draws, bsdf_draws, n_light, n_bsdf } = allocation;
+            ([light_draws, bsdf_draws], [n_light, n_bsdf])
+        };
+
+        // The expected numbers include the sample that the path draws
+        assert_eq!(draws(&mis, true, &diffuse), ([3, 0], [3.0, 1.0]));
+        assert_eq!(draws(&mis, false, &diffuse), ([3, 1], [3.0, 1.0]));
+        assert_eq!(draws(&mis, true, &mirror), ([0, 0], [0.0, 1.0]));
+        assert_eq!(draws(&mis, false, &mirror), ([0, 4], [0.0, 4.0]));
+        let mc = Estimator::Mc(Mc { samples: 4 });
+        assert_eq!(draws(&mc, true, &diffuse), ([4, 0], [4.0, 0.0]));
+        assert_eq!(draws(&mc, true, &mirror), ([0, 4], [0.0, 4.0]));
+    }
+}

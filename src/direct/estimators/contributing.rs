@@ -402,3 +402,27 @@ impl At<'_, '_> {
         count
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn systematic_counts_are_floor_or_ceiling_and_have_the_ideal_mean() {
+        let weights = [0.5, 3.0, 0.1, 0.9, 1.5];
+        let scale = 10.0 / weights.iter().sum::<f32>();
+        let mut sums = [0; 5];
+        for k in 0..1000 {
+            let offset = (k as f32 + 0.5) / 1000.0;
+            let counts: Vec<LightCounts> = systematic(&weights, scale, offset).collect();
+            for (LightCounts { ideal, drawn }, sum) in counts.iter().zip(&mut sums) {
+                assert!((ideal.floor() as u32..=ideal.ceil() as u32).contains(drawn), "{counts:?}");
+                *sum += drawn;
+            }
+            assert!((9..=11).contains(&counts.iter().map(|c| c.drawn).sum::<u32>()));
+        }
+        for (sum, weight) in sums.iter().zip(weights) {
+            assert!((*sum as f32 / 1000.0 - weight * scale).abs() < 0.01, "{sums:?}");
+        }
+    }
+}

@@ -17,14 +17,16 @@ use super::octree::Octree;
 use super::record::{Range, Record};
 use crate::direct::{Fits, ShadingPoint};
 use crate::film::PixelBounds;
-use crate::integrators::path::{AtVertices, CameraSample, PathStats, PathTracer, PathVertex, Shading};
-use crate::integrators::{Cameras, Tracer};
+use crate::integrators::camera_sample::CameraSample;
+use crate::integrators::integrator::{Cameras, Tracer};
+use crate::integrators::path::{AtVertices, PathTracer, PathVertex, Shading};
+use crate::integrators::statistics::{BuildStats, PathStats};
 use crate::scene::RenderJob;
 use crate::settings::Cached;
 use lumiris_numbers::math::{Bounds3, Vec3};
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 /// Pixel stride of the first round.
 const COARSEST: u32 = 16;
@@ -38,21 +40,6 @@ const WORTHWHILE: f32 = 0.2;
 const CHUNK: usize = 1024;
 /// Records computed before they are added. The number of records per round is not limited.
 const MAX_AT_ONCE: usize = 1 << 14;
-
-/// Statistics of building the cache.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct BuildStats {
-    /// Rounds.
-    pub rounds: u32,
-    /// Requests served by another record of their round.
-    pub dropped: u64,
-    /// Camera samples traced.
-    pub camera_samples: u64,
-    /// Counts and times of tracing, summed over threads.
-    pub paths: PathStats,
-    /// Wall-clock time.
-    pub elapsed: Duration,
-}
 
 /// Builds the cache for the pixels in `bounds`. `stop` ends the build early.
 pub fn build(
@@ -185,7 +172,7 @@ fn ask_chunk(
         is_worthwhile
     };
     let own: &mut AtVertices<'_> = &mut |found, _| {
-        found.each().map(|v| Shading { lit: None, next: ask(found.vertex, &v).then_some(v.point.bsdf) }).collect()
+        found.each().map(|v| Shading { direct: None, next: ask(found.vertex, &v).then_some(v.point.bsdf) }).collect()
     };
     (paths.search.only_reflected, paths.only_specular) = (true, true);
     paths.search.start(job, samples, &mut out);

@@ -89,10 +89,10 @@ impl Cells {
         TAU * sector / self.sectors as f32
     }
 
-    /// sin θ and cos θ at the lower bound of a ring.
-    fn bound(self, ring: u32) -> (f32, f32) {
+    /// [sin θ, cos θ] at the lower bound of a ring.
+    fn bound(self, ring: u32) -> [f32; 2] {
         let sin2 = ring as f32 / self.rings as f32;
-        (sin2.sqrt(), safe_sqrt(1.0 - sin2))
+        [sin2.sqrt(), safe_sqrt(1.0 - sin2)]
     }
 
     /// Irradiance and its gradients in world space, from the radiance `l` and the distance `r` of each cell. The
@@ -111,7 +111,7 @@ impl Cells {
             let mut of_sector = Rgb::BLACK;
             for ring in 0..self.rings {
                 let i = at(ring, sector);
-                let ((sin, cos), (sin_upper, cos_upper)) = (self.bound(ring), self.bound(ring + 1));
+                let ([sin, cos], [sin_upper, cos_upper]) = (self.bound(ring), self.bound(ring + 1));
                 of_sector += l[i];
 
                 // ∫ sin² θ dθ = (θ − sin θ cos θ)/2

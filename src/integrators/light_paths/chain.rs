@@ -50,7 +50,7 @@ impl Chain {
 
     /// MIS weight of the camera path, where light paths have the density `of_light` ([`super::Guide::density`]).
     #[inline]
-    pub(in crate::integrators) fn rest(&self, of_light: f32) -> f32 {
+    pub(in crate::integrators) fn camera_weight(&self, of_light: f32) -> f32 {
         1.0 - light_weight(of_light, self.density)
     }
 
@@ -94,7 +94,7 @@ mod tests {
             let chain = Chain::at_first(-0.5, width).beyond_first(Some(0.3), -0.7).bundled();
             assert!(chain.is_caustic());
             let weight = light_weight(light, camera_density(0.5, width, 0.3, 0.7));
-            assert!((chain.rest(light) + weight - 1.0).abs() < 1e-6, "{light} {width}");
+            assert!((chain.camera_weight(light) + weight - 1.0).abs() < 1e-6, "{light} {width}");
         }
     }
 
@@ -109,7 +109,7 @@ mod tests {
             first.beyond_first(Some(1.0), 0.0),
             first.beyond_first(Some(0.0), 1.0),
         ] {
-            assert!(!none.is_open() && !none.bundled().is_caustic() && none.rest(5.0) == 1.0, "{none:?}");
+            assert!(!none.is_open() && !none.bundled().is_caustic() && none.camera_weight(5.0) == 1.0, "{none:?}");
         }
         assert_eq!(light_weight(5.0, camera_density(1.0, 1.0, 1.0, 0.0)), 0.0);
     }

@@ -1,16 +1,17 @@
 //! Contributions of light paths to the pixels, for some steps of share groups.
 
 use super::guide::Guide;
-use super::per_sample;
+use super::per_sample::per_sample;
 use super::pilot::LightPilot;
-use super::trace::{CameraConnection, LightPathStats, Scene, parts, trace};
+use super::trace::{CameraConnection, PathBatch, Scene, batches, trace};
 use crate::film::{PixelBounds, PixelSample};
+use crate::integrators::camera_sample::CameraSample;
+use crate::integrators::statistics::LightPathStats;
 use crate::scene::{PixelSamples, RenderJob};
 use lumiris_numbers::math::Rgb;
 use lumiris_numbers::math::hash::pcg4d;
 use rayon::prelude::*;
 use std::f32::consts::SQRT_2;
-use std::ops::Range;
 use std::sync::Arc;
 
 /// Combined with the seed of the image for the seeds of light paths.
@@ -69,16 +70,16 @@ impl LightImage {
         let seed = job.settings().sampling.seed;
         let paths = u64::from(self.guide.paths);
         let seed_of = |step: u32| pcg4d([seed, SEED, step, 0])[0];
-        let parts = (first..first.saturating_add(count)).flat_map(|step| parts(paths).map(move |part| (step, part)));
-        let parts: Vec<(u32, Range<u64>)> = parts.collect();
+        let batches: Vec<PathBatch> =
+            (first..first.saturating_add(count)).flat_map(|step| batches(step, paths)).collect();
         let scene = Scene::new(job, &self.guide);
-        let connections = trace(&scene, &parts, seed_of, &mut self.stats);
+        let connections = trace(&scene, &batches, seed_of, &mut self.stats);
 
         // Sort the contributions by row, pixel and step
         let factor = 1.0 / paths as f32;
         let mut all: Vec<(u32, Entry)> = Vec::with_capacity(connections.iter().map(Vec::len).sum());
-        for ((step, _), connections) in parts.iter().zip(&connections) {
-            let step = PixelSamples::step(*step);
+        for (batch, connections) in batches.iter().zip(&connections) {
+            let step = PixelSamples::step(batch.round);
             let entry = |c: &CameraConnection| (c.pixel[1], Entry { x: c.pixel[0], step, value: c.value * factor });
             all.extend(connections.iter().map(entry));
         }
@@ -99,13 +100,9 @@ impl LightImage {
         count
     }
 
-    /// Adds the contributions of light paths to camera samples, given by pixel, share group, and true for replicas.
-    pub(in crate::integrators) fn add(
-        &self,
-        samples: impl Iterator<Item = ([u32; 2], u32, bool)>,
-        out: &mut [PixelSample],
-    ) {
-        for (([x, y], share_group, is_replica), out) in samples.zip(out) {
+    /// Adds the contributions of light paths to camera samples.
+    pub(in crate::integrators) fn add(&self, samples: &[CameraSample], out: &mut [PixelSample]) {
+        for (&CameraSample { pixel: [x, y], share_group, is_replica, .. }, out) in samples.iter().zip(out) {
             let index = self.bounds.index_of([x, y]);
             if self.has_entries[index / 64] >> (index % 64) & 1 == 0 {
                 continue;

@@ -25,20 +25,12 @@
 mod chain;
 mod guide;
 mod image;
+mod per_sample;
 mod pilot;
 mod trace;
 
 pub(super) use chain::Chain;
 pub(super) use guide::Guide;
 pub(super) use image::LightImage;
+pub use per_sample::per_sample;
 pub use pilot::LightPilot;
-pub use trace::LightPathStats;
-
-use super::features::{self, Feature};
-use crate::scene::RenderJob;
-
-/// Light paths per camera sample; 0 if disabled.
-pub fn per_sample(job: &RenderJob) -> f32 {
-    let wanted = job.settings().integrator.light_paths.unwrap_or(0.0);
-    if wanted > 0.0 && features::allows(job, Feature::LightPaths) { wanted } else { 0.0 }
-}

@@ -1,12 +1,12 @@
 //! The pilot that learns the emission of useful light paths, and estimates their variance and time.
 
 use super::guide::Guide;
-use super::trace::{LightPathStats, Scene, Walker, parts, trace};
-use crate::integrators::features::{self, Feature};
+use super::trace::{PathBatch, Scene, Walker, batches, trace};
+use crate::integrators::exclusions::{self, Feature};
+use crate::integrators::statistics::LightPathStats;
 use crate::scene::RenderJob;
 use lumiris_numbers::math::hash::pcg4d;
 use rayon::prelude::*;
-use std::ops::Range;
 use std::time::Instant;
 
 /// Seed of pilots.
@@ -36,7 +36,7 @@ pub struct LightPilot {
 impl LightPilot {
     /// Runs the pilot with 1/`divisor` of its paths; `None` if light paths are excluded, or none is useful.
     pub fn new(job: &RenderJob, divisor: u64) -> Option<Self> {
-        if !features::allows(job, Feature::LightPaths) {
+        if !exclusions::allows(job, Feature::LightPaths) {
             return None;
         }
         let (set, bounds) = (&job.world.scene.lights, job.world.scene.film.bounds);
@@ -48,11 +48,12 @@ impl LightPilot {
         let everywhere = Guide::everywhere(set, rays as u32)?;
         let mut bundling = everywhere.begin();
         let scene = Scene::new(job, &everywhere);
-        let of_part = |walker: &mut Walker, part: Range<u64>| {
+        let of_batch = |walker: &mut Walker, batch: PathBatch| {
             let start = Instant::now();
-            (walker.first_hits(&scene, seed(0), part), start.elapsed())
+            (walker.first_hits(&scene, seed(batch.round), batch.paths), start.elapsed())
         };
-        let hits: Vec<_> = parts(rays).collect::<Vec<_>>().into_par_iter().map_init(Walker::default, of_part).collect();
+        let hits: Vec<_> =
+            batches(0, rays).collect::<Vec<_>>().into_par_iter().map_init(Walker::default, of_batch).collect();
         stats.rays += rays;
         for (hits, time) in &hits {
             hits.iter().for_each(|hit| everywhere.add(&mut bundling, hit.light, hit.d, hit.value.luminance().into()));
@@ -64,9 +65,9 @@ impl LightPilot {
         let mut guide = everywhere.learned(set, &bundling)?;
         let (mut moments, mut of_round) = (Vec::new(), (0, 0.0));
         for round in 1..=ROUNDS {
-            let parts: Vec<_> = parts(rays / RAYS_PER_PATH).map(|part| (round, part)).collect();
+            let batches: Vec<_> = batches(round, rays / RAYS_PER_PATH).collect();
             let (scene, before) = (Scene::new(job, &guide), stats);
-            let connections = trace(&scene, &parts, seed, &mut stats);
+            let connections = trace(&scene, &batches, seed, &mut stats);
 
             // Learn from their contributions
             moments.clear();

@@ -4,6 +4,7 @@ use super::chain::{camera_density, light_weight};
 use super::guide::{Emitted, Guide};
 use crate::accel::{Coherence, Hit, RayBatch};
 use crate::film::filter::FilterSampler;
+use crate::integrators::statistics::LightPathStats;
 use crate::lights::LightId;
 use crate::materials::SurfaceBsdf;
 use crate::photons::path::{BATCH, domain, path_stream};
@@ -13,7 +14,7 @@ use lumiris_numbers::math::{Ray, Rgb, Vec2, Vec3};
 use lumiris_numbers::samplers::SampleStream;
 use rayon::prelude::*;
 use std::ops::Range;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 /// Random-number domains of a light path after its emission: position on the lens and in the filter, and vertex k at
 /// `VERTEX + k`.
@@ -146,8 +147,7 @@ fn emit(scene: &Scene<'_>, stream: SampleStream) -> Option<LightPath> {
     let choice = stream.domain(domain::LIGHT).draw::<2>();
     let Emitted { light, p, p_error, n, d, power, density } =
         scene.guide.emit(&scene.job.world.scene.lights, choice, [[p0, p1], [d0, d1]])?;
-    let time = scene.job.world.scene.camera.time(0.0);
-    let ray = Ray { o: offset_origin(p, p_error, n, d), d, t_max: f32::INFINITY, time };
+    let ray = Ray { o: offset_origin(p, p_error, n, d), d, t_max: f32::INFINITY, time: 0.0 };
     Some(LightPath { ray, power, stream, light, d, density })
 }
 
@@ -170,7 +170,7 @@ impl LightPath {
         let [l0, l1, u] = self.stream.domain(FILM).draw::<3>();
         let p = at.surface.p;
         let projected = camera.project(p, [l0, l1], 0.0)?;
-        let (pixel, of_filter) = pixel_of(&scene.filter, projected.film_xy, u)?;
+        let CoveringPixel { pixel, weight: filter_weight } = sample_pixel(&scene.filter, projected.film_xy, u)?;
         if !film.bounds.contains(pixel) {
             return None;
         }
@@ -197,7 +197,7 @@ impl LightPath {
 
         // Contribution
         let measure = cos * projected.density / (distance * distance * cos_light);
-        let value = self.power * bsdf.f_cos(wo, wi) * (measure * weight * of_filter * film.scale);
+        let value = self.power * bsdf.f_cos(wo, wi) * (measure * weight * filter_weight * film.scale);
         if value.is_black() || !value.is_finite() {
             return None;
         }
@@ -207,9 +207,16 @@ impl LightPath {
     }
 }
 
-/// Samples one of the pixels whose filters cover the film point, in proportion to the magnitude of the filter. Returns
-/// the pixel, and filter value over probability.
-fn pixel_of(filter: &FilterSampler, film_xy: Vec2, u: f32) -> Option<([u32; 2], f32)> {
+/// A pixel whose filter covers a film point.
+#[derive(Clone, Copy, Debug)]
+struct CoveringPixel {
+    pixel: [u32; 2],
+    /// Filter value over the probability of the pixel.
+    weight: f32,
+}
+
+/// Samples one of the pixels whose filters cover the film point, in proportion to the magnitude of the filter.
+fn sample_pixel(filter: &FilterSampler, film_xy: Vec2, u: f32) -> Option<CoveringPixel> {
     // All pixels with their filter values
     let reach = filter.radius() + 0.5;
     let pixels = |x: f32, reach: f32| (x - reach).floor().max(0.0) as u32..=(x + reach).max(0.0) as u32;
@@ -224,7 +231,7 @@ fn pixel_of(filter: &FilterSampler, film_xy: Vec2, u: f32) -> Option<([u32; 2], 
     let total: f32 = all().map(|(_, value)| value.abs()).sum();
     let (mut left, mut chosen) = (u * total, None);
     for (pixel, value) in all() {
-        chosen = Some((pixel, total * value.signum()));
+        chosen = Some(CoveringPixel { pixel, weight: total * value.signum() });
         left -= value.abs();
         if left < 0.0 {
             break;
@@ -233,42 +240,38 @@ fn pixel_of(filter: &FilterSampler, film_xy: Vec2, u: f32) -> Option<([u32; 2], 
     chosen
 }
 
-/// Counts and times of light paths.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct LightPathStats {
-    /// Light paths.
-    pub paths: u64,
-    /// Light paths that contribute to a pixel.
-    pub connected: u64,
-    /// Rays and segments traced.
-    pub rays: u64,
-    /// Time (s), summed over threads.
-    pub time: Duration,
+/// A batch of light paths.
+#[derive(Clone, Debug)]
+pub(super) struct PathBatch {
+    /// Round of a pilot, or step of share groups: determines the seed.
+    pub(super) round: u32,
+    /// Indices of its paths in the round.
+    pub(super) paths: Range<u64>,
 }
 
-/// Divides `paths` light paths into batches.
-pub(super) fn parts(paths: u64) -> impl Iterator<Item = Range<u64>> {
-    (0..paths.div_ceil(BATCH)).map(move |i| i * BATCH..((i + 1) * BATCH).min(paths))
+/// Divides the `paths` light paths of a round into batches.
+pub(super) fn batches(round: u32, paths: u64) -> impl Iterator<Item = PathBatch> {
+    (0..paths.div_ceil(BATCH)).map(move |i| PathBatch { round, paths: i * BATCH..((i + 1) * BATCH).min(paths) })
 }
 
-/// Traces batches of light paths, given with their rounds. Returns the connections to the camera, in the order of the
+/// Traces batches of light paths. Returns the connections to the camera, in the order of the
 /// batches.
 pub(super) fn trace(
     scene: &Scene<'_>,
-    parts: &[(u32, Range<u64>)],
+    batches: &[PathBatch],
     seed: impl Fn(u32) -> u32 + Sync,
     stats: &mut LightPathStats,
 ) -> Vec<Vec<CameraConnection>> {
-    let one = |walker: &mut Walker, (round, part): &(u32, Range<u64>)| {
+    let one = |walker: &mut Walker, PathBatch { round, paths }: &PathBatch| {
         let start = Instant::now();
         walker.traced = 0;
-        walker.trace(scene, seed(*round), part.clone());
+        walker.trace(scene, seed(*round), paths.clone());
         (walker.connections.clone(), walker.traced, start.elapsed())
     };
-    let all: Vec<_> = parts.par_iter().with_max_len(1).map_init(Walker::default, one).collect();
+    let all: Vec<_> = batches.par_iter().with_max_len(1).map_init(Walker::default, one).collect();
 
     // Statistics, in the order of the batches
-    stats.paths += parts.iter().map(|(_, part)| part.end - part.start).sum::<u64>();
+    stats.paths += batches.iter().map(|batch| batch.paths.end - batch.paths.start).sum::<u64>();
     all.into_iter()
         .map(|(connections, rays, time)| {
             stats.connected += connections.len() as u64;
@@ -298,8 +301,8 @@ mod tests {
             let mut sums = std::collections::BTreeMap::<[u32; 2], f64>::new();
             for i in 0..count {
                 let u = (i as f32 + 0.5) / count as f32;
-                let (pixel, value) = pixel_of(&sampler, film, u).unwrap();
-                *sums.entry(pixel).or_default() += f64::from(value) / f64::from(count);
+                let CoveringPixel { pixel, weight } = sample_pixel(&sampler, film, u).unwrap();
+                *sums.entry(pixel).or_default() += f64::from(weight) / f64::from(count);
             }
 
             // They equal the filter values

@@ -35,15 +35,25 @@ pub(super) struct Probe {
     pub(super) stream: SampleStream,
 }
 
+/// A point of a kernel to be tested.
+#[derive(Clone, Copy, Debug)]
+struct Trial {
+    /// Base point on the tangent plane.
+    foot: Vec3,
+    /// Height of the path above the plane.
+    height: f32,
+}
+
 impl Probe {
-    /// Base point of a trial on the tangent plane, and its height.
-    fn point(&self, trial: u32) -> (Vec3, f32) {
+    /// The location of a trial.
+    fn trial(&self, trial: u32) -> Trial {
         let [u, v] = self.stream.domain(trial).draw::<2>();
         let s2 = 1.0 - (1.0 - u).sqrt();
         let (sin, cos) = (TAU * v).sin_cos();
         let d = self.radius * s2.sqrt();
         let height = HEIGHT * self.radius * (1.0 - s2).sqrt().max(0.2);
-        (self.point.p + Frame::from_z(self.point.n).to_world(Vec3::new(d * cos, d * sin, 0.0)), height)
+        let foot = self.point.p + Frame::from_z(self.point.n).to_world(Vec3::new(d * cos, d * sin, 0.0));
+        Trial { foot, height }
     }
 }
 
@@ -78,7 +88,7 @@ impl Boundary {
         self.rays.clear();
         for &i in &self.open {
             let probe = &probes[i as usize];
-            let (foot, height) = probe.point(trial);
+            let Trial { foot, height } = probe.trial(trial);
             let o = probe.point.p + probe.point.n * height;
             let d = foot - probe.point.p;
             self.rays.push(&Ray { o, d, t_max: 1.0, time: probe.time });
@@ -90,7 +100,7 @@ impl Boundary {
         self.free.clear();
         for (&i, _) in self.open.iter().zip(&self.blocked).filter(|(_, blocked)| !**blocked) {
             let probe = &probes[i as usize];
-            let (foot, height) = probe.point(trial);
+            let Trial { foot, height } = probe.trial(trial);
             let (o, d) = (foot + probe.point.n * height, probe.point.n * (-2.0 * height));
             self.rays.push(&Ray { o, d, t_max: 1.0, time: probe.time });
             self.free.push(i);

@@ -11,6 +11,15 @@ use lumiris_numbers::math::{PiecewiseConstant2D, Vec2, Vec3};
 /// Cells of the grid per axis.
 const CELLS: usize = 8;
 
+/// A photon near the point of a guide.
+#[derive(Clone, Copy, Debug)]
+pub struct GuidePhoton {
+    /// Direction of incidence, where +z is the normal.
+    pub wi: Vec3,
+    /// Power.
+    pub power: f32,
+}
+
 /// A density of directions about a normal (+z).
 #[derive(Clone, Debug)]
 pub struct Guide {
@@ -19,11 +28,10 @@ pub struct Guide {
 }
 
 impl Guide {
-    /// A guide by photons, given by the direction of incidence and the power. Without photons, the density is the
-    /// cosine.
-    pub fn new(photons: impl IntoIterator<Item = (Vec3, f32)>, fraction: f32) -> Self {
+    /// A guide by photons. Without photons, the density is the cosine.
+    pub fn new(photons: impl IntoIterator<Item = GuidePhoton>, fraction: f32) -> Self {
         let mut cells = [0.0; CELLS * CELLS];
-        for (wi, power) in photons {
+        for GuidePhoton { wi, power } in photons {
             if wi.z > 0.0 && power > 0.0 && power.is_finite() {
                 let [x, y] = invert_cosine_hemisphere(wi).map(|u| ((u * CELLS as f32) as usize).min(CELLS - 1));
                 cells[y * CELLS + x] += power;

@@ -9,22 +9,24 @@
 
 use super::boundary::{Boundary, Probe};
 use crate::direct::Vertices;
-use crate::integrators::Cameras;
-use crate::integrators::path::{BatchVertices, CameraSample};
+use crate::integrators::camera_sample::CameraSample;
+use crate::integrators::integrator::Cameras;
+use crate::integrators::path::BatchVertices;
 use crate::integrators::segment::LastVertices;
-use crate::integrators::vertices::{Stage, VertexSearch};
+use crate::integrators::statistics::MapStats;
+use crate::integrators::vertex_search::{TraceStep, VertexSearch};
 use crate::photons::{
     GatherPoint, GatherScratch, Importance, ImportanceSettings, LowImportance, Origin, Photon, PhotonBudget,
     PhotonError, PhotonMap, Search, Traced, Tracing, path_count, trace_importons, trace_photons,
 };
 use crate::scene::{RenderJob, World};
 use crate::settings::{PhotonMapSettings, PhotonStorage};
+use lumiris_numbers::math::Rgb;
 use lumiris_numbers::math::hash::pcg4d;
-use lumiris_numbers::math::{Rgb, Vec3};
 use lumiris_numbers::samplers::{SampleStream, SamplerKind};
 use rayon::prelude::*;
 use std::sync::atomic::AtomicBool;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 /// Irradiance is precomputed at every `RECORD_STRIDE`-th photon of the global map.
 const RECORD_STRIDE: usize = 4;
@@ -41,27 +43,6 @@ const RECORD_SEED: u32 = 0x65_64_67_65;
 /// Seeds of passes, and of the maps that determine the first radii.
 const PASS_SEED: u32 = 0x70_68_6f_74;
 const RADIUS_SEED: u32 = 0x72_61_64_69;
-
-/// Statistics of the maps.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct MapStats {
-    /// Number of maps.
-    pub maps: u64,
-    /// Photon paths traced, over all maps.
-    pub paths: u64,
-    /// Photons in the global map, over all maps.
-    pub global: u64,
-    /// Photons in the caustic map, over all maps.
-    pub caustic: u64,
-    /// Importons of the last map.
-    pub importons: u64,
-    /// Maximum memory of the maps of one pass (bytes).
-    pub bytes: u64,
-    /// Time of tracing.
-    pub tracing: Duration,
-    /// Time of sorting, and of precomputing irradiance.
-    pub sorting: Duration,
-}
 
 /// Photon maps of one pass, or of a whole image.
 #[derive(Debug)]
@@ -117,9 +98,8 @@ pub struct MapMaker<'a> {
 
 impl<'a> MapMaker<'a> {
     /// Traces importons if enabled, and determines the number of photon paths per map. For progressive maps, also
-    /// determines the first radii: the distance of the nearest photons at `visible`, points and normals visible to the
-    /// camera.
-    pub fn new(job: &RenderJob, visible: &[(Vec3, Vec3)], stop: &'a AtomicBool) -> Result<Self, PhotonError> {
+    /// determines the first radii: the distance of the nearest photons at `visible`, points visible to the camera.
+    pub fn new(job: &RenderJob, visible: &[GatherPoint], stop: &'a AtomicBool) -> Result<Self, PhotonError> {
         let settings = job.settings().integrator.photons;
         let (max_depth, seed) = (job.settings().integrator.max_depth, job.settings().sampling.seed);
 
@@ -331,7 +311,7 @@ impl PhotonMaps {
 }
 
 /// Diffuse points visible to the camera, spread over the image, with their normals.
-pub fn visible_points(job: &RenderJob, cameras: Cameras<'_>) -> Vec<(Vec3, Vec3)> {
+pub fn visible_points(job: &RenderJob, cameras: Cameras<'_>) -> Vec<GatherPoint> {
     let b = job.world.scene.film.bounds;
     let stride = (b.area() / PROBES).max(1);
     let pixels = (0..b.area() as u32).step_by(stride).map(|i| b.pixel_at(i));
@@ -342,7 +322,7 @@ pub fn visible_points(job: &RenderJob, cameras: Cameras<'_>) -> Vec<(Vec3, Vec3)
     search.start(job, &samples, &mut results);
     let (left, mut vertices) = (Vertices::default(), Vertices::default());
     let left = LastVertices { vertices: &left, techniques: None };
-    search.find(Stage {
+    search.find(TraceStep {
         job,
         vertex: 0,
         depth: 1,
@@ -355,24 +335,24 @@ pub fn visible_points(job: &RenderJob, cameras: Cameras<'_>) -> Vec<(Vec3, Vec3)
     // Keep Lambertian surfaces, with the normal on the side of the camera
     let first = BatchVertices { vertex: 0, paths: &search.active, vertices: &vertices };
     let points = first.each().map(|v| v.point).filter(|v| v.bsdf.lambertian(v.wo).is_some());
-    points.map(|v| (v.p, if v.bsdf.n.dot(v.wo) < 0.0 { -v.bsdf.n } else { v.bsdf.n })).collect()
+    points.map(|v| GatherPoint::flat(v.p, if v.bsdf.n.dot(v.wo) < 0.0 { -v.bsdf.n } else { v.bsdf.n })).collect()
 }
 
 /// Position and normal of some photons of a map.
-fn points_of(map: &PhotonMap) -> Vec<(Vec3, Vec3)> {
+fn points_of(map: &PhotonMap) -> Vec<GatherPoint> {
     let stride = (map.len() / PROBES).max(1);
-    map.photons().iter().step_by(stride).map(|photon| (photon.p(), photon.n())).collect()
+    map.photons().iter().step_by(stride).map(|photon| GatherPoint::flat(photon.p(), photon.n())).collect()
 }
 
 /// Median over `points` of the radius that holds `nearest` photons. `None` if, at half of the points or more, `max`
 /// holds fewer.
-fn median_reach(map: &PhotonMap, points: &[(Vec3, Vec3)], nearest: u32, max: f32) -> Option<f32> {
+fn median_reach(map: &PhotonMap, points: &[GatherPoint], nearest: u32, max: f32) -> Option<f32> {
     let mut scratch = GatherScratch::default();
     let search = Search::Nearest { count: nearest, max_radius: max };
     let mut radii: Vec<f32> = points
         .iter()
-        .map(|&(p, n)| {
-            let radius = map.gather(&GatherPoint::flat(p, n), search, &mut scratch, |_, _| ());
+        .map(|point| {
+            let radius = map.gather(point, search, &mut scratch, |_, _| ());
             if radius > 0.0 { radius } else { max }
         })
         .collect();

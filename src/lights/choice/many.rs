@@ -11,7 +11,7 @@ use crate::lights::{AreaLight, AreaShape, Light, LightCtx, LightId, LightLanes, 
 use lumiris_lanes::area::{Rectangle, many};
 use lumiris_lanes::columns::{Column, Columns3, padded, reserve};
 use lumiris_lanes::level;
-use lumiris_lanes::light_choice::{GlossyLobes, Receivers};
+use lumiris_lanes::light_tree::{GlossyLobes, Receivers};
 use lumiris_numbers::math::light_bound::GlossyLobe;
 use lumiris_numbers::math::{Rgb, Vec3};
 use std::cell::LazyCell;

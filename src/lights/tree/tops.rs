@@ -4,7 +4,7 @@ use super::tree_choice::TreeChoice;
 use super::turns::Turns;
 use lumiris_lanes::columns::{Column, reserve};
 use lumiris_lanes::level;
-use lumiris_lanes::light_choice::{Receivers, first_probabilities, importances};
+use lumiris_lanes::light_tree::{Receivers, first_probabilities, importances};
 
 /// Precomputed probabilities of many points.
 #[derive(Debug, Default)]

@@ -39,7 +39,7 @@ pub enum PartError {
 }
 
 impl PartError {
-    pub(super) fn io(path: &Path, cause: io::Error) -> Self {
+    pub(in crate::render) fn io(path: &Path, cause: io::Error) -> Self {
         PartError::Io { path: path.to_owned(), cause }
     }
 

@@ -1,8 +1,9 @@
 //! Selection of samples and pixels: the extent of a part.
 
 use super::stored::Stored;
-use crate::integrators::features::{Feature, between};
-use crate::render::{RenderSettings, TileShare, depends_on_earlier_samples};
+use crate::integrators::exclusions::{Feature, between};
+use crate::render::render_settings::{RenderSettings, depends_on_earlier_samples};
+use crate::render::tile_share::TileShare;
 use crate::settings::{Allocation, EstimatorKind, IntegratorKind, Settings};
 
 /// A part of an image; by default the whole image.

@@ -11,7 +11,8 @@ use super::stored_tile::{self, StoredTile};
 use crate::film::PixelBounds;
 use crate::film::encoding::{Decoder, Encoder};
 use crate::render::cell_progress::CellProgress;
-use crate::render::tiles::{SHARE_TILE, Tile, Tiles};
+use crate::render::tile_share::SHARE_TILE;
+use crate::render::tiles::{Tile, Tiles};
 use rayon::prelude::*;
 use std::fs::File;
 use std::io::{self, BufReader, Read, Write};
@@ -130,7 +131,7 @@ impl FilmReader {
 
         // Read the header
         let left = metadata.len().saturating_sub(start.len() as u64);
-        let (letter, bytes) = read_chunk(&mut file, left).map_err(|e| e.at(path))?;
+        let Chunk { letter, bytes } = read_chunk(&mut file, left).map_err(|e| e.at(path))?;
         let header = std::str::from_utf8(&bytes).ok().filter(|_| letter == HEADER).and_then(FilmHeader::parse);
         let header = header.ok_or_else(|| PartError::damaged(path, "its header means nothing"))?;
         let left = left - (bytes.len() as u64 + CHUNK_OVERHEAD);
@@ -152,7 +153,7 @@ impl FilmReader {
     pub fn tiles(&mut self) -> Result<Option<Vec<StoredTile>>, PartError> {
         // Read a chunk
         let damaged = |reason| PartError::damaged(&self.path, reason);
-        let (letter, bytes) = read_chunk(&mut self.file, self.left).map_err(|e| e.at(&self.path))?;
+        let Chunk { letter, bytes } = read_chunk(&mut self.file, self.left).map_err(|e| e.at(&self.path))?;
         self.left -= bytes.len() as u64 + CHUNK_OVERHEAD;
 
         // Decode and check it
@@ -252,8 +253,15 @@ impl ChunkError {
     }
 }
 
+/// A chunk of a file.
+struct Chunk {
+    /// Kind of the content.
+    letter: u8,
+    bytes: Vec<u8>,
+}
+
 /// Reads a chunk of a file with `left` remaining bytes.
-fn read_chunk(file: &mut impl Read, left: u64) -> Result<(u8, Vec<u8>), ChunkError> {
+fn read_chunk(file: &mut impl Read, left: u64) -> Result<Chunk, ChunkError> {
     const CUT: ChunkError = ChunkError::Damaged("it is cut off");
     if left < CHUNK_OVERHEAD {
         return Err(CUT);
@@ -279,7 +287,7 @@ fn read_chunk(file: &mut impl Read, left: u64) -> Result<(u8, Vec<u8>), ChunkErr
     if u32::from_le_bytes(stored) != checksum(&head, &bytes) {
         return Err(ChunkError::Damaged("a checksum is wrong"));
     }
-    Ok((head[0], bytes))
+    Ok(Chunk { letter: head[0], bytes })
 }
 
 #[cfg(test)]
@@ -287,7 +295,7 @@ mod tests {
     use super::*;
     use crate::direct::Fits;
     use crate::film::packed::PackedSums;
-    use crate::render::tiles::TileShare;
+    use crate::render::TileShare;
     use std::sync::Arc;
 
     const IMAGE: PixelBounds = PixelBounds { x0: 3, x1: 43, y0: 1, y1: 21 };

@@ -10,13 +10,14 @@ use super::notes::{SCENE_NOTE, SECONDS, asked_aovs, has_features};
 use super::stored_tile::StoredTile;
 use crate::direct::Fits;
 use crate::film::accumulator::PixelAccumulator;
-use crate::film::exact::FixedSum;
-use crate::film::layers::{LayerScratch, LightSums, PackedLayers};
+use crate::film::fixed_sums::FixedSum;
+use crate::film::layers::{LayerScratch, PackedLayers, PixelLight};
 use crate::film::packed::PackedSums;
 use crate::film::{Film, PixelBounds};
 use crate::render::control_variates;
 use crate::render::output::{Aov, default_aovs};
-use crate::render::tiles::{SHARE_TILE, Tile, film};
+use crate::render::tile_share::SHARE_TILE;
+use crate::render::tiles::{Tile, film};
 use std::collections::BTreeMap;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -314,9 +315,11 @@ fn add_to(
 }
 
 /// Adds the layers of a stored tile to an overlapping tile.
-fn add_layers_to(tile: &mut Tile, from: &PixelBounds, layers: &[Vec<(u32, LightSums)>], scratch: &mut LayerScratch) {
+fn add_layers_to(tile: &mut Tile, from: &PixelBounds, layers: &[Vec<PixelLight>], scratch: &mut LayerScratch) {
     for (layer, lit) in layers.iter().enumerate() {
-        let inside = |(i, sums): &(u32, LightSums)| Some((index_in(&tile.bounds, from, *i)? as u32, *sums));
+        let inside = |&PixelLight { pixel, sums }: &PixelLight| {
+            Some(PixelLight { pixel: index_in(&tile.bounds, from, pixel)? as u32, sums })
+        };
         let inside: Vec<_> = lit.iter().filter_map(inside).collect();
         if !inside.is_empty() {
             Arc::make_mut(&mut tile.layers).merge(layer, &inside, scratch);

@@ -7,8 +7,8 @@ use super::stored::Stored;
 use crate::cameras::Camera;
 use crate::import::LoadOptions;
 use crate::import::gltf::LightUnits;
-use crate::render::RenderSettings;
 use crate::render::output::{self, Aov};
+use crate::render::render_settings::RenderSettings;
 use crate::scene::{AccelKind, Choices, RenderJob};
 
 /// Note: the layers of the image.
@@ -16,7 +16,7 @@ const AOV: &str = "aov";
 /// Note: the path of the scene.
 pub(super) const SCENE_NOTE: &str = "scene";
 /// Note: the time of the rendering (s).
-pub(super) const SECONDS: &str = "seconds";
+pub(in crate::render) const SECONDS: &str = "seconds";
 /// Notes: the camera matrices.
 const MATRICES: [&str; 2] = ["camera_from_world", "ndc_from_world"];
 /// Setting: the layers of the sums besides radiance, and the word for features of the first surfaces.
@@ -87,7 +87,7 @@ impl Asked {
 
     /// Notes, which may differ between parts; some are needed to resume. `plan` is the text of the settings chosen by
     /// measurements.
-    pub(super) fn notes(&self, plan: Option<String>, camera: &Camera) -> Vec<(String, String)> {
+    pub(in crate::render) fn notes(&self, plan: Option<String>, camera: &Camera) -> Vec<(String, String)> {
         // One note per option that is given
         let LoadOptions { resolution, crop, environment, scene, camera: camera_name, camera_auto, light_units, time } =
             &self.load;
@@ -116,7 +116,7 @@ impl Asked {
     }
 
     /// Settings that all parts of an image have in common.
-    pub(super) fn described(&self, job: &RenderJob, settings: &RenderSettings) -> Vec<(String, String)> {
+    pub(in crate::render) fn described(&self, job: &RenderJob, settings: &RenderSettings) -> Vec<(String, String)> {
         let mut entries = output::metadata(&job.world.scene.film, job.settings());
         entries.push(("lumiris:accel".to_owned(), <&str>::from(self.accel).to_owned()));
         let layers = [(settings.with_features, FEATURES), (settings.with_replicas, "variance")];

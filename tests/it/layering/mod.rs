@@ -55,6 +55,9 @@ const INTERFACES_IN_FILES: &[&str] = &[
     "settings",
     "scene",
     "photons",
+    "direct",
+    "integrators",
+    "render",
 ];
 
 /// Modules of the numbers crate, with the modules that each may import.

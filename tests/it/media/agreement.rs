@@ -3,7 +3,7 @@
 use super::{BOX, assert_answer, assert_they_agree, camera, choose, estimators, grid, job, means, media};
 use crate::path_reuse::image_of_seed;
 use crate::same_light::assert_same_light;
-use lumiris::integrators::features::{Feature, allows};
+use lumiris::integrators::exclusions::{Feature, allows};
 use lumiris::lights::LightCtx;
 use lumiris::media::Medium;
 use lumiris::render::{RenderSettings, render};

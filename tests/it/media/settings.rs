@@ -3,7 +3,7 @@
 use super::{BOX, camera, cloud, film, job, media};
 use lumiris::import::cache::FileCache;
 use lumiris::import::{LoadOptions, load_text};
-use lumiris::integrators::features::{Feature, allows};
+use lumiris::integrators::exclusions::{Feature, allows};
 use lumiris::integrators::reuse;
 use lumiris::planning::{Preparation, prepare};
 use lumiris::render::{RenderSettings, render};

@@ -9,7 +9,7 @@ use super::settings_args::SettingsArgs;
 use anyhow::Context;
 use clap::Args;
 use lumiris::import::cache::FileCache;
-use lumiris::integrators::features;
+use lumiris::integrators::exclusions;
 use lumiris::lights::LightSamplerKind;
 use lumiris::scene::RenderJob;
 use lumiris::settings::{EstimatorKind, IntegratorKind, Settings};
@@ -214,7 +214,7 @@ pub(super) fn efficiency(scene_args: &SceneArgs, own: &EfficiencyArgs, json: Opt
 
 /// True if a case can render the scene; otherwise prints the reason.
 fn is_possible(case: &Case, (job, scene): (&RenderJob, &Path)) -> bool {
-    let refusal = features::refusal(job, &case.settings.integrator);
+    let refusal = exclusions::refusal(job, &case.settings.integrator);
     if let Some(conflict) = refusal {
         progress::say(&format!("{}: {} is left out: {conflict}", scene.display(), case.name));
     }

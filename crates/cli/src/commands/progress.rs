@@ -3,7 +3,7 @@
 
 use anyhow::Context;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
-use lumiris::film::noise::Noise;
+use lumiris::film::image_noise::Noise;
 use lumiris::render::Progress;
 use std::collections::BTreeSet;
 use std::io::{self, Write};

@@ -22,15 +22,16 @@ use lumiris::film::Film;
 use lumiris::imaging::oidn::Denoiser;
 use lumiris::imaging::tiles::TileCounts;
 use lumiris::import::cache::FileCache;
-use lumiris::integrators::photon_map::MapStats;
+use lumiris::integrators::MapStats;
 use lumiris::integrators::{LightPathStats, light_layers};
 use lumiris::planning::preparation::pilot_deadline;
 use lumiris::planning::{Preparation, has_pilot};
+use lumiris::render::FilmFile;
 use lumiris::render::cryptomatte::cryptomattes;
 use lumiris::render::memory::{Wanted, predict};
 use lumiris::render::output::{self, Aov};
-use lumiris::render::parts::{FilmFile, PLAN_NOTE};
-use lumiris::render::{CacheReport, Continuation, Progress, RenderError, RenderSettings, Rendering, TileShare, go_on};
+use lumiris::render::parts::PLAN_NOTE;
+use lumiris::render::{CacheReport, Continuation, Progress, RenderError, RenderSettings, Rendering, TileShare, resume};
 use lumiris::scene::RenderJob;
 use lumiris::settings::{IntegratorKind, IntegratorSettings};
 use lumiris_formats::output::{check_writable, write_text};
@@ -284,12 +285,12 @@ fn render_shown(
     };
     let continuation = Continuation { tells_noise: bar.is_visible(), ..continuation };
     // Without viewers
-    let Some(shown) = canvas else { return Ok(go_on(job, settings, interrupt::stop(), &observe, continuation)?) };
+    let Some(shown) = canvas else { return Ok(resume(job, settings, interrupt::stop(), &observe, continuation)?) };
 
     // With viewers: send the tiles, and the final film
     let set_tile = |tile: &Film| shown.set_tile(tile);
     let watched = Continuation { watch: Some(&set_tile), ..continuation };
-    let rendering = go_on(job, settings, interrupt::stop(), &observe, watched)?;
+    let rendering = resume(job, settings, interrupt::stop(), &observe, watched)?;
     shown.finish(&rendering.film);
     Ok(rendering)
 }

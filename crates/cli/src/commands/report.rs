@@ -6,7 +6,7 @@ use super::laps::Laps;
 use super::progress;
 use super::settings::SetupTimes;
 use lumiris::film::Summary;
-use lumiris::film::noise::Reached;
+use lumiris::film::image_noise::Reached;
 use lumiris::render::Rendering;
 use lumiris::scene::RenderJob;
 use lumiris::settings::Settings;

@@ -2,7 +2,7 @@
 
 use super::Canvas;
 use lumiris::film::Film;
-use lumiris::render::{Continuation, RenderError, RenderSettings, go_on};
+use lumiris::render::{Continuation, RenderError, RenderSettings, resume};
 use lumiris::scene::RenderJob;
 use lumiris::settings::IntegratorKind;
 use std::sync::Arc;
@@ -34,5 +34,5 @@ pub(crate) fn preview(
     };
     let first = RenderSettings { spp: 1, skip: 0, share: None, time_limit: None, ..*settings };
     let watched = Continuation { watch: Some(&set_tile), ..Continuation::default() };
-    go_on(job, &first, &is_over, &|_| (), watched).map(drop)
+    resume(job, &first, &is_over, &|_| (), watched).map(drop)
 }

@@ -6,11 +6,11 @@
 pub mod dragon;
 pub mod fan;
 pub mod files;
+pub mod gradient_noise;
 mod head;
 pub mod keller_wald;
 mod limbs;
 pub mod nets;
-pub mod noise;
 pub mod ply;
 pub mod relief;
 pub mod sky;

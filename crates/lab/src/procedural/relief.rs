@@ -1,6 +1,6 @@
 //! Carved reliefs: heights above the surface of a solid, as functions of the position on it.
 
-use super::noise::{fractal, noise, ridged, smoothstep};
+use super::gradient_noise::{fractal, noise, ridged, smoothstep};
 use lumiris_numbers::math::Vec3;
 use std::f32::consts::{PI, TAU};
 

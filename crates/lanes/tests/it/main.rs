@@ -9,7 +9,7 @@ mod environment;
 mod kernels;
 mod lane;
 mod light;
-mod light_choice;
+mod light_tree;
 mod sampler;
 mod sums;
 mod support;

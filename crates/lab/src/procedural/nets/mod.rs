@@ -401,7 +401,7 @@ impl Net<'_> {
 #[cfg(test)]
 pub(super) mod tests {
     use super::*;
-    use crate::procedural::noise::noise;
+    use crate::procedural::gradient_noise::noise;
     use std::collections::BTreeMap;
 
     /// A torus, or noise inside a ball: all cases occur.

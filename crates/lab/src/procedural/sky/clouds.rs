@@ -5,7 +5,7 @@
 //! p(γ) e^(−τₛ) + b/(1 + τₛ)) + S): light of single forward scattering, diffuse light of multiple scattering, and
 //! skylight S. The background is attenuated by e^(−τ). Clouds fade into the air at the horizon.
 
-use crate::procedural::noise::{fractal, noise, smoothstep};
+use crate::procedural::gradient_noise::{fractal, noise, smoothstep};
 use lumiris_numbers::math::{Rgb, Vec2, Vec3};
 use std::f32::consts::PI;
 

@@ -1,8 +1,12 @@
 //! Traces paths to their next vertices, and adds the emission on the way.
 
+use super::camera_sample::CameraSample;
+use super::domain;
 use super::light_layers::LayerSums;
 use super::light_paths::{Chain, Guide};
-use super::segment::{CameraSample, LastVertices, PathState, PathStats, domain};
+use super::recording::Recording;
+use super::segment::{LastVertices, PathState};
+use super::statistics::PathStats;
 use crate::accel::{Coherence, Hit, RayBatch};
 use crate::direct::Vertices;
 use crate::direct::vertices::VertexData;
@@ -21,28 +25,8 @@ use std::time::Instant;
 /// Maximum number of non-scattering surfaces between two vertices.
 const MAX_PASSED: u32 = 64;
 
-/// Copies of the rays traced, batch by batch, for measurements.
-#[derive(Clone, Debug, Default)]
-pub struct Recording {
-    /// Camera rays up to their first surface.
-    pub camera: Vec<RayBatch>,
-    /// All other path segments.
-    pub bounces: Vec<RayBatch>,
-    /// Shadow segments of first vertices.
-    pub segments: Vec<RayBatch>,
-    /// Shadow segments of later vertices.
-    pub bounce_segments: Vec<RayBatch>,
-}
-
-impl Recording {
-    /// The shadow segments of a vertex, counted from 0.
-    pub(super) fn segments_at(&mut self, vertex: u32) -> &mut Vec<RayBatch> {
-        if vertex == 0 { &mut self.segments } else { &mut self.bounce_segments }
-    }
-}
-
 /// A batch of paths to be traced to the next vertices.
-pub(super) struct Stage<'a, 'w> {
+pub(super) struct TraceStep<'a, 'w> {
     pub(super) job: &'w RenderJob,
     /// Index of the vertices along their paths, and the maximum number of vertices.
     pub(super) vertex: u32,
@@ -57,7 +41,7 @@ pub(super) struct Stage<'a, 'w> {
 }
 
 /// The result of a flight through a medium.
-pub(super) enum Flown {
+pub(super) enum FlightOutcome {
     /// No collision before the hit of the ray.
     Through,
     /// The path was scattered or absorbed.
@@ -123,7 +107,7 @@ impl VertexSearch {
 
     /// Traces the active paths to their next vertices, and adds the emission on the way. `at.vertices` receives the
     /// vertices of the paths that reach a scattering surface or scatter in a medium.
-    pub(super) fn find(&mut self, mut at: Stage<'_, '_>) {
+    pub(super) fn find(&mut self, mut at: TraceStep<'_, '_>) {
         let mut coherence = if at.vertex == 0 { Coherence::Coherent } else { Coherence::Incoherent };
         self.plain.clear();
         self.traced.clear();
@@ -159,15 +143,15 @@ impl VertexSearch {
 
     /// Processes a traced path: flight through its medium, emission, and vertex or continuation.
     #[inline]
-    fn process_hit(&mut self, at: &mut Stage<'_, '_>, paths: &mut Vec<PathState>, index: u32, hit: Option<&Hit>) {
+    fn process_hit(&mut self, at: &mut TraceStep<'_, '_>, paths: &mut Vec<PathState>, index: u32, hit: Option<&Hit>) {
         let mut index = index;
 
         // Medium
         if paths[index as usize].medium.is_some() {
-            match self.fly(at, index, &mut paths[index as usize], hit) {
-                Flown::Through => {}
-                Flown::Ended => return,
-                Flown::Ghost(ghost) => {
+            match self.sample_flight(at, index, &mut paths[index as usize], hit) {
+                FlightOutcome::Through => {}
+                FlightOutcome::Ended => return,
+                FlightOutcome::Ghost(ghost) => {
                     index = paths.len() as u32;
                     paths.push(ghost);
                 }
@@ -177,15 +161,15 @@ impl VertexSearch {
         // Surface or environment
         let path = &mut paths[index as usize];
         match hit {
-            Some(hit) if self.take_plain(at, index, path, hit) => {}
-            Some(hit) => self.take(at, index, path, hit),
+            Some(hit) if self.add_plain_mesh_hit(at, index, path, hit) => {}
+            Some(hit) => self.process_surface(at, index, path, hit),
             None if self.adds_emission(at.vertex, path) => self.escaped.push(index),
             None => {}
         }
     }
 
     /// Sets times and random numbers of the vertices.
-    fn set_numbers(&self, at: &mut Stage<'_, '_>) {
+    fn set_numbers(&self, at: &mut TraceStep<'_, '_>) {
         let Vertices { path, time, streams, direct, .. } = &mut *at.vertices;
         let sample = |&path: &u32| &at.samples[self.active[path as usize].sample as usize];
         let key = domain::VERTEX + at.vertex;
@@ -196,7 +180,7 @@ impl VertexSearch {
     }
 
     /// Sets the features of first vertices on plain meshes.
-    fn set_plain_features(&self, at: &mut Stage<'_, '_>) {
+    fn set_plain_features(&self, at: &mut TraceStep<'_, '_>) {
         let Vertices { path, surface, .. } = &*at.vertices;
         for (row, &(object, depth)) in at.vertices.plain_rows().zip(&self.plain) {
             let (z, wo) = (surface.ns.vec3(row), surface.wo.vec3(row));
@@ -218,7 +202,7 @@ impl VertexSearch {
     /// Handles the hit of a mesh with a constant Lambertian reflectance, whose points are computed together with
     /// others. Returns false for all other hits.
     #[inline]
-    fn take_plain(&mut self, at: &mut Stage<'_, '_>, index: u32, path: &mut PathState, hit: &Hit) -> bool {
+    fn add_plain_mesh_hit(&mut self, at: &mut TraceStep<'_, '_>, index: u32, path: &mut PathState, hit: &Hit) -> bool {
         let is_last = at.vertex >= at.depth;
         let Some(rho) = at.job.plain_reflectance(hit) else { return false };
         if path.medium.is_some() || path.is_ghost || is_last && at.vertex == 0 {
@@ -248,7 +232,7 @@ impl VertexSearch {
 
     /// Handles any other hit, and adds its vertex if the path continues.
     #[inline]
-    fn take(&mut self, at: &mut Stage<'_, '_>, index: u32, path: &mut PathState, hit: &Hit) {
+    fn process_surface(&mut self, at: &mut TraceStep<'_, '_>, index: u32, path: &mut PathState, hit: &Hit) {
         let interaction = SurfaceInteraction::new(at.job, &path.ray, path.width, path.spread, hit);
         let (sample, out) = (&at.samples[path.sample as usize], &mut at.out[path.sample as usize]);
 
@@ -295,7 +279,7 @@ impl VertexSearch {
         // The vertex, unless the path stays in an interior
         let media = interaction.sides(at.job, path.medium);
         path.beta = beta;
-        let Some(bsdf) = self.leave(at, index, path, &interaction, bsdf, media) else { return };
+        let Some(bsdf) = self.exit_or_reflect(at, index, path, &interaction, bsdf, media) else { return };
         let SurfaceInteraction { surface, wo, width, .. } = interaction;
         path.chain = self.chain(at, path, &interaction, &bsdf);
         path.width = width;
@@ -309,7 +293,13 @@ impl VertexSearch {
     }
 
     /// The part of the path that light paths can sample as well, at a vertex with this BSDF.
-    fn chain(&self, at: &Stage<'_, '_>, path: &PathState, met: &SurfaceInteraction, bsdf: &SurfaceBsdf<'_>) -> Chain {
+    fn chain(
+        &self,
+        at: &TraceStep<'_, '_>,
+        path: &PathState,
+        met: &SurfaceInteraction,
+        bsdf: &SurfaceBsdf<'_>,
+    ) -> Chain {
         if self.guide.is_none() || path.passed > 0 {
             return Chain::NONE;
         }
@@ -324,7 +314,7 @@ impl VertexSearch {
     }
 
     /// The wavelength of a path, and the throughput factor of its sampling.
-    fn wavelength(&self, at: &Stage<'_, '_>, path: &PathState) -> (f32, Rgb) {
+    fn wavelength(&self, at: &TraceStep<'_, '_>, path: &PathState) -> (f32, Rgb) {
         path.wavelength.map_or_else(
             || {
                 let stream = at.samples[path.sample as usize].stream;
@@ -335,8 +325,14 @@ impl VertexSearch {
     }
 
     /// Samples the free flight of a path through its medium, and adds the emission of the medium.
-    fn fly(&mut self, at: &mut Stage<'_, '_>, index: u32, path: &mut PathState, hit: Option<&Hit>) -> Flown {
-        let Some(id) = path.medium.filter(|_| !path.is_ghost) else { return Flown::Through };
+    fn sample_flight(
+        &mut self,
+        at: &mut TraceStep<'_, '_>,
+        index: u32,
+        path: &mut PathState,
+        hit: Option<&Hit>,
+    ) -> FlightOutcome {
+        let Some(id) = path.medium.filter(|_| !path.is_ghost) else { return FlightOutcome::Through };
         let medium = &at.job.world.scene.media.media[id as usize];
         if medium.is_interior() {
             return self.walk(at, medium, index, path, hit);
@@ -365,7 +361,7 @@ impl VertexSearch {
         match end {
             End::Through { weight } => {
                 path.weaken(weight);
-                Flown::Through
+                FlightOutcome::Through
             }
             End::Scattered { t, weight } => {
                 let ghost = PathState { is_ghost: true, ..*path };
@@ -378,13 +374,13 @@ impl VertexSearch {
                     at.vertices.push(VertexData { path: index, p, p_error, wo: bsdf.frame.z, bsdf, media });
                 }
                 let wants_features = at.vertex == 0 && self.features != FeatureSet::None;
-                if wants_features { Flown::Ghost(ghost) } else { Flown::Ended }
+                if wants_features { FlightOutcome::Ghost(ghost) } else { FlightOutcome::Ended }
             }
         }
     }
 
     /// Adds the radiance of infinite lights along the escaped paths, with the weights of the techniques that drew them.
-    fn add_infinite(&mut self, at: &mut Stage<'_, '_>) {
+    fn add_infinite(&mut self, at: &mut TraceStep<'_, '_>) {
         let (lights, layers, left, out) = (&at.job.lights, &mut self.layers, &at.left, &mut *at.out);
         let (active, escaped) = (&self.active, &self.escaped);
         let path = |i: usize| &active[escaped[i] as usize];

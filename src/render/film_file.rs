@@ -1,15 +1,12 @@
 //! Storage of a rendering: checkpoints while it runs, a part at the end.
 
-use super::checkpoint::Checkpoints;
-use super::error::PartError;
-use super::file::write_film;
-use super::header::{FilmHeader, PLAN_NOTE};
-use super::notes::{Asked, SECONDS};
-use super::stored::Stored;
-use super::stored_tile::StoredTile;
+use super::cell_progress::CellProgress;
+use super::continuation::Continuation;
+use super::parts::notes::SECONDS;
+use super::parts::{Asked, Checkpoints, FilmHeader, PLAN_NOTE, PartError, Stored, StoredTile, write_film};
+use super::render_settings::RenderSettings;
+use super::rendering::Rendering;
 use crate::import::fingerprint::SceneFiles;
-use crate::render::cell_progress::CellProgress;
-use crate::render::{Continuation, RenderSettings, Rendering};
 use crate::scene::RenderJob;
 use std::path::{Path, PathBuf};
 use std::time::Duration;

@@ -1,9 +1,9 @@
-//! Tests of `lumiris_lanes::light_choice`.
+//! Tests of `lumiris_lanes::light_tree`.
 
 use super::support::assert_same_bits;
 use lumiris_lanes::lane::LANES;
 use lumiris_lanes::level;
-use lumiris_lanes::light_choice::{GlossyLobes, Receivers, first_probabilities, importances};
+use lumiris_lanes::light_tree::{GlossyLobes, Receivers, first_probabilities, importances};
 use lumiris_lanes::vertex::Columns3;
 use lumiris_numbers::math::Vec3;
 use lumiris_numbers::math::light_bound::{GlossyLobe, LightBound, Receiver, first_probability};

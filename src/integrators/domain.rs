@@ -1,0 +1,17 @@
+//! Random-number domains of a path vertex.
+
+pub(super) const DIRECT: u32 = 0;
+pub(super) const BSDF: u32 = 1;
+pub(super) const ROULETTE: u32 = 2;
+pub(super) const RESAMPLE: u32 = 3;
+pub(super) const ALBEDO: u32 = 4;
+/// Vertex k uses the domain `VERTEX + k` of the camera sample.
+pub(super) const VERTEX: u32 = 16;
+/// The segment to vertex k, through media, uses the domain `FLIGHT + k`.
+pub(super) const FLIGHT: u32 = 1 << 19;
+/// The light for equiangular distance sampling in media.
+pub(super) const FOCUS: u32 = 1 << 18;
+/// The walk through an interior before vertex k uses the domain `WALK + k`.
+pub(super) const WALK: u32 = 1 << 17;
+/// The wavelength of the path.
+pub(super) const WAVELENGTH: u32 = 1 << 16;
