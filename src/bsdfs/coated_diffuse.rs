@@ -138,7 +138,7 @@ impl<'a> CoatedDiffuse<'a> {
             Some(Kernel::SmoothCoated) => evaluate::<SmoothCoated>(&p, &[], wo, wi),
             Some(_) => evaluate::<Coated>(&p, self.tables(), wo, wi),
             None => to_upper(wo, wi).map_or((Rgb::BLACK, 0.0), |(wo, wi)| {
-                let value = rough_value(&p, (wo.into(), wi.into()), self.directional(wo), self.directional(wi)[0]);
+                let value = rough_value(&p, wo.into(), wi.into(), self.directional(wo), self.directional(wi)[0]);
                 let value = value.kept(true);
                 (Rgb::from_array(value.f_cos), value.pdf)
             }),
@@ -174,7 +174,7 @@ impl<'a> CoatedDiffuse<'a> {
         let wo = wo.times(flip);
         let of_wo = self.directional(wo.into());
         let (wi, is_interface) = rough_direction(p, wo, of_wo, u);
-        let value = rough_value(p, (wo, wi), of_wo, self.directional(wi.into())[0]);
+        let value = rough_value(p, wo, wi, of_wo, self.directional(wi.into())[0]);
         let kind = coated::kind(is_interface, lobe::GLOSSY, flip);
         Drawn::new(wi.times(flip), value, kind, 1.0).kept(wo.z > 0.0 && wi.z > 0.0)
     }

@@ -305,6 +305,7 @@ impl Camera {
     /// depends only on the point, so all techniques that sample a path agree on it [Pharr et al. 2023, §10.1.3].
     #[inline]
     pub fn pixel_width(&self, p: Vec3, time: f32) -> f32 {
+        // Distance and direction from the camera
         let base = self.base();
         let world_from_camera = placement_at(&base.world_from_camera, time);
         let d = p - world_from_camera.transform_point3(Vec3::ZERO);
@@ -312,6 +313,8 @@ impl Camera {
         if !(distance > 0.0) {
             return 0.0;
         }
+
+        // Width = distance × spread of the camera in this direction
         let cos_to = |axis: Vec3| (d.dot(world_from_camera.transform_vector3(axis).normalize()) / distance).abs();
         match self {
             Camera::Perspective { base, screen_window, tan_half_fov, .. } => {

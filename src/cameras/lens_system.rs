@@ -320,6 +320,7 @@ fn check(elements: &[LensElement]) -> Result<(), String> {
     if elements.is_empty() {
         return Err("there are no surfaces".to_owned());
     }
+    // Numbers of each surface
     for (i, e) in elements.iter().enumerate() {
         let values = [e.curvature_radius, e.thickness, e.eta, e.aperture_radius];
         let is_right = values.iter().all(|v| v.is_finite())
@@ -335,6 +336,8 @@ fn check(elements: &[LensElement]) -> Result<(), String> {
             ));
         }
     }
+
+    // Surfaces without curvature are aperture stops
     match elements.iter().filter(|e| e.curvature_radius == 0.0).count() {
         0 | 1 => Ok(()),
         n => Err(format!("there are {n} aperture stops; a lens has one")),

@@ -126,11 +126,14 @@ pub(super) fn emitter_at(
     time: f32,
     pmf: impl FnOnce(&LightCtx, LightId) -> f32,
 ) -> Option<EmitterInDirection> {
+    // Emission towards the point
     let lights = &job.lights;
     let light = hit.light.filter(|&light| !lights.lights[light as usize].is_dark_from(ctx.p))?;
     let surface = job.world.scene.geometry.surface_hit(hit.geometry, hit.primitive, Hit::NO_INSTANCE, hit.uv, time);
     let light_hit = LightHit { t: hit.t, p: surface.p, n: surface.n, uv: surface.uv };
     let li = lights.lights[light as usize].l(&light_hit, -wi);
+
+    // Density of the same direction by light sampling
     (!li.is_black()).then(|| {
         let pdf = lights.lights[light as usize].pdf_li(ctx, wi, &light_hit);
         let p_light = if pdf > 0.0 { pdf * pmf(ctx, light) } else { 0.0 };

@@ -290,6 +290,7 @@ impl ProposalColumns {
     fn adapt_weights(&mut self, job: &RenderJob, point: &ShadingPoint<'_>, target: Target, start: usize, end: usize) {
         match target {
             Target::Fgl | Target::Gvl => {}
+            // The cosine alone
             Target::Gv => {
                 for i in start..end {
                     self.p_hat[i] = self.f_cos[0][i];
@@ -299,16 +300,17 @@ impl ProposalColumns {
             Target::Visibility | Target::VisibilityControl => {
                 let ctx = point.light_ctx();
                 let contributing = job.lights.contributing_lights(&ctx);
-                let mut of = (NO_LIGHT, 0.0, 0.0);
+                // The samples of a light are consecutive
+                let (mut last, mut visibility, mut factor_of_last) = (NO_LIGHT, 0.0, 0.0);
                 for i in start..end {
                     let light = self.chosen[i].0;
-                    if of.0 != light {
-                        let v = job.lights.visibility(&ctx, &contributing, light);
-                        of = (light, v, factor(target, v));
+                    if last != light {
+                        visibility = job.lights.visibility(&ctx, &contributing, light);
+                        (last, factor_of_last) = (light, factor(target, visibility));
                     }
-                    self.visibility[i] = of.1;
-                    self.p_hat[i] *= of.2;
-                    self.weight[i] *= of.2;
+                    self.visibility[i] = visibility;
+                    self.p_hat[i] *= factor_of_last;
+                    self.weight[i] *= factor_of_last;
                 }
             }
         }

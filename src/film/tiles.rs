@@ -182,10 +182,14 @@ impl Film {
             if left >= right {
                 continue;
             }
+
+            // Whole rows of the tile, since sums are packed row by row
             let (top, bottom, len) = (bounds.y0.max(pixels.y0), bounds.y1.min(pixels.y1), bounds.width() as usize);
             let start = (top - bounds.y0) as usize * len;
             sums.resize((bottom - top) as usize * len, S::default());
             read(tile, start..start + sums.len(), &mut sums);
+
+            // Their common pixels
             for (y, row) in (top..bottom).zip(sums.chunks_exact(len)) {
                 let at = pixels.index_of([left, y]);
                 let row = &row[(left - bounds.x0) as usize..(right - bounds.x0) as usize];

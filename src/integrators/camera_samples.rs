@@ -134,6 +134,7 @@ impl<'a> CameraSampler<'a> {
         scratch: &mut Scratch,
         out: &mut Vec<CameraSample>,
     ) {
+        // Other cameras make their rays one by one
         let Some((pinhole, o)) = &self.pinhole else {
             for PixelSampleRange { fit, pixel, samples } in pixels {
                 out.extend(samples.map(|sample| CameraSample { fit, ..self.sample(pixel, sample, seed) }));
@@ -141,6 +142,7 @@ impl<'a> CameraSampler<'a> {
             return;
         };
 
+        // Film positions, rays, and the other fields
         self.draw_numbers(pixels, seed, scratch);
         self.find_film_positions(scratch);
         let len = padded(scratch.streams.len());
@@ -154,6 +156,7 @@ impl<'a> CameraSampler<'a> {
     fn draw_numbers(&self, pixels: impl Iterator<Item = PixelSampleRange>, seed: u32, scratch: &mut Scratch) {
         let Scratch { pixels: of_pixels, streams, points, u: [x, y], weight, d, spread } = scratch;
         let kind = self.job.settings().sampling.sampler;
+        // Streams, and the net points of samplers that are made of nets
         of_pixels.clear();
         streams.clear();
         points.clear();
@@ -162,6 +165,8 @@ impl<'a> CameraSampler<'a> {
             SampleStream::append((kind, pixel, seed), samples, domain::FILM_AND_LENS, (streams, points));
             of_pixels.push(range);
         }
+
+        // Two numbers of each
         let (n, len) = (streams.len(), padded(streams.len()));
         reserve(&mut [x, y, weight, spread], len);
         d.reserve(len);
@@ -212,6 +217,7 @@ impl<'a> CameraSampler<'a> {
                 of_pixel.share_group = sample;
             }
             first += samples.len();
+            // Fields that few images need
             if !self.are_plain {
                 for (of_pixel, sample) in out[begin..].iter_mut().zip(samples.clone()) {
                     of_pixel.direct = self.direct_stream(pixel, sample, seed).unwrap_or(of_pixel.stream);

@@ -92,6 +92,7 @@ impl PathState {
         }
     }
 
+    /// Features of the first surface, for denoisers and AOVs.
     pub(super) fn features(
         &self,
         job: &RenderJob,

@@ -119,11 +119,7 @@ pub fn measure_frame(job: &RenderJob, tile_size: u32, rays: usize, turns: u32) -
     // Record the rays
     let (tracer, samples, results, packed, times) = Default::default();
     let mut frame = Frame { job, batches, tracer, samples, results, packed, times };
-    frame.tracer.record();
-    frame.render();
-    let recording = frame.tracer.take_recording();
-    frame.tracer.take_stats();
-    frame.times = Times::default();
+    let recording = frame.record();
 
     // Calibrate the bare loop
     let (geometry, textures) = (Arc::clone(&job.world.scene.geometry), Arc::clone(&job.world.scene.textures));
@@ -153,34 +149,36 @@ pub fn measure_frame(job: &RenderJob, tile_size: u32, rays: usize, turns: u32) -
 
     // Medians
     let [ours, traced] = [0, 1].map(|slot| median(both.iter().map(|turn| turn[slot])));
-    let stage = |name, of: &dyn Fn(&PathStats, &Times) -> Duration| FrameStage {
-        name,
-        ns_per_camera_sample: median(stats.iter().map(|(stats, times)| per_sample(of(stats, times)))),
-    };
-    let mut stages = vec![stage("camera_samples", &|_, times| times.camera_samples)];
-    stages.extend(
-        PathStats::default().stages().iter().enumerate().map(|(i, (name, _))| stage(name, &|s, _| s.stages()[i].1)),
-    );
-    stages.push(stage("paths", &|s, times| s.beside_stages(times.tracing)));
-    stages.push(stage("film", &|_, times| times.film));
+    let rays = kinds.iter().zip(&of_kinds).map(|(kind, times)| BareRays {
+        name: kind.name,
+        per_camera_sample: kind.rays() as f64 / camera_samples.max(1) as f64,
+        width: kind.width,
+        ns_per_ray: median(times.iter().copied()),
+    });
     Ok(FrameReport {
         camera_samples,
         ns_per_camera_sample: ours,
         bare_trace_ns_per_camera_sample: traced,
         tracing_share: traced / ours,
-        stages,
-        rays: kinds
-            .iter()
-            .zip(&of_kinds)
-            .map(|(kind, times)| BareRays {
-                name: kind.name,
-                per_camera_sample: kind.rays() as f64 / camera_samples.max(1) as f64,
-                width: kind.width,
-                ns_per_ray: median(times.iter().copied()),
-            })
-            .collect(),
+        stages: stages(&stats, per_sample),
+        rays: rays.collect(),
         turns: both,
     })
+}
+
+/// Median times of the stages over all turns. `per_sample` divides a time by the number of camera samples.
+fn stages(turns: &[(PathStats, Times)], per_sample: impl Fn(Duration) -> f64) -> Vec<FrameStage> {
+    let stage = |name, of: &dyn Fn(&PathStats, &Times) -> Duration| FrameStage {
+        name,
+        ns_per_camera_sample: median(turns.iter().map(|(stats, times)| per_sample(of(stats, times)))),
+    };
+    let tracing = PathStats::default().stages();
+    let tracing = tracing.iter().enumerate().map(|(i, (name, _))| stage(name, &|s, _| s.stages()[i].1));
+    let mut stages = vec![stage("camera_samples", &|_, times| times.camera_samples)];
+    stages.extend(tracing);
+    stages.push(stage("paths", &|s, times| s.beside_stages(times.tracing)));
+    stages.push(stage("film", &|_, times| times.film));
+    stages
 }
 
 fn kinds(recording: &Recording) -> Vec<Kind<'_>> {
@@ -215,6 +213,15 @@ struct Frame<'a> {
 }
 
 impl Frame<'_> {
+    /// Renders once without counting, and returns the rays.
+    fn record(&mut self) -> Recording {
+        self.tracer.record();
+        self.render();
+        self.tracer.take_stats();
+        self.times = Times::default();
+        self.tracer.take_recording()
+    }
+
     /// Renders the batches, from camera samples to sums of pixels.
     fn render(&mut self) {
         // From camera samples to packed sums, with the time of each step

@@ -43,7 +43,7 @@ fn connect_lanes<S: Simd>(simd: S, from: &Vertices<'_>, to: &Vertices<'_>, out: 
         for i in (0..len).step_by(LANES) {
             let at = j * len + i;
             let start = from.ends.load(simd, i);
-            let g = density((start, Vec3s::load(simd, from.ns, i)), (end, ns));
+            let g = density(start, Vec3s::load(simd, from.ns, i), end, ns);
             store(g, out.g, at);
             if g.simd_gt(F::splat(simd, 0.0)).any_true() {
                 let o = offset_origins(start, end[0].minus(start[0]));
@@ -61,7 +61,7 @@ fn splat<S: Simd>(simd: S, [x, y, z]: Columns3<'_>, j: usize) -> Vec3s<S> {
 }
 
 #[inline(always)]
-fn density<S: Simd>((x, x_ns): (End<S>, Vec3s<S>), (y, y_ns): (End<S>, Vec3s<S>)) -> F<S> {
+fn density<S: Simd>(x: End<S>, x_ns: Vec3s<S>, y: End<S>, y_ns: Vec3s<S>) -> F<S> {
     let d = y[0].minus(x[0]);
     let (cos, cos_y, cos_shading) = (x_ns.dot(d), -y[2].dot(d), -y_ns.dot(d));
     let zero = F::splat(d.x.token(), 0.0);

@@ -109,6 +109,7 @@ impl Controls {
         emitters: &EmitterRays,
         vertices: &Vertices<'_>,
     ) {
+        // Light groups; rays that hit nothing belong to the group of the infinite lights
         self.divide([n_light, n_bsdf], samples, false);
         let groups = &job.lights.groups;
         let infinite = job.lights.infinite.iter().find_map(|l| groups.group_of(*l));
@@ -119,6 +120,8 @@ impl Controls {
                 sums[group] += part;
             }
         }
+
+        // Lobe
         self.add_lobes([n_light, n_bsdf], samples, vertices);
     }
 

@@ -1,7 +1,7 @@
 //! Directions from many points to one surface. The formulas are in the modules of `lights::kinds::area`.
 
+use super::shapes::{Rectangle, barycentric};
 use super::spherical::SphericalSetup;
-use super::{Rectangle, barycentric};
 use crate::lane::{F, LANES, M, Vec3s, load, narrowed, or_zero, store, widened};
 use fearless_simd::{Level, Simd, dispatch, f64x8, prelude::*};
 use lumiris_numbers::math::{Vec3, gamma};

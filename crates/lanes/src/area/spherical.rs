@@ -1,6 +1,6 @@
 //! Spherical rectangles [Ureña, Fajardo and King 2013] from many points at once; see `lights::kinds::area::rectangle`.
 
-use super::Rectangle;
+use super::shapes::Rectangle;
 use fearless_simd::{Simd, f64x8, mask64x8, prelude::*};
 use lumiris_numbers::math::DVec3;
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, FRAC_PI_8, PI, TAU};

@@ -11,9 +11,9 @@
 //!
 //! [`SmoothCoated`] has a smooth interface. Parameters: b, the albedo as above, η, thickness.
 
+use super::bsdf_kernel::{BsdfKernel, Drawn, Value, flags, lobe, same_side};
 use super::facets::Facets;
 use super::fresnel::{fr_dielectric, reflect};
-use super::{BsdfKernel, Drawn, Value, flags, lobe, same_side};
 use lumiris_numbers::math::elementary::{cosine_hemisphere, exp};
 use lumiris_numbers::math::number::{Mask as _, Number};
 use lumiris_numbers::math::v3::V3;
@@ -93,7 +93,7 @@ pub fn interface<N: Number>(p: &[N], wo: V3<N>, wi: V3<N>) -> (N, N) {
 
 /// Value and density of a rough coat for directions in the upper hemisphere, given T and R of `wo` and T of `wi`.
 #[inline(always)]
-pub fn rough_value<N: Number>(p: &[N], (wo, wi): (V3<N>, V3<N>), of_wo: [N; 2], t_wi: N) -> Value<N> {
+pub fn rough_value<N: Number>(p: &[N], wo: V3<N>, wi: V3<N>, of_wo: [N; 2], t_wi: N) -> Value<N> {
     let (density, reflected) = interface(p, wo, wi);
     let Value { f_cos: [r, g, b], pdf } = base(p, of_wo[0] * t_wi, wi.z);
     let choice = p_interface(p[3], of_wo);
@@ -143,7 +143,7 @@ impl BsdfKernel for Coated {
         let (wo, wi) = (wo.times(flip), wi.times(flip));
         let row = [p[7], p[8]];
         let (of_wo, t_wi) = (rough_directional(tables, row, wo.z), directional(tables, row, wi.z, false));
-        rough_value(p, (wo, wi), of_wo, t_wi).kept(is_seen)
+        rough_value(p, wo, wi, of_wo, t_wi).kept(is_seen)
     }
 
     #[inline(always)]
@@ -152,7 +152,7 @@ impl BsdfKernel for Coated {
         let (wo, row) = (wo.times(flip), [p[7], p[8]]);
         let of_wo = rough_directional(tables, row, wo.z);
         let (wi, is_interface) = rough_direction(p, wo, of_wo, u);
-        let value = rough_value(p, (wo, wi), of_wo, directional(tables, row, wi.z, false));
+        let value = rough_value(p, wo, wi, of_wo, directional(tables, row, wi.z, false));
         let kind = kind(is_interface, lobe::GLOSSY, flip);
         Drawn::new(wi.times(flip), value, kind, wo.z.constant(1.0)).kept(wo.z.above(zero) & wi.z.above(zero))
     }

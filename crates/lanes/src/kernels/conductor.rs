@@ -1,9 +1,9 @@
 //! Reflection by a metal, smooth or with GGX microfacets: f = D F G / (4 cos θo cos θi) [Cook and Torrance 1982; Walter
 //! et al. 2007]. Single scattering only. Parameters: alphas, η, k.
 
+use super::bsdf_kernel::{BsdfKernel, Drawn, Value, flags, lobe, same_side};
 use super::facets::Facets;
 use super::fresnel::{fr_complex, reflect};
-use super::{BsdfKernel, Drawn, Value, flags, lobe, same_side};
 use lumiris_numbers::math::number::{Mask as _, Number};
 use lumiris_numbers::math::v3::V3;
 

@@ -5,9 +5,9 @@
 //! refraction on the side of `wi` relative to the side of `wo`. Single scattering only. Parameters: η on the side of −z
 //! relative to the side of +z, alphas.
 
+use super::bsdf_kernel::{BsdfKernel, Drawn, Value, flags, lobe, same_side};
 use super::facets::Facets;
 use super::fresnel::{fr_inverse, inverse_eta, reflect, refract};
-use super::{BsdfKernel, Drawn, Value, flags, lobe, same_side};
 use lumiris_numbers::math::number::{Mask as _, Number};
 use lumiris_numbers::math::v3::V3;
 
@@ -71,6 +71,16 @@ fn selected<N: Number>(select: Select, value: N, is_reflection: N::Mask) -> N {
     }
 }
 
+/// A half vector.
+struct Microfacet<N> {
+    /// Along the half vector.
+    h: V3<N>,
+    /// Its cosine with `wo`.
+    o_m: N,
+    /// Its cosine with `wi`.
+    i_m: N,
+}
+
 impl<N: Number> Interface<N> {
     /// From the parameters.
     #[inline(always)]
@@ -95,20 +105,23 @@ impl<N: Number> Interface<N> {
         let scale = one.signed_as(h.z) / h.dot(h).root();
         let (o_m, i_m) = (wo.dot(h) * scale, wi.dot(h) * scale);
         let faces = (i_m * wi.z).above(zero) & (o_m * wo.z).above(zero);
-        let (f_cos, pdf) = self.of_normal((wo, wi), (h, o_m, i_m), inverse, (select, transport));
-        let Value { f_cos, pdf } = Value::grey(f_cos, pdf).kept(faces & !self.is_specular());
+        let at = Microfacet { h, o_m, i_m };
+        let Value { f_cos, pdf } =
+            self.of_normal(wo, wi, at, inverse, select, transport).kept(faces & !self.is_specular());
         (f_cos[0], pdf)
     }
 
-    /// f·|cos θi| and density (1/sr) for a half vector along `h`, whose cosines with `wo` and `wi` are `o_m` and `i_m`.
+    /// f·|cos θi| and density (1/sr) for a half vector.
     #[inline(always)]
     fn of_normal(
         self,
-        (wo, wi): (V3<N>, V3<N>),
-        (h, o_m, i_m): (V3<N>, N, N),
+        wo: V3<N>,
+        wi: V3<N>,
+        Microfacet { h, o_m, i_m }: Microfacet<N>,
         inverse: N,
-        (select, transport): (Select, Transport),
-    ) -> (N, N) {
+        select: Select,
+        transport: Transport,
+    ) -> Value<N> {
         // Reflection or transmission
         let is_reflection = same_side(wo, wi);
         let fresnel = fr_inverse(o_m, inverse);
@@ -123,7 +136,7 @@ impl<N: Number> Interface<N> {
         // Values of the selected lobes
         let f_cos = d_g * N::choose(is_reflection, fresnel, (-fresnel + 1.0) * jacobian * scale);
         let pdf = density * N::choose(is_reflection, p, (-p + 1.0) * jacobian);
-        (selected(select, f_cos, is_reflection), pdf.or_zero(exists))
+        Value::grey(selected(select, f_cos, is_reflection), pdf.or_zero(exists))
     }
 
     /// Samples reflection or refraction, chosen by the Fresnel reflectance of the sampled microfacet.
@@ -152,9 +165,10 @@ impl<N: Number> Interface<N> {
         if !is_specular.all() {
             let side = wo.z * wi.z;
             let is_side = (reflects & side.above(zero)) | (!reflects & zero.above(side));
-            let (f, density) = self.of_normal((wo, wi), (m, o_m, wi.dot(m)), inverse, (select, transport));
-            f_cos = N::choose(is_specular, f_cos, f);
-            pdf = N::choose(is_specular, pdf, density);
+            let at = Microfacet { h: m, o_m, i_m: wi.dot(m) };
+            let rough = self.of_normal(wo, wi, at, inverse, select, transport);
+            f_cos = N::choose(is_specular, f_cos, rough.f_cos[0]);
+            pdf = N::choose(is_specular, pdf, rough.pdf);
             is_sample = is_sample & (is_specular | (is_side & (o_m * wo.z).above(zero)));
         }
         let kind = N::choose(is_specular, flags(one, lobe::SPECULAR), flags(one, lobe::GLOSSY))

@@ -1,6 +1,6 @@
 //! Lambertian reflection: f = ρ/π on the side of `wo`. Parameters: ρ.
 
-use super::{BsdfKernel, Drawn, Value, flags, lobe, same_side};
+use super::bsdf_kernel::{BsdfKernel, Drawn, Value, flags, lobe, same_side};
 use lumiris_numbers::math::elementary::cosine_hemisphere;
 use lumiris_numbers::math::number::Number;
 use lumiris_numbers::math::v3::V3;

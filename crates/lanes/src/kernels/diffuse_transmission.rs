@@ -1,6 +1,6 @@
 //! Lambertian reflection and transmission: f = ρ/π on the side of `wo`, τ/π on the other. Parameters: ρ, τ.
 
-use super::{BsdfKernel, Drawn, Value, flags, lobe};
+use super::bsdf_kernel::{BsdfKernel, Drawn, Value, flags, lobe};
 use lumiris_numbers::math::elementary::cosine_hemisphere;
 use lumiris_numbers::math::number::Number;
 use lumiris_numbers::math::v3::V3;

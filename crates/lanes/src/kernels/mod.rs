@@ -3,10 +3,11 @@
 //! Directions are in the shading frame, n = +z. A kernel is a [`BsdfKernel`]; [`rows`] evaluates it over columns.
 //! Two-sided BSDFs behave the same on both sides.
 //!
-//! Reading order: this file, [`fresnel`], [`facets`], [`diffuse`], [`diffuse_transmission`], [`conductor`],
-//! [`dielectric`], [`thin_dielectric`], [`coated`], [`albedo`], [`sheen`], [`principled`], [`rows`].
+//! Reading order: `bsdf_kernel`, [`fresnel`], [`facets`], [`diffuse`], [`diffuse_transmission`], [`conductor`],
+//! [`dielectric`], [`thin_dielectric`], [`coated`], [`albedo`], [`sheen`], [`principled`], `kernel`, [`rows`].
 
 pub mod albedo;
+mod bsdf_kernel;
 pub mod coated;
 pub mod conductor;
 pub mod dielectric;
@@ -14,159 +15,19 @@ pub mod diffuse;
 pub mod diffuse_transmission;
 pub mod facets;
 pub mod fresnel;
+mod kernel;
 pub mod principled;
 pub mod rows;
 pub mod sheen;
 pub mod thin_dielectric;
 
+pub use bsdf_kernel::{BsdfKernel, Drawn, Value, lobe};
 pub use coated::{Coated, SmoothCoated};
 pub use conductor::Conductor;
 pub use dielectric::{Dielectric, Exit};
 pub use diffuse::Diffuse;
 pub use diffuse_transmission::DiffuseTransmission;
+pub use kernel::{Kernel, MAX_PARAMS};
 pub use principled::Principled;
 pub use rows::{Directions, One, Rows, Values, evaluate, evaluate_one, sample};
 pub use thin_dielectric::ThinDielectric;
-
-use lumiris_numbers::math::number::Number;
-use lumiris_numbers::math::v3::V3;
-
-/// Flags of samples. A sum of flags is a whole number.
-pub mod lobe {
-    /// To the side of `wo`.
-    pub const REFLECTION: u8 = 1;
-    /// To the other side.
-    pub const TRANSMISSION: u8 = 2;
-    /// Lambertian or similarly wide.
-    pub const DIFFUSE: u8 = 4;
-    /// A rough lobe.
-    pub const GLOSSY: u8 = 8;
-    /// A delta. The density is a probability; values and densities of other directions do not include it.
-    pub const SPECULAR: u8 = 16;
-}
-
-/// Value and density for one direction.
-#[derive(Clone, Copy, Debug)]
-pub struct Value<N> {
-    /// f·|cos θi| by channel (1/sr), without deltas.
-    pub f_cos: [N; 3],
-    /// Density of the samples (1/sr), without deltas.
-    pub pdf: N,
-}
-
-/// A sampled direction. The weight of the path is `f_cos`/`pdf`.
-#[derive(Clone, Copy, Debug)]
-pub struct Drawn<N> {
-    /// Direction to the light.
-    pub wi: V3<N>,
-    /// f·|cos θi| by channel (1/sr). For a delta, its weight times `pdf`.
-    pub f_cos: [N; 3],
-    /// Density (1/sr). For a delta, its probability. 0 if there is no sample.
-    pub pdf: N,
-    /// Sum of [`lobe`] flags.
-    pub lobe: N,
-    /// Index of refraction on the side of `wi` relative to the side of `wo`; 1 for reflection.
-    pub eta: N,
-}
-
-/// A BSDF. `p` are its parameters, `tables` its tabulated values.
-pub trait BsdfKernel {
-    /// Number of parameters.
-    const PARAMS: usize;
-
-    /// Value and density for a pair of directions.
-    fn evaluate<N: Number>(p: &[N], tables: &[f32], wo: V3<N>, wi: V3<N>) -> Value<N>;
-
-    /// Samples a direction: `u[0]` chooses the lobe, `u[1]` and `u[2]` the direction within it. Directions with a value
-    /// of zero are samples, too.
-    fn sample<N: Number>(p: &[N], tables: &[f32], wo: V3<N>, u: [N; 3]) -> Drawn<N>;
-}
-
-/// Largest number of parameters of a kernel.
-pub const MAX_PARAMS: usize = principled::PARAMS;
-
-/// The kernels.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Kernel {
-    /// Lambertian reflection.
-    Diffuse,
-    /// Lambertian reflection and transmission.
-    DiffuseTransmission,
-    /// Metal.
-    Conductor,
-    /// Glass.
-    Dielectric,
-    /// Refraction only.
-    Exit,
-    /// A sheet of glass.
-    ThinDielectric,
-    /// Lambertian base under a rough coat.
-    Coated,
-    /// Lambertian base under a smooth coat.
-    SmoothCoated,
-    /// Metal, glossy diffuse or glass, under a coat.
-    Principled,
-}
-
-impl Kernel {
-    /// Number of parameters.
-    pub fn params(self) -> usize {
-        match self {
-            Kernel::Diffuse => Diffuse::PARAMS,
-            Kernel::DiffuseTransmission => DiffuseTransmission::PARAMS,
-            Kernel::Conductor => Conductor::PARAMS,
-            Kernel::Dielectric => Dielectric::PARAMS,
-            Kernel::Exit => Exit::PARAMS,
-            Kernel::ThinDielectric => ThinDielectric::PARAMS,
-            Kernel::Coated => Coated::PARAMS,
-            Kernel::SmoothCoated => SmoothCoated::PARAMS,
-            Kernel::Principled => Principled::PARAMS,
-        }
-    }
-}
-
-impl<N: Number> Value<N> {
-    /// The same value for all channels.
-    #[inline(always)]
-    pub fn grey(f_cos: N, pdf: N) -> Self {
-        Value { f_cos: [f_cos, f_cos, f_cos], pdf }
-    }
-
-    /// Zero where the mask is false. Values with a non-finite channel, and non-finite densities, become 0, too.
-    #[inline(always)]
-    pub fn kept(self, mask: N::Mask) -> Self {
-        let [r, g, b] = self.f_cos;
-        let is_value = mask & r.finite() & g.finite() & b.finite();
-        let pdf = self.pdf.or_zero(mask & self.pdf.finite());
-        Value { f_cos: [r.or_zero(is_value), g.or_zero(is_value), b.or_zero(is_value)], pdf }
-    }
-}
-
-impl<N: Number> Drawn<N> {
-    /// A sample with the given value and density.
-    #[inline(always)]
-    pub fn new(wi: V3<N>, value: Value<N>, lobe: N, eta: N) -> Self {
-        Drawn { wi, f_cos: value.f_cos, pdf: value.pdf, lobe, eta }
-    }
-
-    /// Removes samples where the mask is false, and directions along the surface.
-    #[inline(always)]
-    pub fn kept(self, mask: N::Mask) -> Self {
-        let zero = self.pdf.constant(0.0);
-        let mask = mask & self.pdf.above(zero) & self.wi.z.magnitude().above(zero);
-        let Value { f_cos, pdf } = Value { f_cos: self.f_cos, pdf: self.pdf }.kept(mask);
-        Drawn { f_cos, pdf, ..self }
-    }
-}
-
-/// A sum of flags as a number.
-#[inline(always)]
-fn flags<N: Number>(like: N, flags: u8) -> N {
-    like.constant(f32::from(flags))
-}
-
-/// True if both directions are on the same side.
-#[inline(always)]
-fn same_side<N: Number>(wo: V3<N>, wi: V3<N>) -> N::Mask {
-    (wo.z * wi.z).above(wo.z.constant(0.0))
-}

@@ -17,10 +17,11 @@
 //! Smooth facets get the smallest roughness that counts as rough, so there are no deltas. Parameters: see [`Params`].
 
 use super::albedo::{self, Place, roughness};
+use super::bsdf_kernel::{BsdfKernel, Drawn, Value, flags, lobe};
 use super::dielectric::{Interface, Select, Transport};
 use super::facets::Facets;
 use super::fresnel::{inverse_eta, reflect};
-use super::{BsdfKernel, Drawn, Value, flags, lobe, sheen};
+use super::sheen;
 use lumiris_numbers::math::elementary::cosine_hemisphere;
 use lumiris_numbers::math::number::{Mask as _, Number};
 use lumiris_numbers::math::v3::V3;

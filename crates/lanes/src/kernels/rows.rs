@@ -2,10 +2,19 @@
 //!
 //! Columns may have any length: the last vector overlaps the previous one, and fewer rows than one vector are padded.
 
-use super::*;
+use super::bsdf_kernel::{BsdfKernel, Value};
+use super::coated::{Coated, SmoothCoated};
+use super::conductor::Conductor;
+use super::dielectric::{Dielectric, Exit};
+use super::diffuse::Diffuse;
+use super::diffuse_transmission::DiffuseTransmission;
+use super::kernel::{Kernel, MAX_PARAMS};
+use super::principled::Principled;
+use super::thin_dielectric::ThinDielectric;
 use crate::lane::{Columns3, ColumnsMut3, F, LANES, Vec3s, begin, load, padded, store};
 use crate::wide::Wide;
 use fearless_simd::{Level, Simd, dispatch, prelude::*};
+use lumiris_numbers::math::v3::V3;
 use lumiris_numbers::math::{Frame, Vec3};
 
 /// Vertices with the same kernel.
@@ -54,7 +63,7 @@ pub struct Directions<'a> {
     pub f_cos: ColumnsMut3<'a>,
     /// Density per steradian. For deltas, their probability. 0 if there is no sample.
     pub pdf: &'a mut [f32],
-    /// Sums of [`lobe`] flags.
+    /// Sums of [`super::lobe`] flags.
     pub lobe: &'a mut [f32],
     /// Indices of refraction on the side of `wi` relative to the side of `wo`; 1 for reflection.
     pub eta: &'a mut [f32],

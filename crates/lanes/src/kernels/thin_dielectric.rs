@@ -1,8 +1,8 @@
 //! A thin dielectric sheet without refraction: the sum of all reflections between its two parallel faces,
 //! R' = R + T²R/(1 − R²), T' = 1 − R' [Pharr et al. 2023, §9.5.1]. Parameters: η.
 
+use super::bsdf_kernel::{BsdfKernel, Drawn, Value, flags, lobe};
 use super::fresnel::fr_dielectric;
-use super::{BsdfKernel, Drawn, Value, flags, lobe};
 use lumiris_numbers::math::number::Number;
 use lumiris_numbers::math::v3::V3;
 

@@ -98,7 +98,36 @@ fn figure(setup: &Setup<'_>, o: &Outcome) -> Result<Figure, ReproduceError> {
     (0..o.names.len()).for_each(|i| table.row(method_row(o.names[i], pair(i), errors(i))));
 
     // Text, facts and images
-    let mut blocks = vec![
+    let mut blocks = description(o, systematic);
+    blocks.push(Block::Images(shown(setup, o)?));
+    let list = [0, BEST].map(|i| (o.names[i], &o.measured[i]));
+    blocks.extend(variances(setup, &o.truth, o.size, &list, "box-variance", "stratified over all rays")?);
+    blocks.push(Block::Table(table));
+
+    // The summary and the numbers
+    let rows: Vec<Value> = (0..o.names.len()).map(|i| method_json(o.names[i], pair(i), errors(i))).collect();
+    let reason = format!(
+        "the bias of the interpolation alone is {}; without it {} → {}",
+        significant(systematic),
+        significant(noise(&o.errors[0])),
+        significant(noise(&o.errors[BEST]))
+    );
+    Ok(Figure {
+        id: "box",
+        title: "Box, irradiance cache",
+        summary: summary(&ASKED, pair(BEST), errors(BEST), reason),
+        also: Vec::new(),
+        blocks,
+        numbers: json!({
+            "size": o.size, "camera_rays": SPP, "samples": SAMPLES, "turns": o.measured[0].turns(), "methods": rows,
+            "interpolation_error": systematic, "reference": { "noise": o.truth.noise() },
+        }),
+    })
+}
+
+/// Text and facts. `systematic` is the bias of the interpolation.
+fn description(o: &Outcome, systematic: f64) -> Vec<Block> {
+    vec![
         Block::Text(
             "A box by irradiance caching, as in figure 4: everything that its diffuse walls reflect is interpolated between records, \
              and the light of sources at a record is estimated by mis or by ocv."
@@ -124,31 +153,7 @@ fn figure(setup: &Setup<'_>, o: &Outcome) -> Result<Figure, ReproduceError> {
                 format!("{}, which is in the error of every method", significant(systematic)),
             ),
         ]),
-    ];
-    blocks.push(Block::Images(shown(setup, o)?));
-    let list = [0, BEST].map(|i| (o.names[i], &o.measured[i]));
-    blocks.extend(variances(setup, &o.truth, o.size, &list, "box-variance", "stratified over all rays")?);
-    blocks.push(Block::Table(table));
-
-    // The summary and the numbers
-    let rows: Vec<Value> = (0..o.names.len()).map(|i| method_json(o.names[i], pair(i), errors(i))).collect();
-    let reason = format!(
-        "the bias of the interpolation alone is {}; without it {} → {}",
-        significant(systematic),
-        significant(noise(&o.errors[0])),
-        significant(noise(&o.errors[BEST]))
-    );
-    Ok(Figure {
-        id: "box",
-        title: "Box, irradiance cache",
-        summary: summary(&ASKED, pair(BEST), errors(BEST), reason),
-        also: Vec::new(),
-        blocks,
-        numbers: json!({
-            "size": o.size, "camera_rays": SPP, "samples": SAMPLES, "turns": o.measured[0].turns(), "methods": rows,
-            "interpolation_error": systematic, "reference": { "noise": o.truth.noise() },
-        }),
-    })
+    ]
 }
 
 /// The images of `mis`, of the best form, and of the reference.

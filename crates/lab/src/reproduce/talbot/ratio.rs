@@ -326,14 +326,8 @@ fn figure(o: &Outcome, size: [u32; 2], blocks: Vec<Block>) -> Figure {
         "pilot_seconds": o.pilot_seconds, "best_per_pixel_over_auto_predicted": of_best / of_auto.max(1e-300),
         "methods": rows,
     });
-    Figure {
-        id: "paper-figure-3",
-        title: "Paper, figure 3; thesis, figures 5.1 and 5.2: proposals per sample",
-        summary,
-        also: Vec::new(),
-        blocks,
-        numbers,
-    }
+    let title = "Paper, figure 3; thesis, figures 5.1 and 5.2: proposals per sample";
+    Figure { id: "paper-figure-3", title, summary, also: Vec::new(), blocks, numbers }
 }
 
 impl Outcome {
