@@ -136,8 +136,8 @@ impl CameraBase {
         ((window[1] - window[0]) * (window[3] - window[2]) / (self.resolution.x * self.resolution.y)).abs()
     }
 
-    /// Angle between the rays of neighbouring pixels of a perspective camera (radians), at the cosine `cos` to its axis: a
-    /// pixel of area a on the plane z = 1 subtends a·cos³θ.
+    /// Angle between the rays of neighbouring pixels of a perspective camera (radians), at the cosine `cos` to its
+    /// axis: a pixel of area a on the plane z = 1 subtends a·cos³θ.
     #[inline]
     fn perspective_spread(&self, window: &[f32; 4], tan_half_fov: f32, cos: f32) -> f32 {
         (self.pixel_area(window) * cos).sqrt() * cos * tan_half_fov
@@ -336,8 +336,8 @@ impl Camera {
         matches!(self, Camera::Perspective { .. })
     }
 
-    /// Projects the point `p` of world space through the point `u_lens` of the lens at `time` (0 to 1), onto the film or beyond its edges. `None` for points behind the camera, and for cameras that are not
-    /// perspective.
+    /// Projects the point `p` of world space through the point `u_lens` of the lens at `time` (0 to 1), onto the film
+    /// or beyond its edges. `None` for points behind the camera, and for cameras that are not perspective.
     pub fn project(&self, p: Vec3, u_lens: [f32; 2], time: f32) -> Option<Projection> {
         let Camera::Perspective { base, screen_window, tan_half_fov, lens } = self else { return None };
         let world_from_camera = placement_at(&base.world_from_camera, time);

@@ -1,11 +1,11 @@
 //! The film: sums per pixel, for means, variances and AOVs.
 //!
 //! Pixel filters are importance-sampled: a sample belongs to one pixel, and its weight is the sign of the filter
-//! ([`filter`]). Samples ([`pixel`]) are added to exact sums ([`fixed_sums`], [`accumulator`]), so that the film does not
-//! depend on their order and division. In memory, [`packed`] compresses the sums of a tile, and [`layers`] the sums of
-//! light groups; [`encoding`] compresses both in files.
-//! `tiles` holds the film. [`variance`] estimates the variance of pixel means by [`replicas`], [`image_noise`] the noise of
-//! the image, and [`summary`] has both with the numbers of samples.
+//! ([`filter`]). Samples ([`pixel`]) are added to exact sums ([`fixed_sums`], [`accumulator`]), so that the film does
+//! not depend on their order and division. In memory, [`packed`] compresses the sums of a tile, and [`layers`] the sums
+//! of light groups; [`encoding`] compresses both in files. `tiles` holds the film. [`variance`] estimates the variance
+//! of pixel means by [`replicas`], [`image_noise`] the noise of the image, and [`summary`] has both with the numbers of
+//! samples.
 
 pub mod accumulator;
 pub mod encoding;

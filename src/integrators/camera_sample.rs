@@ -18,8 +18,8 @@ pub struct CameraSample {
     pub direct: SampleStream,
     /// Sample counts at its first vertex.
     pub sample_counts: SampleCounts,
-    /// Share group ([`crate::scene::PixelSamples::share_group`]). Samples with the same group may share paths, and use the
-    /// same light paths.
+    /// Share group ([`crate::scene::PixelSamples::share_group`]). Samples with the same group may share paths, and use
+    /// the same light paths.
     pub share_group: u32,
     /// Index of the fit of its pixel.
     pub fit: u32,

@@ -91,8 +91,8 @@ impl VertexSearch {
         Some(go_on(next, path.ray.o + d * t, sample.wi, beta))
     }
 
-    /// The BSDF of a path at a surface; the throughput is divided by the probability of the choice. Returns `None` if the
-    /// boundary reflects a path back into its interior; the path is then queued for the next trace.
+    /// The BSDF of a path at a surface; the throughput is divided by the probability of the choice. Returns `None` if
+    /// the boundary reflects a path back into its interior; the path is then queued for the next trace.
     pub(super) fn exit_or_reflect<'w>(
         &mut self,
         at: &TraceStep<'_, '_>,

@@ -2,8 +2,8 @@
 //! bounce.
 //!
 //! The radiance along a camera ray is L_e(x₁) + Σ_k β_k L_direct(x_k). β_k = Π f_s |cos θ|/p is the throughput up to
-//! the k-th vertex. L_direct, estimated by [`PointDirectLighting`], is the light that the vertex reflects and that comes
-//! straight from emitters. So emission is added at the hit of the camera ray, and never twice.
+//! the k-th vertex. L_direct, estimated by [`PointDirectLighting`], is the light that the vertex reflects and that
+//! comes straight from emitters. So emission is added at the hit of the camera ray, and never twice.
 //!
 //! If `mis` has one BSDF sample and the path continues, this sample is the next segment of the path, which hits the
 //! emitter itself. The estimate at x_k then lacks the emission of x_{k+1}, MIS-weighted against light sampling at x_k.

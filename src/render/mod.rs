@@ -4,8 +4,8 @@
 //! of its coordinates and their indices, independent of the rest of their batch, and are added to exact sums. Threads,
 //! tiles, passes and [`parts`] of the image therefore do not change a bit.
 //!
-//! Inputs and outputs: [`RenderSettings`], [`Continuation`], [`Rendering`], [`RenderError`]. Passes: `render_job`, `run`,
-//! `pace`, `shared_cells`, [`cell_progress`]. Tiles, threads and batches: `tile_share`, `tiles`, `tile_samples`,
+//! Inputs and outputs: [`RenderSettings`], [`Continuation`], [`Rendering`], [`RenderError`]. Passes: `render_job`,
+//! `run`, `pace`, `shared_cells`, [`cell_progress`]. Tiles, threads and batches: `tile_share`, `tiles`, `tile_samples`,
 //! `worker`, [`batches`], `emission_rays`. Finished film: `control_variates`, [`cryptomatte`], [`output`]. Files:
 //! [`parts`], [`film_file`]. Costs: [`memory`], [`phases`].
 

@@ -1,4 +1,5 @@
-//! Area lights of constant emission, sampled from many points. The formulas are in the modules of `lights::kinds::area`.
+//! Area lights of constant emission, sampled from many points. The formulas are in the modules of
+//! `lights::kinds::area`.
 //!
 //! Reading order: `shapes`, [`spherical`], [`many`].
 
