@@ -34,7 +34,7 @@ pub trait Tracer: Send {
     /// the samples.
     fn trace(&mut self, job: &RenderJob, samples: &[CameraSample], fits: &mut Fits, out: &mut Vec<PixelSample>);
 
-    /// Sums the light of `count` light-group layers from now on, if supported; see [`light_layers`].
+    /// Sums the light of `count` light-group layers from now on, if supported; see [`super::light_layers`].
     fn keep_light_layers(&mut self, _count: usize) {}
 
     /// Light-group layers of the last batch, if supported.

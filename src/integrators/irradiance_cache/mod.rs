@@ -1,8 +1,9 @@
 //! Irradiance caching [Ward et al. 1988]: irradiance of diffuse surfaces is interpolated between records.
 //!
 //! Irradiance has two parts, E = E_sources + E_indirect [Fan et al. 2006, §5.1]. Records hold either E_indirect
-//! ([`Cached::Indirect`]; direct light is estimated at every hit) or both ([`Cached::All`]). They are computed at
-//! points visible to the camera, before rendering ([`build()`]), and do not change afterwards.
+//! ([`Cached::Indirect`](crate::settings::Cached); direct light is estimated at every hit) or both
+//! ([`Cached::All`](crate::settings::Cached)). They are computed at points visible to the camera, before rendering
+//! ([`build()`]), and do not change afterwards.
 //!
 //! Camera paths take the light reflected by Lambertian lobes from the records, and continue with the other lobes
 //! (`diffuse.rs`).

@@ -2,9 +2,9 @@
 //! a rendering is resumed.
 //!
 //! Both have one format ([`mod@file`]): exact sums of some samples of some pixels, tile by tile ([`stored_tile`]), with
-//! the settings that they belong to ([`header`], [`notes`]). [`extent`] selects samples and pixels. [`film_file`] is
-//! the storage of one rendering, with [`checkpoint`] while it runs. [`stored`] is the input of a resumed rendering.
-//! [`mod@merge`] adds parts. `partial` is a file with a temporary name.
+//! the settings that they belong to ([`header`], [`notes`]). [`extent`] selects samples and pixels.
+//! [`super::film_file`] is the storage of one rendering, with [`checkpoint`] while it runs. [`stored`] is the input of
+//! a resumed rendering. [`mod@merge`] adds parts. `partial` is a file with a temporary name.
 
 pub mod checkpoint;
 pub mod error;

@@ -1,7 +1,7 @@
 //! Generated content: a statue, a sky, and the scenes that use them.
 //!
-//! Reading order: [`noise`], [`nets`], [`solids`], [`relief`], [`dragon`] (with `head`), [`statue`], [`ply`], [`sky`],
-//! [`files`], [`talbot`], [`fan`], [`keller_wald`].
+//! Reading order: [`gradient_noise`], [`nets`], [`solids`], [`relief`], [`dragon`] (with `head`), [`statue`], [`ply`],
+//! [`sky`], [`files`], [`talbot`], [`fan`], [`keller_wald`].
 
 pub mod dragon;
 pub mod fan;

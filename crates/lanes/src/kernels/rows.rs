@@ -54,7 +54,7 @@ pub struct Values<'a> {
     pub pdf: &'a mut [f32],
 }
 
-/// Columns of samples; see [`Drawn`].
+/// Columns of samples; see [`super::Drawn`].
 #[derive(Debug)]
 pub struct Directions<'a> {
     /// Unit directions to the light, in world space.
