@@ -5,6 +5,7 @@ use std::process::Command;
 
 fn main() {
     embree();
+    openimageio();
     git_hash();
 }
 
@@ -22,6 +23,12 @@ fn embree() {
     if let Ok(path) = env::var("DEP_EMBREE_RPATH") {
         println!("cargo:rustc-link-arg=-Wl,-rpath,{path}");
     }
+}
+
+/// The version of OpenImageIO, on which the values of decoded images may depend.
+fn openimageio() {
+    let version = env::var("DEP_OIIO_SHIM_VERSION").unwrap_or_else(|_| "unknown".to_owned());
+    println!("cargo:rustc-env=LUMIRIS_OIIO_VERSION={version}");
 }
 
 /// `LUMIRIS_GIT_HASH`, if the sources are a git checkout: the commit, with a `+` if it was changed.

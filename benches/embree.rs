@@ -99,7 +99,7 @@ fn main() -> Result<(), EmbreeError> {
     let root = Group { geometries: vec![0] };
     let set = Arc::new(GeometrySet { geometries: vec![shape], root, ..GeometrySet::default() });
     let accel = EmbreeAccel::new(Arc::clone(&set), None, Some(WIDTH))?;
-    println!("{} triangles, {:?}", set.primitive_counts().0, accel.stats());
+    println!("{} triangles, {:?}", set.primitive_counts().triangles, accel.stats());
 
     // Rays
     let camera = camera_rays();

@@ -294,7 +294,8 @@ fn gltf(folder: &Path, scene: &Gltf) -> String {
     let Gltf { nodes, roots, meshes, accessors, rest } = scene;
     let text = format!(
         r#"{{"asset":{{"version":"2.0"}},"scenes":[{{"nodes":[{roots}]}}],"nodes":[{nodes}],"meshes":[{meshes}],
-        "accessors":[{accessors}],"bufferViews":[{{"buffer":0,"byteLength":36}},{{"buffer":0,"byteOffset":36,"byteLength":12}}],
+        "accessors":[{accessors}],
+        "bufferViews":[{{"buffer":0,"byteLength":36}},{{"buffer":0,"byteOffset":36,"byteLength":12}}],
         "buffers":[{{"byteLength":48,"uri":"data:application/octet-stream;base64,{data}"}}]{rest}}}"#
     );
     write(folder, "scene.gltf", text.as_bytes());
@@ -313,7 +314,8 @@ fn shared_vertices(n: usize, folder: &Path) -> String {
     let indices =
         |i| format!(r#"{{"bufferView":1,"byteOffset":{},"componentType":5125,"count":3,"type":"SCALAR"}}"#, 12 * i);
     let text = format!(
-        r#"{{"asset":{{"version":"2.0"}},"scenes":[{{"nodes":[0]}}],"nodes":[{{"mesh":0}}],"meshes":[{{"primitives":[{}]}}],
+        r#"{{"asset":{{"version":"2.0"}},"scenes":[{{"nodes":[0]}}],"nodes":[{{"mesh":0}}],
+        "meshes":[{{"primitives":[{}]}}],
         "accessors":[{{"bufferView":0,"componentType":5126,"count":{},"type":"VEC3"}},{}],
         "bufferViews":[{{"buffer":0,"byteLength":{}}},{{"buffer":0,"byteOffset":{},"byteLength":{}}}],
         "buffers":[{{"byteLength":{},"uri":"data.bin"}}]}}"#,

@@ -8,11 +8,11 @@ use lumiris::bsdfs::{
     Bsdf, CoatTable, CoatedDiffuse, Conductor, Dielectric, Diffuse, DiffuseTransmission, TrowbridgeReitz,
 };
 use lumiris::lights::{EnvironmentFilter, EnvironmentMap, EnvironmentMapping};
-use lumiris::lights::{Light, LightCtx, LightLanes};
+use lumiris::lights::{Light, LightCtx, LightLanes, PointLight};
 use lumiris::materials::surface::SurfaceBsdf;
-use lumiris_lanes::combine::{Proposals, Weights, combine};
 use lumiris_lanes::curve::{hilbert_points, hilbert_points_scalar, strata, strata_scalar};
-use lumiris_numbers::estimators::mis::Heuristic;
+use lumiris_lanes::ris_weights::{Proposals, Weights, weigh};
+use lumiris_numbers::estimators::heuristics::Heuristic;
 use lumiris_numbers::math::hash::pcg4d;
 use lumiris_numbers::math::warp::sample_uniform_sphere;
 use lumiris_numbers::math::{Affine3A, Frame, Rgb, Vec3};
@@ -97,7 +97,7 @@ fn lights() -> Vec<(&'static str, Make)> {
         ("environment 2048×1024 bilinear", Box::new(move || sky([2048, 1024], EnvironmentMapping::LatLong, bilinear))),
         ("environment 4096×2048 bilinear", Box::new(move || sky([4096, 2048], EnvironmentMapping::LatLong, bilinear))),
         ("constant environment", Box::new(move || Light::InfiniteConstant { l })),
-        ("point light", Box::new(move || Light::Point { p: Vec3::Y * 3.0, intensity: l })),
+        ("point light", Box::new(move || Light::Point(PointLight { p: Vec3::Y * 3.0, intensity: l }))),
     ]
 }
 
@@ -118,7 +118,7 @@ fn main() {
                     let [jx, jy, ..] = pcg4d([point, 7, 7, 7]).map(|h| h as f32 * 1e-10);
                     let ctx = LightCtx::on(Vec3::new(jx, 0.0, jy), Vec3::Y);
                     let u = numbers[point as usize].each_ref().map(|u| &u[..]);
-                    if is_single || !light.sample_li_lanes(u, &mut out) {
+                    if is_single || !light.sample_li_columns(u, &mut out) {
                         for i in 0..m {
                             let Some(s) = light.sample_li(&ctx, [u[0][i], u[1][i]]) else { continue };
                             for c in 0..3 {
@@ -208,8 +208,8 @@ fn kernels(m: usize) {
         let proposals =
             Proposals { f_cos, li, p: u0, p_other: u1, m: m as f32, m_other: 1.0, heuristic: Heuristic::Power };
         let mut out = Weights { q_hat, r, w };
-        let lanes = time(m, |_| combine(lumiris_lanes::level(), black_box(&proposals), &mut out));
-        let single = time(m, |_| combine(lumiris_lanes::Level::baseline(), black_box(&proposals), &mut out));
+        let lanes = time(m, |_| weigh(lumiris_lanes::level(), black_box(&proposals), &mut out));
+        let single = time(m, |_| weigh(lumiris_lanes::Level::baseline(), black_box(&proposals), &mut out));
         report("combine (single: baseline)", m, lanes, single);
     }
 }

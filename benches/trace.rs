@@ -91,7 +91,7 @@ fn main() {
         ..GeometrySet::default()
     });
     let bvh = Bvh::new(Arc::clone(&set), None);
-    let (triangles, stats) = (set.primitive_counts().0, bvh.stats());
+    let (triangles, stats) = (set.primitive_counts().triangles, bvh.stats());
     let per_triangle = stats.bytes as f64 / triangles as f64;
     println!("{triangles} triangles, build {:.3} s, {per_triangle:.1} B each", stats.build_seconds);
 

@@ -190,6 +190,7 @@ def render(
     light_units: Optional[Literal["watt", "candela"]] = None,
     time_in_scene: Optional[float] = None,
     texture_memory: Union[None, int, str] = None,
+    texture_cache: Optional[Path] = None,
     aov: Union[None, str, Sequence[str]] = None,
     cryptomatte: Sequence[str] = (),
     part: Union[None, str, Tuple[int, int]] = None,
@@ -236,6 +237,8 @@ def render(
     texture_memory
         Memory limit for textures: a number of bytes, or a text such as `2G`. The rest is read by tiles from a temporary
         file. The image is bit-identical.
+    texture_cache
+        Folder for textures that later renderings read by tiles, at once. The image is bit-identical.
     cryptomatte
         Cryptomatte layers of ids and coverage: `object`, `material`, or both. The names of the ids are in the metadata.
         Compositing programs can read the layers from files by `lumiris.write`.
@@ -290,6 +293,7 @@ def render(
         "light_units": light_units,
         "time_in_scene": time_in_scene,
         "texture_memory": None if texture_memory is None else str(texture_memory),
+        "texture_cache": None if texture_cache is None else os.fspath(texture_cache),
         "cryptomatte": [cryptomatte] if isinstance(cryptomatte, str) else list(cryptomatte),
         "aov": _aov(aov),
         "interval": interval,

@@ -1,7 +1,7 @@
 //! The estimators of `lumiris_numbers`, row by row.
 
 use lumiris::settings::Strata;
-use lumiris_numbers::estimators::mis::{Heuristic, Technique};
+use lumiris_numbers::estimators::heuristics::{Heuristic, Technique};
 use lumiris_numbers::estimators::ocv::{Form, MAX_COMPONENTS, NormalEquations};
 use lumiris_numbers::estimators::optimal_mis as optimal;
 use lumiris_numbers::estimators::ris::strata::{equal_proposals, equal_weights};

@@ -63,6 +63,7 @@ pub(crate) struct Options {
     light_units: Option<String>,
     time_in_scene: Option<f32>,
     texture_memory: Option<String>,
+    texture_cache: Option<PathBuf>,
     aov: Option<Vec<String>>,
     cryptomatte: Vec<String>,
     interval: f64,
@@ -77,6 +78,7 @@ struct Request {
     asked: Asked,
     /// Memory limit for textures (bytes).
     texture_memory: Option<u64>,
+    texture_cache: Option<PathBuf>,
     packet_width: Option<u32>,
     render: RenderSettings,
     parts: Parts,
@@ -175,6 +177,7 @@ impl Options {
             asked: Asked { scene: self.source.name(), load, box_filter: self.box_filter, accel, aovs: aov },
             source: self.source,
             texture_memory,
+            texture_cache: self.texture_cache,
             packet_width: self.packet_width,
             render,
             parts,
@@ -198,14 +201,17 @@ impl Source {
 
 impl Request {
     /// Loads the scene and applies the settings, after the settings of the stored state.
-    fn load(&self, asked: &Asked, stored: Option<&Stored>) -> Result<Loaded, Failure> {
-        let files = FileCache::default();
+    fn load(&self, asked: &Asked, files: &FileCache, stored: Option<&Stored>) -> Result<Loaded, Failure> {
         if let Some(bytes) = self.texture_memory {
             files.limit_textures(bytes);
         }
+        if let Some(folder) = &self.texture_cache {
+            let failed = |error| Failure::Other(format!("texture_cache: {}: {error}", folder.display()));
+            files.cache_textures(folder).map_err(failed)?;
+        }
         let loaded = match &self.source {
-            Source::File(path) => load_with(path, &asked.load, &files),
-            Source::Text((text, name, folder)) => load_text(text, name, folder, &asked.load, &files),
+            Source::File(path) => load_with(path, &asked.load, files),
+            Source::Text((text, name, folder)) => load_text(text, name, folder, &asked.load, files),
         };
         let mut loaded = loaded.map_err(Failure::Scene)?;
         if let Some(stored) = stored {
@@ -250,7 +256,8 @@ impl Request {
         let stored = self.parts.stored().map_err(Failure::Part)?;
         stored.as_ref().map_or(Ok(()), |stored| asked.complete(stored)).map_err(Failure::Part)?;
         let start = Instant::now();
-        let mut loaded = self.load(&asked, stored.as_ref())?;
+        let textures = FileCache::default();
+        let mut loaded = self.load(&asked, &textures, stored.as_ref())?;
         let mut warnings = Vec::from_iter(Some(loaded.warnings.to_string()).filter(|text| !text.is_empty()));
         if loaded.settings.integrator.leaves_lights_out() {
             warnings.push("without samples on non-contributing lights, direct light is biased".to_owned());
@@ -291,6 +298,7 @@ impl Request {
         let rendering =
             observed((&job, &settings), (stop, latest), events, continuation).map_err(|error| other(&error))?;
         warnings.extend(told.try_iter());
+        warnings.extend(textures.take_texture_warnings());
         if let (Some(film_file), Some(path)) = (&mut film_file, &self.parts.file) {
             film_file.end(&rendering);
             film_file.write(path, &rendering).map_err(Failure::Part)?;

@@ -9,7 +9,7 @@ use super::evaluated::Evaluated;
 use super::hair::Hair;
 use super::kernel::{Kernel, KernelBsdf as _, MAX_PARAMS, evaluate, without_cos};
 use super::layered::Layered;
-use super::lobe::BsdfSample;
+use super::lobe::{BsdfSample, BsdfValue, LobeWidth, MicrofacetLobe};
 use super::measured::Measured;
 use super::microfacet::TrowbridgeReitz;
 use super::models::Model;
@@ -74,25 +74,19 @@ impl<'a> Bsdf<'a> {
     /// Value without cosine (1/sr), without deltas. 0 at the horizon and never NaN or infinite.
     #[inline]
     pub fn f(&self, wo: Vec3, wi: Vec3) -> Rgb {
-        self.f_and_pdf(wo, wi).0
+        let f_cos = self.f_cos_and_pdf(wo, wi).f_cos;
+        if self.has_surface() { without_cos(f_cos, wi) } else { f_cos }
     }
 
     /// Density of the non-specular part of [`Self::sample`] per steradian.
     #[inline]
     pub fn pdf(&self, wo: Vec3, wi: Vec3) -> f32 {
-        self.f_cos_and_pdf(wo, wi).1
-    }
-
-    /// [`Self::f`] and [`Self::pdf`] together.
-    #[inline]
-    pub fn f_and_pdf(&self, wo: Vec3, wi: Vec3) -> (Rgb, f32) {
-        let (f_cos, pdf) = self.f_cos_and_pdf(wo, wi);
-        (if self.has_surface() { without_cos(f_cos, wi) } else { f_cos }, pdf)
+        self.f_cos_and_pdf(wo, wi).pdf
     }
 
     /// [`Self::f`] times [`Self::cos`], and [`Self::pdf`]; bit-identical to the kernel, if there is one.
     #[inline]
-    pub fn f_cos_and_pdf(&self, wo: Vec3, wi: Vec3) -> (Rgb, f32) {
+    pub fn f_cos_and_pdf(&self, wo: Vec3, wi: Vec3) -> BsdfValue {
         let (f, pdf) = match self {
             Bsdf::Diffuse(b) => return b.f_cos_and_pdf(wo, wi),
             Bsdf::DiffuseTransmission(b) => return b.f_cos_and_pdf(wo, wi),
@@ -101,10 +95,10 @@ impl<'a> Bsdf<'a> {
             Bsdf::Exit(b) => return evaluate::<kernels::Exit>(&b.params(), &[], wo, wi),
             Bsdf::CoatedDiffuse(b) => return b.f_cos_and_pdf(wo, wi),
             Bsdf::Principled(b) => return b.f_cos_and_pdf(wo, wi),
-            Bsdf::ThinDielectric(_) => return (Rgb::BLACK, 0.0),
+            Bsdf::ThinDielectric(_) => return BsdfValue::ZERO,
 
             // BSDFs without a kernel
-            _ if (wo.z == 0.0 || wi.z == 0.0) && self.has_surface() => return (Rgb::BLACK, 0.0),
+            _ if (wo.z == 0.0 || wi.z == 0.0) && self.has_surface() => return BsdfValue::ZERO,
             Bsdf::Layered(b) => (b.f(wo, wi), b.pdf(wo, wi)),
             Bsdf::Hair(b) => (b.f(wo, wi), b.pdf(wo, wi)),
             Bsdf::Measured(b) => (b.f(wo, wi), b.pdf(wo, wi)),
@@ -114,7 +108,10 @@ impl<'a> Bsdf<'a> {
 
         // Overflow counts as black
         let f_cos = f * self.cos(wi);
-        (if f_cos.is_finite() { f_cos } else { Rgb::BLACK }, if pdf.is_finite() { pdf } else { 0.0 })
+        BsdfValue {
+            f_cos: if f_cos.is_finite() { f_cos } else { Rgb::BLACK },
+            pdf: if pdf.is_finite() { pdf } else { 0.0 },
+        }
     }
 
     /// Probability that [`Self::sample`] samples the first of at most two lobes, which it does if `uc` is less. The
@@ -162,15 +159,14 @@ impl<'a> Bsdf<'a> {
         if first > 0.0 { first.min(pdf) } else { 0.0 }
     }
 
-    /// The strongest rough lobe about the mirror direction of `wo`: its α (the greater one if it is anisotropic) and
-    /// its fraction of the albedo (0 to 1). `None` if there is none, or if the BSDF also transmits light, which the
-    /// lobe does not describe.
+    /// The strongest rough lobe about the mirror direction of `wo`. `None` if there is none, or if the BSDF also
+    /// transmits light, which the lobe does not describe.
     #[inline]
-    pub fn glossy_lobe(&self, wo: Vec3) -> Option<(f32, f32)> {
-        let (distribution, share) = match self {
-            Bsdf::Measured(b) => return Some((b.alpha(), 1.0)),
-            Bsdf::Conductor(b) => (b.distribution, 1.0),
-            Bsdf::CoatedDiffuse(b) => (b.distribution(), b.first_lobe(wo)),
+    pub fn glossy_lobe(&self, wo: Vec3) -> Option<LobeWidth> {
+        let MicrofacetLobe { distribution, share } = match self {
+            Bsdf::Measured(b) => return Some(LobeWidth { alpha: b.alpha(), share: 1.0 }),
+            Bsdf::Conductor(b) => MicrofacetLobe { distribution: b.distribution, share: 1.0 },
+            Bsdf::CoatedDiffuse(b) => MicrofacetLobe { distribution: b.distribution(), share: b.first_lobe(wo) },
             Bsdf::Layered(b) => b.glossy_lobe(wo),
             Bsdf::Principled(b) => b.glossy_lobe(wo)?,
             Bsdf::Diffuse(_)
@@ -182,7 +178,8 @@ impl<'a> Bsdf<'a> {
             | Bsdf::Evaluated(_)
             | Bsdf::Phase(_) => return None,
         };
-        (!distribution.is_smooth()).then_some((distribution.alpha_x.max(distribution.alpha_y), share))
+        let alpha = distribution.alpha_x.max(distribution.alpha_y);
+        (!distribution.is_smooth()).then_some(LobeWidth { alpha, share })
     }
 
     /// True for metals and glass that are smooth or nearly so: their reflection or refraction makes caustics.

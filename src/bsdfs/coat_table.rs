@@ -12,7 +12,7 @@
 //! down to the horizon.
 
 use super::dielectric::Dielectric;
-use super::fresnel::{fr_dielectric, reflect, refract};
+use super::fresnel::{Refraction, fr_dielectric, reflect, refract};
 use super::microfacet::{SMOOTH_ALPHA, TrowbridgeReitz};
 use lumiris_lanes::kernels::coated;
 use lumiris_lanes::kernels::coated::COSINES;
@@ -274,7 +274,7 @@ fn scatter(interface: &Dielectric, w: Vec3, thickness: f32) -> Scatter {
             }
 
             // Transmission
-            if let Some((t, _)) = refract(w, m, interface.eta)
+            if let Some(Refraction { w: t, .. }) = refract(w, m, interface.eta)
                 && t.z < 0.0
             {
                 let value = (1.0 - fresnel) * distribution.g(w, t) / g1;

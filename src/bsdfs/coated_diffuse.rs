@@ -15,7 +15,7 @@ use super::coat_table::{CoatTable, Hemispherical};
 use super::dielectric::Dielectric;
 use super::fresnel::to_upper;
 use super::kernel::{evaluate, of_drawn};
-use super::lobe::BsdfSample;
+use super::lobe::{BsdfSample, BsdfValue};
 use super::microfacet::TrowbridgeReitz;
 use lumiris_lanes::kernels::BsdfKernel;
 use lumiris_lanes::kernels::coated::{self, flip, rough_direction, rough_value};
@@ -132,15 +132,15 @@ impl<'a> CoatedDiffuse<'a> {
 
     /// f·|cos θi| and density (1/sr), without the mirror of a smooth interface.
     #[inline]
-    pub(super) fn f_cos_and_pdf(&self, wo: Vec3, wi: Vec3) -> (Rgb, f32) {
+    pub(super) fn f_cos_and_pdf(&self, wo: Vec3, wi: Vec3) -> BsdfValue {
         let p = self.params();
         match self.kernel() {
             Some(Kernel::SmoothCoated) => evaluate::<SmoothCoated>(&p, &[], wo, wi),
             Some(_) => evaluate::<Coated>(&p, self.tables(), wo, wi),
-            None => to_upper(wo, wi).map_or((Rgb::BLACK, 0.0), |(wo, wi)| {
+            None => to_upper(wo, wi).map_or(BsdfValue::ZERO, |[wo, wi]| {
                 let value = rough_value(&p, wo.into(), wi.into(), self.directional(wo), self.directional(wi)[0]);
                 let value = value.kept(true);
-                (Rgb::from_array(value.f_cos), value.pdf)
+                BsdfValue { f_cos: Rgb::from_array(value.f_cos), pdf: value.pdf }
             }),
         }
     }
@@ -152,7 +152,7 @@ impl<'a> CoatedDiffuse<'a> {
 
     /// Density of sampling the interface, including its probability, see [`super::Bsdf::pdf_first_lobe`].
     pub(super) fn pdf_first_lobe(&self, wo: Vec3, wi: Vec3) -> f32 {
-        let Some((wo, wi)) = to_upper(wo, wi) else { return 0.0 };
+        let Some([wo, wi]) = to_upper(wo, wi) else { return 0.0 };
         if self.interface.is_specular() {
             return 0.0;
         }

@@ -16,11 +16,20 @@ pub struct Conductor {
     pub k: Rgb,
 }
 
+/// A complex index of refraction, relative to the outside.
+#[derive(Clone, Copy, Debug)]
+pub struct ComplexIor {
+    /// Real part.
+    pub eta: Rgb,
+    /// Imaginary part (extinction).
+    pub k: Rgb,
+}
+
 impl Conductor {
     /// η and k of a metal of the given reflectance at normal incidence: η = 1, k = 2√r/√(1 − r), as in pbrt-v4.
-    pub fn eta_k_of_reflectance(reflectance: Rgb) -> (Rgb, Rgb) {
+    pub fn eta_k_of_reflectance(reflectance: Rgb) -> ComplexIor {
         let k = reflectance.clamp(0.0, 0.9999).map(|r| 2.0 * r.sqrt() / (1.0 - r).sqrt());
-        (Rgb::WHITE, k)
+        ComplexIor { eta: Rgb::WHITE, k }
     }
 }
 

@@ -53,17 +53,26 @@ pub enum ProposalDensity {
     Uniform,
 }
 
+/// A sampled direction, and its lobe.
+#[derive(Clone, Copy, Debug)]
+pub struct LobeDirection {
+    /// The direction.
+    pub wi: Vec3,
+    /// The lobe.
+    pub lobe: Lobe,
+}
+
 impl ProposalDensity {
     /// Samples a direction on the side of `wo`: a lobe by `uc`, a direction within it by `u`. `None` if the direction
     /// is below the horizon.
     #[inline]
-    pub fn sample(self, wo: Vec3, uc: f32, u: [f32; 2]) -> Option<(Vec3, Lobe)> {
+    pub fn sample(self, wo: Vec3, uc: f32, u: [f32; 2]) -> Option<LobeDirection> {
         let flip = if wo.z < 0.0 { -1.0 } else { 1.0 };
-        let (wi, lobe) = match self {
+        let LobeDirection { wi, lobe } = match self {
             ProposalDensity::Lobes => sample_lobes(wo * flip, uc, u),
-            ProposalDensity::Uniform => (warp::sample_uniform_hemisphere(u), Lobe::DIFFUSE),
+            ProposalDensity::Uniform => LobeDirection { wi: warp::sample_uniform_hemisphere(u), lobe: Lobe::DIFFUSE },
         };
-        (wi.z > 0.0).then_some((wi * flip, lobe | Lobe::REFLECTION))
+        (wi.z > 0.0).then_some(LobeDirection { wi: wi * flip, lobe: lobe | Lobe::REFLECTION })
     }
 
     /// Probability of the cosine lobe, see [`super::Bsdf::first_lobe`].
@@ -78,15 +87,15 @@ impl ProposalDensity {
     pub(super) fn pdf_first_lobe(self, wo: Vec3, wi: Vec3) -> f32 {
         match (self, to_upper(wo, wi)) {
             (_, None) => 0.0,
-            (ProposalDensity::Lobes, Some((_, wi))) => COSINE_WEIGHT * warp::pdf_cosine_hemisphere(wi),
-            (ProposalDensity::Uniform, Some((_, wi))) => warp::pdf_uniform_hemisphere(wi),
+            (ProposalDensity::Lobes, Some([_, wi])) => COSINE_WEIGHT * warp::pdf_cosine_hemisphere(wi),
+            (ProposalDensity::Uniform, Some([_, wi])) => warp::pdf_uniform_hemisphere(wi),
         }
     }
 
     /// Density of [`Self::sample`] per steradian.
     #[inline]
     pub fn pdf(self, wo: Vec3, wi: Vec3) -> f32 {
-        let Some((wo, wi)) = to_upper(wo, wi) else { return 0.0 };
+        let Some([wo, wi]) = to_upper(wo, wi) else { return 0.0 };
         match self {
             ProposalDensity::Lobes => pdf_lobes(wo, wi),
             ProposalDensity::Uniform => warp::pdf_uniform_hemisphere(wi),
@@ -94,23 +103,23 @@ impl ProposalDensity {
     }
 }
 
-fn sample_lobes(wo: Vec3, uc: f32, u: [f32; 2]) -> (Vec3, Lobe) {
+fn sample_lobes(wo: Vec3, uc: f32, u: [f32; 2]) -> LobeDirection {
     if uc < COSINE_WEIGHT {
-        (warp::sample_cosine_hemisphere(u), Lobe::DIFFUSE)
+        LobeDirection { wi: warp::sample_cosine_hemisphere(u), lobe: Lobe::DIFFUSE }
     } else if uc < COSINE_WEIGHT + MIRROR_WEIGHT {
-        (reflect(wo, MIRROR.sample_m(wo, u)), Lobe::GLOSSY)
+        LobeDirection { wi: reflect(wo, MIRROR.sample_m(wo, u)), lobe: Lobe::GLOSSY }
     } else {
-        (turn(reflect(wo, RETRO.sample_m(wo, u))), Lobe::GLOSSY)
+        LobeDirection { wi: rotated(reflect(wo, RETRO.sample_m(wo, u))), lobe: Lobe::GLOSSY }
     }
 }
 
 fn pdf_lobes(wo: Vec3, wi: Vec3) -> f32 {
     COSINE_WEIGHT * warp::pdf_cosine_hemisphere(wi)
         + MIRROR_WEIGHT * MIRROR.pdf_reflection(wo, wi)
-        + RETRO_WEIGHT * RETRO.pdf_reflection(wo, turn(wi))
+        + RETRO_WEIGHT * RETRO.pdf_reflection(wo, rotated(wi))
 }
 
 /// Rotates by 180° about the normal.
-fn turn(w: Vec3) -> Vec3 {
+fn rotated(w: Vec3) -> Vec3 {
     Vec3::new(-w.x, -w.y, w.z)
 }

@@ -3,7 +3,7 @@
 //! Sampling and density are those of [`ProposalDensity`] and exact, so that MIS with light sampling is possible. The
 //! density fits badly. [`super::resample()`] samples f |cos θi| itself in the limit of many proposals.
 
-use super::default_lobes::ProposalDensity;
+use super::default_lobes::{LobeDirection, ProposalDensity};
 use super::lobe::BsdfSample;
 use super::models::Model;
 use lumiris_numbers::math::{Rgb, Vec3};
@@ -33,7 +33,7 @@ impl Evaluated {
     /// Samples the proposal density.
     #[inline]
     pub fn sample(&self, wo: Vec3, uc: f32, u: [f32; 2]) -> Option<BsdfSample> {
-        let (wi, lobe) = self.density.sample(wo, uc, u)?;
+        let LobeDirection { wi, lobe } = self.density.sample(wo, uc, u)?;
         Some(BsdfSample { f: self.f(wo, wi), wi, pdf: self.pdf(wo, wi), lobe, eta: 1.0 })
     }
 }

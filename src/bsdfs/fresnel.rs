@@ -13,12 +13,20 @@ pub fn reflect(w: Vec3, n: Vec3) -> Vec3 {
     fresnel::reflect(w.into(), n.into()).into()
 }
 
-/// Refraction of `w` at a surface with normal `n`, and η along that path (`eta`, or its inverse if `w` is on the side
-/// of `-n`). `None` for total internal reflection.
+/// A refracted direction.
+#[derive(Clone, Copy, Debug)]
+pub struct Refraction {
+    /// The direction.
+    pub w: Vec3,
+    /// η along the path: the given one, or its inverse for a direction from the side of `-n`.
+    pub eta: f32,
+}
+
+/// Refraction of `w` at a surface with normal `n`. `None` for total internal reflection.
 #[inline]
-pub fn refract(w: Vec3, n: Vec3, eta: f32) -> Option<(Vec3, f32)> {
+pub fn refract(w: Vec3, n: Vec3, eta: f32) -> Option<Refraction> {
     let (refracted, inverse, passes) = fresnel::refract(w.into(), n.into(), eta);
-    passes.then(|| (refracted.into(), 1.0 / inverse))
+    passes.then(|| Refraction { w: refracted.into(), eta: 1.0 / inverse })
 }
 
 /// [`fr_complex`] of each channel.
@@ -30,13 +38,13 @@ pub fn fr_conductor(cos_i: f32, eta: Rgb, k: Rgb) -> Rgb {
 /// Both directions mirrored to the upper hemisphere, by the symmetry of the surface; `None` if they are on different
 /// sides.
 #[inline]
-pub(super) fn to_upper(wo: Vec3, wi: Vec3) -> Option<(Vec3, Vec3)> {
+pub(super) fn to_upper(wo: Vec3, wi: Vec3) -> Option<[Vec3; 2]> {
     if wo.z * wi.z <= 0.0 {
         None
     } else if wo.z < 0.0 {
-        Some((-wo, -wi))
+        Some([-wo, -wi])
     } else {
-        Some((wo, wi))
+        Some([wo, wi])
     }
 }
 
@@ -70,11 +78,11 @@ mod tests {
         for i in 1..100 {
             let cos_i = i as f32 / 100.0;
             let w = Vec3::new(safe_sqrt(1.0 - cos_i * cos_i), 0.0, cos_i);
-            let (t, eta) = refract(w, Vec3::Z, 1.5).unwrap();
+            let Refraction { w: t, eta } = refract(w, Vec3::Z, 1.5).unwrap();
             assert!((t.length() - 1.0).abs() < 1e-5 && t.z < 0.0 && eta == 1.5);
             assert!((t.x + w.x / 1.5).abs() < 1e-6);
             assert!((fr_dielectric(cos_i, 1.5) - fr_dielectric(t.z, 1.5)).abs() < 1e-4);
-            let (back, eta) = refract(t, Vec3::Z, 1.5).unwrap();
+            let Refraction { w: back, eta } = refract(t, Vec3::Z, 1.5).unwrap();
             assert!((back - w).length() < 1e-3 && (eta * 1.5 - 1.0).abs() < 1e-6);
         }
         assert_eq!(fr_dielectric(-0.5, 1.5), 1.0);

@@ -53,6 +53,14 @@ struct Angles {
     phi: f32,
 }
 
+/// Attenuation of light from one direction.
+struct Attenuation {
+    /// A of each path.
+    a: [Rgb; P_MAX + 1],
+    /// γt.
+    gamma_t: f32,
+}
+
 impl Angles {
     fn of(w: Vec3) -> Self {
         Angles { sin: w.x.clamp(-1.0, 1.0), cos: safe_sqrt(1.0 - w.x * w.x), phi: w.z.atan2(w.y) }
@@ -84,8 +92,7 @@ impl Hair {
         Rgb::new(0.419, 0.697, 1.37) * eumelanin + Rgb::new(0.187, 0.4, 1.05) * pheomelanin
     }
 
-    /// Attenuation of each path, and γt.
-    fn attenuation(&self, o: &Angles) -> ([Rgb; P_MAX + 1], f32) {
+    fn attenuation(&self, o: &Angles) -> Attenuation {
         let cos_o = o.cos.max(1e-4);
         let sin_t = o.sin / self.eta;
         let cos_t = safe_sqrt(1.0 - sqr(sin_t)).max(1e-4);
@@ -101,7 +108,7 @@ impl Hair {
             trt.g * f * pass.g / (1.0 - pass.g * f),
             trt.b * f * pass.b / (1.0 - pass.b * f),
         );
-        ([Rgb::splat(f), tt, trt, rest], sin_gamma.asin())
+        Attenuation { a: [Rgb::splat(f), tt, trt, rest], gamma_t: sin_gamma.asin() }
     }
 
     /// Sine and |cosine| of θo, tilted for a path.
@@ -136,7 +143,7 @@ impl Hair {
     /// Value without cosine (1/sr).
     pub fn f(&self, wo: Vec3, wi: Vec3) -> Rgb {
         let (o, i) = (Angles::of(wo), Angles::of(wi));
-        let (a, gamma_t) = self.attenuation(&o);
+        let Attenuation { a, gamma_t } = self.attenuation(&o);
         let lobes = self.lobes(&o, &i, gamma_t);
         let sum = a.iter().zip(lobes).fold(Rgb::BLACK, |sum, (&a, lobe)| sum + a * lobe);
         sum * (1.0 / wi.z.abs())
@@ -152,14 +159,14 @@ impl Hair {
     /// Density of [`Self::sample`] per steradian.
     pub fn pdf(&self, wo: Vec3, wi: Vec3) -> f32 {
         let (o, i) = (Angles::of(wo), Angles::of(wi));
-        let (a, gamma_t) = self.attenuation(&o);
+        let Attenuation { a, gamma_t } = self.attenuation(&o);
         Self::choice(&a).iter().zip(self.lobes(&o, &i, gamma_t)).map(|(p, lobe)| p * lobe).sum()
     }
 
     /// Samples a direction of one path, chosen by `uc`.
     pub fn sample(&self, wo: Vec3, uc: f32, u: [f32; 2]) -> Option<BsdfSample> {
         let o = Angles::of(wo);
-        let (a, gamma_t) = self.attenuation(&o);
+        let Attenuation { a, gamma_t } = self.attenuation(&o);
         let choice = Self::choice(&a);
         let (mut p, mut before) = (0, 0.0);
         while p < P_MAX && uc >= before + choice[p] {
@@ -179,8 +186,9 @@ impl Hair {
         let cos_i = safe_sqrt(1.0 - sqr(sin_i));
 
         // Azimuth
-        let turn = if p < P_MAX { self.center(p, gamma_t) + sample_trimmed_logistic(u[1], self.s) } else { TAU * u[1] };
-        let phi = o.phi + turn;
+        let offset =
+            if p < P_MAX { self.center(p, gamma_t) + sample_trimmed_logistic(u[1], self.s) } else { TAU * u[1] };
+        let phi = o.phi + offset;
         let wi = Vec3::new(sin_i, cos_i * phi.cos(), cos_i * phi.sin());
         let side = if wi.z * wo.z < 0.0 { Lobe::TRANSMISSION } else { Lobe::REFLECTION };
         Some(BsdfSample { f: self.f(wo, wi), wi, pdf: self.pdf(wo, wi), lobe: Lobe::GLOSSY | side, eta: 1.0 })

@@ -1,6 +1,6 @@
 //! BSDFs whose formulas are kernels of `lumiris_lanes::kernels`, here for single directions.
 
-use super::lobe::{BsdfSample, Lobe};
+use super::lobe::{BsdfSample, BsdfValue, Lobe};
 use lumiris_lanes::kernels::{BsdfKernel, Drawn, Value};
 pub use lumiris_lanes::kernels::{Kernel, MAX_PARAMS};
 use lumiris_numbers::math::{Rgb, Vec3};
@@ -23,20 +23,20 @@ pub trait KernelBsdf {
 
     /// f·|cos θi| and density (1/sr), without deltas.
     #[inline]
-    fn f_cos_and_pdf(&self, wo: Vec3, wi: Vec3) -> (Rgb, f32) {
+    fn f_cos_and_pdf(&self, wo: Vec3, wi: Vec3) -> BsdfValue {
         evaluate::<Self::Formulas>(self.params().as_ref(), self.tables(), wo, wi)
     }
 
     /// Value without cosine (1/sr), without deltas.
     #[inline]
     fn f(&self, wo: Vec3, wi: Vec3) -> Rgb {
-        without_cos(self.f_cos_and_pdf(wo, wi).0, wi)
+        without_cos(self.f_cos_and_pdf(wo, wi).f_cos, wi)
     }
 
     /// Density of the non-specular part of [`Self::sample`] per steradian.
     #[inline]
     fn pdf(&self, wo: Vec3, wi: Vec3) -> f32 {
-        self.f_cos_and_pdf(wo, wi).1
+        self.f_cos_and_pdf(wo, wi).pdf
     }
 
     /// Samples a direction: a lobe by `uc`, a direction within it by `u`.
@@ -49,9 +49,9 @@ pub trait KernelBsdf {
 
 /// f·|cos θi| and density (1/sr) by a kernel.
 #[inline]
-pub(super) fn evaluate<K: BsdfKernel>(p: &[f32], tables: &[f32], wo: Vec3, wi: Vec3) -> (Rgb, f32) {
+pub(super) fn evaluate<K: BsdfKernel>(p: &[f32], tables: &[f32], wo: Vec3, wi: Vec3) -> BsdfValue {
     let Value { f_cos, pdf } = K::evaluate(p, tables, wo.into(), wi.into());
-    (Rgb::from_array(f_cos), pdf)
+    BsdfValue { f_cos: Rgb::from_array(f_cos), pdf }
 }
 
 /// f from f·|cos θi|; black along the surface, where the quotient is not finite.

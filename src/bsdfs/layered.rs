@@ -18,9 +18,9 @@ use super::dielectric::{Dielectric, Select, Transport};
 use super::diffuse::Diffuse;
 use super::fresnel::{fr_conductor, fr_dielectric, reflect, to_upper};
 use super::kernel::KernelBsdf as _;
-use super::lobe::{BsdfSample, Lobe};
+use super::lobe::{BsdfSample, BsdfValue, Lobe, MicrofacetLobe};
 use super::microfacet::TrowbridgeReitz;
-use lumiris_numbers::estimators::mis::{Heuristic, Technique};
+use lumiris_numbers::estimators::heuristics::{Heuristic, Technique};
 use lumiris_numbers::math::hash::{HashStream, hash_floats};
 use lumiris_numbers::math::{Frame, Rgb, Vec3, safe_sqrt, sqr, warp};
 use std::f32::consts::{PI, TAU};
@@ -117,7 +117,7 @@ impl Layered {
 
     /// Value without cosine (1/sr), without mirror reflection: the mean of `samples` walks.
     pub fn f(&self, wo: Vec3, wi: Vec3) -> Rgb {
-        let Some((wo, wi)) = to_upper(wo, wi) else { return Rgb::BLACK };
+        let Some([wo, wi]) = to_upper(wo, wi) else { return Rgb::BLACK };
         let mut stream = HashStream::new([hash_floats(&wo.to_array()), hash_floats(&wi.to_array()), 0x6c61_7965]);
         let mut sum = Rgb::BLACK;
         if self.has_non_specular() {
@@ -228,23 +228,25 @@ impl Layered {
     }
 
     /// The strongest lobe other than the cosine, see [`super::Bsdf::glossy_lobe`].
-    pub(super) fn glossy_lobe(&self, wo: Vec3) -> (TrowbridgeReitz, f32) {
+    pub(super) fn glossy_lobe(&self, wo: Vec3) -> MicrofacetLobe {
         let lobes = self.lobes(if wo.z < 0.0 { -wo } else { wo });
         match &self.base {
-            Base::Conductor(metal) if lobes.base > lobes.interface => (metal.distribution, lobes.base),
-            _ => (self.top.distribution, lobes.interface),
+            Base::Conductor(metal) if lobes.base > lobes.interface => {
+                MicrofacetLobe { distribution: metal.distribution, share: lobes.base }
+            }
+            _ => MicrofacetLobe { distribution: self.top.distribution, share: lobes.interface },
         }
     }
 
     /// Density of these lobes, including their probabilities, see [`super::Bsdf::pdf_first_lobe`].
     pub(super) fn pdf_first_lobe(&self, wo: Vec3, wi: Vec3) -> f32 {
-        let Some((wo, wi)) = to_upper(wo, wi) else { return 0.0 };
+        let Some([wo, wi]) = to_upper(wo, wi) else { return 0.0 };
         self.pdf_upper(wo, wi, &Lobes { cosine: 0.0, ..self.lobes(wo) })
     }
 
     /// Density of the non-specular part of [`Self::sample`] per steradian.
     pub fn pdf(&self, wo: Vec3, wi: Vec3) -> f32 {
-        let Some((wo, wi)) = to_upper(wo, wi) else { return 0.0 };
+        let Some([wo, wi]) = to_upper(wo, wi) else { return 0.0 };
         self.pdf_upper(wo, wi, &self.lobes(wo))
     }
 
@@ -323,12 +325,12 @@ struct Walk<'a> {
 impl Walk<'_> {
     /// Connects the event at depth `z` to the presampled exit. `event` gives the scattering function times cosine
     /// towards the exit, and the density with which the walk itself would sample it.
-    fn connect_exit(&mut self, z: f32, event: impl Fn(Vec3) -> (Rgb, f32)) {
+    fn connect_exit(&mut self, z: f32, event: impl Fn(Vec3) -> BsdfValue) {
         let Some(exit) = &self.exit else { return };
-        let (value, pdf) = event(-exit.wi);
+        let BsdfValue { f_cos, pdf } = event(-exit.wi);
         let weight = if self.layer.top.is_specular() { 1.0 } else { power_weight(exit.pdf, pdf) };
         let transmittance = Layered::transmittance(self.layer.thickness - z, exit.wi);
-        self.f += self.beta * value * exit.f * (transmittance * weight / exit.pdf);
+        self.f += self.beta * f_cos * exit.f * (transmittance * weight / exit.pdf);
     }
 
     /// Connects a scattering event in the medium, at `z` between a smooth interface and a smooth base, by all chains of
@@ -378,7 +380,7 @@ impl Walk<'_> {
         let (albedo, g) = (self.layer.albedo, self.layer.g);
         self.connect_exit(z, |out| {
             let phase = henyey_greenstein(-w.dot(out), g);
-            (albedo * phase, phase)
+            BsdfValue { f_cos: albedo * phase, pdf: phase }
         });
         self.connect_mirrors(z, w);
         let next = sample_henyey_greenstein(-w, g, u);
@@ -393,7 +395,7 @@ impl Walk<'_> {
         let base = self.layer.base;
         let specular = base.is_specular();
         if !specular {
-            self.connect_exit(0.0, |out| (base.f(-w, out) * out.z.abs(), base.pdf(-w, out)));
+            self.connect_exit(0.0, |out| BsdfValue { f_cos: base.f(-w, out) * out.z.abs(), pdf: base.pdf(-w, out) });
         }
         let sample = base.sample(-w, u).filter(|s| s.pdf > 0.0 && s.wi.z != 0.0)?;
         self.beta = self.beta * sample.f * (sample.wi.z.abs() / sample.pdf);

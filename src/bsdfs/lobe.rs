@@ -1,5 +1,6 @@
 //! BSDF samples and their lobes.
 
+use super::microfacet::TrowbridgeReitz;
 use lumiris_lanes::kernels::lobe;
 use lumiris_numbers::math::{Rgb, Vec3};
 use std::ops::BitOr;
@@ -43,12 +44,6 @@ impl Lobe {
     pub const fn is_specular(self) -> bool {
         self.contains(Lobe::SPECULAR)
     }
-
-    /// True if the direction is on the other side.
-    #[inline]
-    pub const fn is_transmission(self) -> bool {
-        self.contains(Lobe::TRANSMISSION)
-    }
 }
 
 impl BitOr for Lobe {
@@ -72,4 +67,34 @@ pub struct BsdfSample {
     pub lobe: Lobe,
     /// Index of refraction on the side of `wi` relative to the side of `wo`; 1 for reflection.
     pub eta: f32,
+}
+
+/// Value and density of a BSDF for a pair of directions, without deltas.
+#[derive(Clone, Copy, Debug)]
+pub struct BsdfValue {
+    /// f·|cos θi| (1/sr).
+    pub f_cos: Rgb,
+    /// Density of sampling `wi` (1/sr).
+    pub pdf: f32,
+}
+
+impl BsdfValue {
+    /// No scattering.
+    pub const ZERO: BsdfValue = BsdfValue { f_cos: Rgb::BLACK, pdf: 0.0 };
+}
+
+/// A rough lobe about the mirror direction.
+#[derive(Clone, Copy, Debug)]
+pub struct LobeWidth {
+    /// α, the greater one if the lobe is anisotropic.
+    pub alpha: f32,
+    /// Fraction of the albedo (0 to 1).
+    pub share: f32,
+}
+
+/// A lobe of microfacets, with its fraction of the albedo (0 to 1).
+#[derive(Clone, Copy, Debug)]
+pub(super) struct MicrofacetLobe {
+    pub(super) distribution: TrowbridgeReitz,
+    pub(super) share: f32,
 }

@@ -161,57 +161,57 @@ pub struct Measured<'a> {
 }
 
 /// Data for a direction wo, in the upper hemisphere and in the range of the tables.
-struct Seen {
+struct Viewer {
     wo: Vec3,
     blend: Blend,
     /// Added to azimuths within the square.
-    turned: f32,
+    azimuth: f32,
     /// Its point in the square.
     place: Vec2,
 }
 
 impl Measured<'_> {
-    fn seen(&self, wo: Vec3) -> Seen {
+    fn viewer(&self, wo: Vec3) -> Viewer {
         let (theta, phi) = (theta_of(wo), wo.y.atan2(wo.x));
-        let turned = if self.tables.symmetry == Symmetry::Isotropic { phi } else { 0.0 };
-        Seen { wo, blend: self.tables.grid.at([phi, theta]), turned, place: square(theta, phi) }
+        let azimuth = if self.tables.symmetry == Symmetry::Isotropic { phi } else { 0.0 };
+        Viewer { wo, blend: self.tables.grid.at([phi, theta]), azimuth, place: square(theta, phi) }
     }
 
     /// Both directions, mapped to the range of the tables; `None` if they are on different sides.
-    fn folded(&self, wo: Vec3, wi: Vec3) -> Option<(Vec3, Vec3)> {
-        let (wo, wi) = to_upper(wo, wi)?;
+    fn folded(&self, wo: Vec3, wi: Vec3) -> Option<[Vec3; 2]> {
+        let [wo, wi] = to_upper(wo, wi)?;
         let signs = self.tables.symmetry.signs(wo).extend(1.0);
-        Some((wo * signs, wi * signs))
+        Some([wo * signs, wi * signs])
     }
 
     /// f cos θi (1/sr) for the normal at the point `m` of the square, whose random number is `u`.
-    fn f_cos(&self, seen: &Seen, m: Vec2, u: Vec2) -> Rgb {
-        let color = self.tables.color.at(&seen.blend, u);
+    fn f_cos(&self, viewer: &Viewer, m: Vec2, u: Vec2) -> Rgb {
+        let color = self.tables.color.at(&viewer.blend, u);
         let relative = |facets: &Facets| {
             let all = Blend::only(0);
-            facets.ndf.at(&all, m) / (4.0 * facets.sigma.at(&all, seen.place))
+            facets.ndf.at(&all, m) / (4.0 * facets.sigma.at(&all, viewer.place))
         };
         color * self.tables.facets.as_ref().map_or(1.0, relative)
     }
 
     /// Value without cosine (1/sr).
     pub fn f(&self, wo: Vec3, wi: Vec3) -> Rgb {
-        let Some((wo, wi)) = self.folded(wo, wi) else { return Rgb::BLACK };
+        let Some([wo, wi]) = self.folded(wo, wi) else { return Rgb::BLACK };
         let Some(m) = (wo + wi).try_normalize() else { return Rgb::BLACK };
-        let seen = self.seen(wo);
-        let place = square(theta_of(m), m.y.atan2(m.x) - seen.turned);
-        let u = self.tables.visible.invert(&seen.blend, place);
-        self.f_cos(&seen, place, u) / wi.z
+        let viewer = self.viewer(wo);
+        let place = square(theta_of(m), m.y.atan2(m.x) - viewer.azimuth);
+        let u = self.tables.visible.invert(&viewer.blend, place);
+        self.f_cos(&viewer, place, u) / wi.z
     }
 
     /// Density of [`Self::sample`] per steradian.
     pub fn pdf(&self, wo: Vec3, wi: Vec3) -> f32 {
-        let Some((wo, wi)) = self.folded(wo, wi) else { return 0.0 };
+        let Some([wo, wi]) = self.folded(wo, wi) else { return 0.0 };
         let Some(m) = (wo + wi).try_normalize() else { return 0.0 };
-        let seen = self.seen(wo);
-        let place = square(theta_of(m), m.y.atan2(m.x) - seen.turned);
-        let u = self.tables.visible.invert(&seen.blend, place);
-        let density = self.tables.luminance.pdf(&seen.blend, u) * self.tables.visible.pdf(&seen.blend, place);
+        let viewer = self.viewer(wo);
+        let place = square(theta_of(m), m.y.atan2(m.x) - viewer.azimuth);
+        let u = self.tables.visible.invert(&viewer.blend, place);
+        let density = self.tables.luminance.pdf(&viewer.blend, u) * self.tables.visible.pdf(&viewer.blend, place);
         density / steradians(place.x, m, wo)
     }
 
@@ -219,22 +219,22 @@ impl Measured<'_> {
     pub fn sample(&self, wo: Vec3, u: [f32; 2]) -> Option<BsdfSample> {
         let side = Vec3::splat(wo.z.signum());
         let signs = self.tables.symmetry.signs(wo * side).extend(1.0);
-        let seen = self.seen(wo * side * signs);
+        let viewer = self.viewer(wo * side * signs);
 
         // Choose a normal
-        let number = self.tables.luminance.sample(&seen.blend, Vec2::from(u));
-        let normal = self.tables.visible.sample(&seen.blend, number.p);
+        let number = self.tables.luminance.sample(&viewer.blend, Vec2::from(u));
+        let normal = self.tables.visible.sample(&viewer.blend, number.p);
         let (sin, cos) = polar_of(normal.p.x).sin_cos();
-        let phi = (2.0 * normal.p.y - 1.0) * PI + seen.turned;
+        let phi = (2.0 * normal.p.y - 1.0) * PI + viewer.azimuth;
         let m = Vec3::new(sin * phi.cos(), sin * phi.sin(), cos);
 
         // Reflect
-        let wi = reflect(seen.wo, m);
-        if seen.wo.dot(m) <= 0.0 || wi.z <= 0.0 {
+        let wi = reflect(viewer.wo, m);
+        if viewer.wo.dot(m) <= 0.0 || wi.z <= 0.0 {
             return None;
         }
-        let f = self.f_cos(&seen, normal.p, number.p) / wi.z;
-        let pdf = number.pdf * normal.pdf / steradians(normal.p.x, m, seen.wo);
+        let f = self.f_cos(&viewer, normal.p, number.p) / wi.z;
+        let pdf = number.pdf * normal.pdf / steradians(normal.p.x, m, viewer.wo);
         Some(BsdfSample { f, wi: wi * signs * side, pdf, lobe: Lobe::GLOSSY | Lobe::REFLECTION, eta: 1.0 })
     }
 

@@ -189,7 +189,7 @@ impl Model {
     /// Value without cosine (1/sr) on the side of `wo`; both sides of the surface are equal.
     #[inline]
     pub fn f(&self, wo: Vec3, wi: Vec3) -> Rgb {
-        let Some((wo, wi)) = to_upper(wo, wi) else { return Rgb::BLACK };
+        let Some([wo, wi]) = to_upper(wo, wi) else { return Rgb::BLACK };
         match self {
             Model::Diffuse(reflectance) => *reflectance * FRAC_1_PI,
             Model::OrenNayar(m) => m.f(wo, wi),

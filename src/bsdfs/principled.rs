@@ -1,6 +1,7 @@
 //! Metal, glossy diffuse or glass under a coat, see [`lumiris_lanes::kernels::principled`].
 
 use super::kernel::KernelBsdf;
+use super::lobe::MicrofacetLobe;
 use super::microfacet::{SMOOTH_ALPHA, TrowbridgeReitz};
 use super::sheen::Sheen;
 use lumiris_lanes::kernels;
@@ -70,14 +71,14 @@ impl Principled {
     }
 
     /// The strongest reflected lobe, see [`super::Bsdf::glossy_lobe`].
-    pub(super) fn glossy_lobe(&self, wo: Vec3) -> Option<(TrowbridgeReitz, f32)> {
+    pub(super) fn glossy_lobe(&self, wo: Vec3) -> Option<MicrofacetLobe> {
         let choice = self.choice(wo);
         if self.transmission > 0.0 {
             None
         } else if choice.coat > choice.facets {
-            Some((self.coat_distribution, choice.coat))
+            Some(MicrofacetLobe { distribution: self.coat_distribution, share: choice.coat })
         } else {
-            Some((self.distribution, choice.facets))
+            Some(MicrofacetLobe { distribution: self.distribution, share: choice.facets })
         }
     }
 
@@ -106,6 +107,7 @@ impl KernelBsdf for Principled {
             Interior::Solid(eta) => eta,
         };
         let TrowbridgeReitz { alpha_x, alpha_y } = self.distribution;
+        // In the order of `kernels::principled::Params::new`
         [
             color.r,
             color.g,

@@ -3,8 +3,8 @@
 use super::domain;
 use super::stats::DirectStats;
 use crate::lights::LightId;
+use lumiris_numbers::estimators::heuristics::{Heuristic, Technique};
 use lumiris_numbers::estimators::mc;
-use lumiris_numbers::estimators::mis::{Heuristic, Technique};
 use lumiris_numbers::math::{Ray, Rgb};
 use lumiris_numbers::samplers::SampleStream;
 

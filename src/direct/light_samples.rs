@@ -3,7 +3,7 @@
 use super::candidates::{Candidate, Drawn, SampleAllocation};
 use super::domain;
 use super::point::ShadingPoint;
-use crate::lights::{LightCtx, LightId, LightSample};
+use crate::lights::{LeAndPdf, LightCtx, LightId, LightSample};
 use crate::scene::RenderJob;
 
 /// Draws the light samples of a point, with lights chosen by the light sampler. Returns the number of samples.
@@ -28,7 +28,7 @@ pub(super) fn draw(
 pub(super) fn with_infinite(job: &RenderJob, ctx: &LightCtx, light: LightId, mut sample: LightSample) -> LightSample {
     let lights = &job.lights;
     if lights.infinite.len() > 1 && lights.infinite.contains(&light) {
-        (sample.li, sample.pdf) = lights.infinite_in_direction(ctx, sample.wi);
+        LeAndPdf { le: sample.li, pdf: sample.pdf } = lights.infinite_in_direction(ctx, sample.wi);
     }
     sample
 }

@@ -170,7 +170,7 @@ pub(super) fn draw_groups(
         for i in 0..end - first {
             let stream = point.stream.split(domain::GROUP + group as u32, count, i);
             let [u0, u1, u_choice] = stream.draw::<3>();
-            let drawn = lights.sample_group(&ctx, (group, pmf), u_choice, [u0, u1]);
+            let drawn = lights.sample_group(&ctx, group, pmf, u_choice, [u0, u1]);
             records.extend(mixture.candidate(job, index, point, allocation, group, drawn));
         }
         first = end;

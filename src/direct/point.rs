@@ -1,5 +1,6 @@
 //! A point at which direct light is estimated, and the rays that leave it.
 
+use crate::bsdfs::LobeWidth;
 use crate::lights::{GlossyLobe, LightCtx, LightSample, LightSampling};
 use crate::materials::SurfaceBsdf;
 use crate::media::{MediumId, Sides};
@@ -52,7 +53,7 @@ pub fn lobe_for_lights(lights: &LightSampling, bsdf: &SurfaceBsdf<'_>, wo: Vec3)
     }
     let frame = &bsdf.frame;
     let lobe = bsdf.bsdf.glossy_lobe(frame.to_local(wo));
-    lobe.map_or(GlossyLobe::NONE, |(alpha, share)| GlossyLobe::new(wo, frame.z, alpha, share))
+    lobe.map_or(GlossyLobe::NONE, |LobeWidth { alpha, share }| GlossyLobe::new(wo, frame.z, alpha, share))
 }
 
 impl ShadingPoint<'_> {

@@ -10,14 +10,14 @@
 
 use super::candidates::Candidate;
 use super::point::ShadingPoint;
-use crate::lights::many::{LightSamples, NO_LIGHT, Scratch};
+use crate::lights::sample_columns::{ChosenLight, LightSamples, NO_LIGHT, Scratch};
 use crate::lights::{LightId, LightRun, LightSample};
 use crate::scene::RenderJob;
 use crate::settings::{ProposalPoints, Target};
 use lumiris_lanes::columns::{Column, Columns3, padded};
 use lumiris_lanes::lane::LANES;
-use lumiris_lanes::{combine, curve};
-use lumiris_numbers::estimators::mis::Heuristic;
+use lumiris_lanes::{curve, ris_weights};
+use lumiris_numbers::estimators::heuristics::Heuristic;
 use lumiris_numbers::estimators::ris::control::{ControlSum, doubt};
 use lumiris_numbers::estimators::ris::weight;
 use lumiris_numbers::math::Rgb;
@@ -31,7 +31,7 @@ const POSITIONS: u32 = 0x517c_c1b7;
 pub struct ProposalColumns {
     points: Vec<PointProposals>,
     /// Light and probability of its choice; [`NO_LIGHT`] for BSDF samples.
-    chosen: Vec<(LightId, f32)>,
+    chosen: Vec<ChosenLight>,
     u: [Column; 2],
     /// Positions of the shading points.
     p: Columns3,
@@ -65,7 +65,7 @@ pub struct PointProposals {
 
 /// Expected numbers of proposals per technique at a point, MIS heuristic and target.
 #[derive(Clone, Copy, Debug)]
-pub struct Techniques {
+pub struct ProposalTechniques {
     /// Expected number of light samples.
     pub n_light: f32,
     /// Expected number of BSDF samples.
@@ -106,7 +106,7 @@ impl ProposalColumns {
     /// A light sample; `None` if it failed.
     pub fn light_sample(&self, proposal: usize) -> Option<(LightId, LightSample)> {
         let sample = self.samples.get(proposal, self.p.vec3(proposal))?;
-        Some((self.chosen[proposal].0, sample))
+        Some((self.chosen[proposal].light, sample))
     }
 
     /// Σ c·V̂ over the proposals of a point; `bsdf_samples` are its BSDF samples.
@@ -126,7 +126,7 @@ impl ProposalColumns {
 
     /// Reserves memory for `len` proposals, keeping existing ones.
     fn grow(&mut self, len: usize) {
-        self.chosen.resize(len, (NO_LIGHT, 0.0));
+        self.chosen.resize(len, ChosenLight::NONE);
         if self.r.len() < len {
             let len = len.next_power_of_two().max(LANES);
             self.p.reserve(len);
@@ -142,7 +142,7 @@ impl ProposalColumns {
         &mut self,
         job: &RenderJob,
         point: &ShadingPoint<'_>,
-        techniques: &Techniques,
+        techniques: &ProposalTechniques,
         light: LightProposals,
         bsdf_samples: &[Candidate],
     ) {
@@ -152,7 +152,7 @@ impl ProposalColumns {
         let end = bsdf_start + bsdf_samples.len();
         self.grow(end);
         self.points.push(PointProposals { start, bsdf_start, end });
-        self.chosen[start..end].fill((NO_LIGHT, 0.0));
+        self.chosen[start..end].fill(ChosenLight::NONE);
         if light.draws > 0 {
             self.place(light);
             self.choose_lights(job, point, start, bsdf_start);
@@ -201,12 +201,12 @@ impl ProposalColumns {
     fn choose_lights(&mut self, job: &RenderJob, point: &ShadingPoint<'_>, start: usize, end: usize) {
         job.lights.sampler.runs(&point.light_ctx(), &self.positions, &mut self.runs);
         for run in &self.runs {
-            let [first, last] = run.places.map(|p| p as usize);
+            let [first, last] = run.range.map(|p| p as usize);
             let (from, to) = (start + first, start + last);
             for position in &mut self.positions[first..last] {
                 *position = run.within(*position);
             }
-            self.chosen[from..to].fill((run.light, run.pmf));
+            self.chosen[from..to].fill(ChosenLight { light: run.light, pmf: run.pmf });
         }
         let [u0, u1] = &mut self.u;
         curve::hilbert_points(&self.positions, &self.jitter, &mut u0[start..end], &mut u1[start..end]);
@@ -218,7 +218,7 @@ impl ProposalColumns {
         &mut self,
         job: &RenderJob,
         points: &[ShadingPoint<'_>],
-        techniques: impl Fn(&ShadingPoint<'_>) -> Techniques,
+        techniques: impl Fn(&ShadingPoint<'_>) -> ProposalTechniques,
     ) {
         let n = self.count();
         self.samples.reserve(padded(n));
@@ -238,7 +238,7 @@ impl ProposalColumns {
         &mut self,
         job: &RenderJob,
         point: &ShadingPoint<'_>,
-        techniques: &Techniques,
+        techniques: &ProposalTechniques,
         start: usize,
         end: usize,
     ) {
@@ -249,7 +249,7 @@ impl ProposalColumns {
         for (p_bsdf, is_delta) in self.p_bsdf[start..end].iter_mut().zip(&is_delta[start..end]) {
             *p_bsdf = if *is_delta { 0.0 } else { *p_bsdf };
         }
-        let proposals = combine::Proposals {
+        let proposals = ris_weights::Proposals {
             f_cos: self.f_cos.each_ref().map(|a| &a[start..end]),
             li: li.get(end).map(|c| &c[start..]),
             p: &pdf[start..end],
@@ -258,12 +258,12 @@ impl ProposalColumns {
             m_other: techniques.n_bsdf,
             heuristic: techniques.heuristic,
         };
-        let mut out = combine::Weights {
+        let mut out = ris_weights::Weights {
             q_hat: &mut self.p_hat[start..end],
             r: &mut self.r[start..end],
             w: &mut self.weight[start..end],
         };
-        combine::combine(lumiris_lanes::level(), &proposals, &mut out);
+        ris_weights::weigh(lumiris_lanes::level(), &proposals, &mut out);
         self.adapt_weights(job, point, techniques.target, start, end);
     }
 
@@ -303,7 +303,7 @@ impl ProposalColumns {
                 // The samples of a light are consecutive
                 let (mut last, mut visibility, mut factor_of_last) = (NO_LIGHT, 0.0, 0.0);
                 for i in start..end {
-                    let light = self.chosen[i].0;
+                    let light = self.chosen[i].light;
                     if last != light {
                         visibility = job.lights.visibility(&ctx, &contributing, light);
                         (last, factor_of_last) = (light, factor(target, visibility));

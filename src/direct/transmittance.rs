@@ -6,7 +6,7 @@
 
 use crate::accel::{Coherence, Hit, RayBatch};
 use crate::lights::LightId;
-use crate::media::{MediumId, Numbers, Segment};
+use crate::media::{FlightSampler, MediumId, Segment};
 use crate::scene::{RenderJob, SurfaceInteraction};
 use lumiris_numbers::math::ray::SEGMENT_END;
 use lumiris_numbers::math::{Ray, Rgb, Vec3};
@@ -36,7 +36,7 @@ struct Crossed {
     medium_of_end: Option<MediumId>,
     /// The current medium.
     medium: Option<MediumId>,
-    numbers: Numbers,
+    numbers: FlightSampler,
     /// Estimate of the transmittance.
     transmittance: Rgb,
 }
@@ -71,7 +71,7 @@ impl Crossing {
                 end: ray.t_max.is_finite().then(|| ray.o + ray.d),
                 medium_of_end: job.lights.medium_of(light),
                 medium,
-                numbers: Numbers::new(stream),
+                numbers: FlightSampler::new(stream),
                 transmittance: Rgb::WHITE,
             }
         }));

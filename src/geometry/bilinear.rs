@@ -124,8 +124,8 @@ impl BilinearMesh {
         let (n, ns) = shading.map_or((n, n), |ns| (face_forward(n, ns), ns));
 
         // Derivatives by the texture coordinates, by the chain rule.
-        let (dpdu, dpdv) = self.texture_derivatives(i, uv, [du, dv]);
-        let (dpdu, dpdv) = spanning(dpdu, dpdv, n);
+        let [dpdu, dpdv] = self.texture_derivatives(i, uv, [du, dv]);
+        let [dpdu, dpdv] = spanning(dpdu, dpdv, n);
         let uv = self.texture_coordinates_at(i, uv);
         SurfaceHit { p, p_error, n, ns, dpdu, dpdv, dpdus: dpdu, dpdvs: dpdv, uv, vertex: self.vertex_values_of(i) }
     }
@@ -147,18 +147,18 @@ impl BilinearMesh {
     }
 
     /// Derivatives of p by the texture coordinates at `uv` of patch `i`; by u and v if they are singular.
-    fn texture_derivatives(&self, i: usize, uv: [f32; 2], [du, dv]: [DVec3; 2]) -> (Vec3, Vec3) {
+    fn texture_derivatives(&self, i: usize, uv: [f32; 2], [du, dv]: [DVec3; 2]) -> [Vec3; 2] {
         if self.uvs.is_empty() {
-            return (round(du), round(dv));
+            return [round(du), round(dv)];
         }
         let [s00, s10, s01, s11] = self.indices[i].map(|k| self.uvs[k as usize]);
         let st_u = (s10 - s00).lerp(s11 - s01, uv[1]).as_dvec2();
         let st_v = (s01 - s00).lerp(s11 - s10, uv[0]).as_dvec2();
         let det = st_u.x * st_v.y - st_u.y * st_v.x;
         if det.is_nan() || det.abs() < 1e-9 {
-            return (round(du), round(dv));
+            return [round(du), round(dv)];
         }
-        (round((du * st_v.y - dv * st_u.y) / det), round((dv * st_u.x - du * st_v.x) / det))
+        [round((du * st_v.y - dv * st_u.y) / det), round((dv * st_u.x - du * st_v.x) / det)]
     }
 }
 

@@ -186,14 +186,14 @@ impl CurveSet {
         let (o, d) = (ray.o.as_dvec3(), ray.d.as_dvec3());
         let inv_d2 = 1.0 / d.length_squared();
         let project = |x: DVec3| x - d * (x.dot(d) * inv_d2);
-        // Half the derivative of the squared distance of the ray and c(u)
+        // Half the derivative of the squared distance of the ray and c(u), and its own derivative
         let slope = |u: f64| {
             let at = curve.at(u, o);
             let c2 = project(at.c);
-            (c2.dot(at.d1), project(at.d1).length_squared() + c2.dot(at.d2))
+            [c2.dot(at.d1), project(at.d1).length_squared() + c2.dot(at.d2)]
         };
         let [from, to] = [index, index + 1].map(|k| f64::from(k) / f64::from(count));
-        let (a, b) = (slope(from).0, slope(to).0);
+        let (a, b) = (slope(from)[0], slope(to)[0]);
         if !(a <= 0.0 && b > 0.0) {
             return None;
         }
@@ -258,10 +258,10 @@ impl CurveSet {
 }
 
 /// The root of an increasing function in a bracket with the values `ends`; `f` returns its value and derivative.
-fn root(f: impl Fn(f64) -> (f64, f64), [mut lo, mut hi]: [f64; 2], ends: [f64; 2]) -> f64 {
+fn root(f: impl Fn(f64) -> [f64; 2], [mut lo, mut hi]: [f64; 2], ends: [f64; 2]) -> f64 {
     let mut u = lo - ends[0] * (hi - lo) / (ends[1] - ends[0]);
     for _ in 0..24 {
-        let (value, derivative) = f(u);
+        let [value, derivative] = f(u);
         if value <= 0.0 {
             lo = u;
         } else {

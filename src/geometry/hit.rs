@@ -121,13 +121,13 @@ pub(super) fn round(p: DVec3) -> Vec3 {
 
 /// `u` and `v` if they are linearly independent, else the tangents of some frame about `n`.
 #[inline]
-pub(super) fn spanning(u: Vec3, v: Vec3, n: Vec3) -> (Vec3, Vec3) {
+pub(super) fn spanning(u: Vec3, v: Vec3, n: Vec3) -> [Vec3; 2] {
     let area_squared = u.as_dvec3().cross(v.as_dvec3()).length_squared();
     if area_squared > 0.0 && u.is_finite() && v.is_finite() {
-        return (u, v);
+        return [u, v];
     }
     let frame = Frame::from_z(n);
-    (frame.x, frame.y)
+    [frame.x, frame.y]
 }
 
 /// |M|·v with the absolute values of the linear part, for error bounds.

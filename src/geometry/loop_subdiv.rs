@@ -21,12 +21,13 @@ pub fn loop_subdivide(levels: u32, positions: Vec<Vec3>, indices: Vec<[u32; 3]>)
     if count.is_none_or(|n| n > MAX_TRIANGLES) {
         return Err(format!("{levels} levels of subdivision of {} triangles are too many triangles", indices.len()));
     }
-    let (mut positions, mut indices) = (positions, indices);
-    let mut links = Links::new(&indices, positions.len())?;
+    let mut mesh = ControlMesh { positions, faces: indices };
+    let mut links = Links::new(&mesh.faces, mesh.positions.len())?;
     for _ in 0..levels {
-        (positions, indices) = subdivide(&links, &positions, &indices)?;
-        links = Links::new(&indices, positions.len())?;
+        mesh = subdivide(&links, &mesh)?;
+        links = Links::new(&mesh.faces, mesh.positions.len())?;
     }
+    let ControlMesh { positions, faces } = mesh;
 
     // Move the vertices to the limit surface.
     let mut limit = Vec::with_capacity(positions.len());
@@ -36,13 +37,18 @@ pub fn loop_subdivide(levels: u32, positions: Vec<Vec3>, indices: Vec<[u32; 3]>)
         limit.push(ring.blend(p, Rule::Limit));
         normals.push(ring.limit_normal(p));
     }
-    let mut mesh = TriangleMesh::new(limit, indices)?;
+    let mut mesh = TriangleMesh::new(limit, faces)?;
     mesh.normals = normals;
     Ok(mesh)
 }
 
+struct ControlMesh {
+    positions: Vec<Vec3>,
+    faces: Vec<[u32; 3]>,
+}
+
 /// One level of subdivision: four triangles for one.
-fn subdivide(links: &Links, positions: &[Vec3], faces: &[[u32; 3]]) -> Result<(Vec<Vec3>, Vec<[u32; 3]>), String> {
+fn subdivide(links: &Links, ControlMesh { positions, faces }: &ControlMesh) -> Result<ControlMesh, String> {
     // Even vertices keep their indices.
     let mut refined = Vec::with_capacity(positions.len() * 4);
     for (v, &p) in positions.iter().enumerate() {
@@ -72,7 +78,7 @@ fn subdivide(links: &Links, positions: &[Vec3], faces: &[[u32; 3]]) -> Result<(V
         let (ab, bc, ca) = (mid(a, b), mid(b, c), mid(c, a));
         [[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]]
     });
-    Ok((refined, split.collect()))
+    Ok(ControlMesh { faces: split.collect(), positions: refined })
 }
 
 /// The links [v, a, b] of all corners, sorted, so that the links of a vertex are contiguous.

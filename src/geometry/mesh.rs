@@ -120,19 +120,19 @@ impl TriangleMesh {
 
         // Partial derivatives from the texture coordinates.
         let st = self.texture_coordinates(i);
-        let (dpdu, dpdv) = partial_derivatives(corners, st);
-        let (dpdu, dpdv) = spanning(dpdu, dpdv, ns);
-        let (dpdus, dpdvs) = self.shading_tangents(i, b, ns).unwrap_or((dpdu, dpdv));
+        let [dpdu, dpdv] = partial_derivatives(corners, st);
+        let [dpdu, dpdv] = spanning(dpdu, dpdv, ns);
+        let [dpdus, dpdvs] = self.shading_tangents(i, b, ns).unwrap_or([dpdu, dpdv]);
         let vertex = self.vertex_values_at(i, uv);
         let uv = self.texture_coordinates_at(i, uv);
         SurfaceHit { p, p_error, n, ns, dpdu, dpdv, dpdus, dpdvs, uv, vertex }
     }
 
     /// The shading tangents at the weights `b` of triangle `i`; `None` if they follow the texture coordinates.
-    fn shading_tangents(&self, i: usize, b: [f32; 3], ns: Vec3) -> Option<(Vec3, Vec3)> {
+    fn shading_tangents(&self, i: usize, b: [f32; 3], ns: Vec3) -> Option<[Vec3; 2]> {
         let vertices = self.indices[i].map(|v| v as usize);
         let second = || {
-            let (u, v) = partial_derivatives(self.triangle(i), vertices.map(|v| self.uvs1[v]));
+            let [u, v] = partial_derivatives(self.triangle(i), vertices.map(|v| self.uvs1[v]));
             spanning(u, v, ns)
         };
         if self.tangents.is_empty() {
@@ -140,11 +140,11 @@ impl TriangleMesh {
         }
         let tangent = self.blend(&self.tangents, i, b).filter(|s| s.length_squared() > 0.0)?;
         if self.tangent_signs.is_empty() {
-            let (_, dpdv) = partial_derivatives(self.triangle(i), self.texture_coordinates(i));
-            return Some((tangent, dpdv));
+            let [_, dpdv] = partial_derivatives(self.triangle(i), self.texture_coordinates(i));
+            return Some([tangent, dpdv]);
         }
         let sign = vertices.iter().map(|&v| i32::from(self.tangent_signs[v])).sum::<i32>().signum();
-        Some((tangent, ns.cross(tangent) * sign as f32))
+        Some([tangent, ns.cross(tangent) * sign as f32])
     }
 
     /// The texture coordinates of triangle `i`'s corners.
@@ -193,16 +193,16 @@ impl TriangleMesh {
 }
 
 /// ∂p/∂u and ∂p/∂v of a triangle; zero if the texture coordinates are degenerate.
-fn partial_derivatives([p0, p1, p2]: [Vec3; 3], [uv0, uv1, uv2]: [Vec2; 3]) -> (Vec3, Vec3) {
+fn partial_derivatives([p0, p1, p2]: [Vec3; 3], [uv0, uv1, uv2]: [Vec2; 3]) -> [Vec3; 2] {
     let (duv02, duv12) = ((uv0 - uv2).as_dvec2(), (uv1 - uv2).as_dvec2());
     let (dp02, dp12) = ((p0 - p2).as_dvec3(), (p1 - p2).as_dvec3());
     let det = duv02.x * duv12.y - duv02.y * duv12.x;
     if det.is_nan() || det.abs() < 1e-9 {
-        return (Vec3::ZERO, Vec3::ZERO);
+        return [Vec3::ZERO; 2];
     }
     let dpdu = (duv12.y * dp02 - duv02.y * dp12) / det;
     let dpdv = (duv02.x * dp12 - duv12.x * dp02) / det;
-    (round(dpdu), round(dpdv))
+    [round(dpdu), round(dpdv)]
 }
 
 #[cfg(test)]

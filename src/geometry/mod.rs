@@ -23,5 +23,5 @@ pub use hit::{AlphaSource, LocalHit, SurfaceHit, VertexValues};
 pub use loop_subdiv::loop_subdivide;
 pub use mesh::TriangleMesh;
 pub use quadric::{Quadric, QuadricKind};
-pub use set::{Geometry, GeometryId, GeometrySet, Group, GroupId, Instance, NO_INSTANCE, Visibility};
+pub use set::{Geometry, GeometryId, GeometrySet, Group, GroupId, Instance, NO_INSTANCE, PrimitiveCounts, Visibility};
 pub use shape::Shape;

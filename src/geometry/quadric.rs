@@ -134,7 +134,7 @@ impl Quadric {
         let reversed = self.flip_normal != swaps_handedness(&self.group_from_local);
         let n = if reversed { -outward } else { outward };
         let [dpdu, dpdv] = local.derivatives.map(|v| round(group_from_local.transform_vector3(v)));
-        let (dpdu, dpdv) = spanning(dpdu, dpdv, n);
+        let [dpdu, dpdv] = spanning(dpdu, dpdv, n);
         let vertex = VertexValues::default();
         SurfaceHit { p, p_error, n, ns: n, dpdu, dpdv, dpdus: dpdu, dpdvs: dpdv, uv: Vec2::from(uv), vertex }
     }
@@ -190,7 +190,7 @@ impl QuadricKind {
 
     /// Parameters of a point of the full quadric; `None` if it is cut off.
     fn parameters(&self, p: DVec3) -> Option<[f32; 2]> {
-        let (phi, phi_max) = self.azimuth(p)?;
+        let Azimuth { phi, phi_max } = self.azimuth(p)?;
         let v = match *self {
             QuadricKind::Sphere { radius, z_min, z_max, .. } => {
                 let [from, to] = polar_range(radius, z_min, z_max);
@@ -210,10 +210,9 @@ impl QuadricKind {
         Some([ratio(phi, phi_max) as f32, v as f32])
     }
 
-    /// Azimuth of a point of the full quadric, and φ_max. `None` if the point is cut off. The azimuth is only computed
-    /// if it can cut the point off.
+    /// Azimuth of a point of the full quadric; `None` if the point is cut off.
     #[inline]
-    fn azimuth(&self, p: DVec3) -> Option<(Option<f64>, f64)> {
+    fn azimuth(&self, p: DVec3) -> Option<Azimuth> {
         let phi_max = match *self {
             QuadricKind::Sphere { radius, z_min, z_max, phi_max } => {
                 if (z_min > -radius && p.z < f64::from(z_min)) || (z_max < radius && p.z > f64::from(z_max)) {
@@ -238,10 +237,10 @@ impl QuadricKind {
         let phi_max = f64::from(phi_max);
         // Azimuths are at most 2π
         if phi_max >= TAU && p.is_finite() {
-            return Some((None, phi_max));
+            return Some(Azimuth { phi: None, phi_max });
         }
         let phi = azimuth(p);
-        (phi <= phi_max).then_some((Some(phi), phi_max))
+        (phi <= phi_max).then_some(Azimuth { phi: Some(phi), phi_max })
     }
 
     /// The surface at parameters (u, v).
@@ -279,6 +278,13 @@ impl QuadricKind {
             }
         }
     }
+}
+
+/// The azimuth of a point of a quadric.
+struct Azimuth {
+    /// `None` if it was not needed to decide whether the point is cut off.
+    phi: Option<f64>,
+    phi_max: f64,
 }
 
 /// x / y, and 0 if y is.

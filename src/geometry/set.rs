@@ -146,25 +146,37 @@ impl GeometrySet {
         shape.surface_hit(primitive, uv, d).transformed(&world_from_group)
     }
 
-    /// Number of stored primitives: (triangles, quadrics, bilinear patches).
-    pub fn primitive_counts(&self) -> (usize, usize, usize) {
-        self.geometries.iter().fold((0, 0, 0), |(t, q, b), g| match &g.shape {
-            Shape::Mesh(m) => (t + m.triangle_count(), q, b),
-            Shape::Quadric(_) => (t, q + 1, b),
-            Shape::Bilinear(m) => (t, q, b + m.patch_count()),
-            Shape::Curves(_) => (t, q, b),
-        })
+    /// Numbers of stored primitives.
+    pub fn primitive_counts(&self) -> PrimitiveCounts {
+        let mut counts = PrimitiveCounts::default();
+        for geometry in &self.geometries {
+            match &geometry.shape {
+                Shape::Mesh(mesh) => counts.triangles += mesh.triangle_count(),
+                Shape::Quadric(_) => counts.quadrics += 1,
+                Shape::Bilinear(mesh) => counts.patches += mesh.patch_count(),
+                Shape::Curves(set) => {
+                    counts.curves += set.curves().len();
+                    counts.curve_pieces += set.piece_count();
+                }
+            }
+        }
+        counts
     }
 }
 
-impl GeometrySet {
-    /// Number of stored curves, and of their pieces in the ray tracers.
-    pub fn curve_counts(&self) -> (usize, usize) {
-        self.geometries.iter().fold((0, 0), |(curves, pieces), g| match &g.shape {
-            Shape::Curves(set) => (curves + set.curves().len(), pieces + set.piece_count()),
-            Shape::Mesh(_) | Shape::Quadric(_) | Shape::Bilinear(_) => (curves, pieces),
-        })
-    }
+/// Numbers of primitives.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct PrimitiveCounts {
+    /// Triangles.
+    pub triangles: usize,
+    /// Quadrics.
+    pub quadrics: usize,
+    /// Bilinear patches.
+    pub patches: usize,
+    /// Curves.
+    pub curves: usize,
+    /// Pieces of curves in the ray tracers.
+    pub curve_pieces: usize,
 }
 
 #[cfg(test)]

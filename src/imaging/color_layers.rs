@@ -5,7 +5,7 @@
 //! **layer** is a set of red, green and blue with a common name. The image is the layer without a name; else the only
 //! layer with a name of the whole image; else the only layer. In all other cases the user has to choose.
 
-use super::ColorChannels;
+use super::channels::ColorChannels;
 use super::file::PartHeader;
 
 /// A set of colour channels.

@@ -1,7 +1,7 @@
 //! All parts of an image file, in a form that can be written again: additions to a file preserve the rest.
 
-use super::Image;
 use super::file::ImageError;
+use super::image::Image;
 use super::oiio::{Input, MetaValue, Part, ReadLimits, Storage, read_failure, read_headers, read_part};
 use std::path::Path;
 

@@ -64,7 +64,7 @@ impl FileTexels {
             match self.channel_bytes() {
                 1 => row.iter_mut().zip(values).for_each(|(b, v)| *b = byte(*v)),
                 _ => row.chunks_exact_mut(4).zip(values).for_each(|(word, v)| {
-                    word.copy_from_slice(&self.encoding.to_linear(*v).to_ne_bytes());
+                    word.copy_from_slice(&self.encoding.to_linear(*v).to_le_bytes());
                 }),
             }
         }

@@ -1,9 +1,8 @@
 //! A level of an image pyramid: pixels as bytes or floats, in memory or in tiles.
 
-use super::Image;
+use super::image::Image;
 use super::tiles::{TILE, TileStore};
 use lumiris_numbers::math::{Rgb, Vec2};
-use std::io;
 use std::sync::Arc;
 
 /// Values of a level, row-major from the top left, channels interleaved.
@@ -17,7 +16,7 @@ pub(super) enum Texels {
     Tiled(Tiled),
 }
 
-/// Tiles of a level, row-major. Tiles at the right and lower edges have the full size.
+/// Tiles of a level, row-major, floats little-endian. Tiles at the right and lower edges have the full size.
 #[derive(Clone, Debug)]
 pub(super) struct Tiled {
     pub(super) store: Arc<TileStore>,
@@ -39,7 +38,7 @@ impl Tiled {
         self.store.with_tile(self.first + (tile * tile_bytes) as u64, tile_bytes, |bytes| {
             std::array::from_fn(|c| match self.channel_bytes {
                 1 => table[usize::from(bytes[at + c])],
-                _ => bytes[at + 4 * c..].first_chunk().map_or(0.0, |word| f32::from_ne_bytes(*word)),
+                _ => bytes[at + 4 * c..].first_chunk().map_or(0.0, |word| f32::from_le_bytes(*word)),
             })
         })
     }
@@ -111,40 +110,6 @@ impl Level {
             Texels::Tiled(tiled) => Some(&tiled.store),
             Texels::Bytes(_) | Texels::Floats(_) => None,
         }
-    }
-
-    /// Moves the pixels into `store` if they are more than a tile.
-    pub(super) fn put_into(&mut self, store: &Arc<TileStore>, channels: usize) -> io::Result<()> {
-        if self.width * self.height > TILE * TILE {
-            self.texels = Texels::Tiled(self.tiles(channels, store)?);
-        }
-        Ok(())
-    }
-
-    /// Writes the pixels, which are not in tiles yet, to `store`.
-    fn tiles(&self, channels: usize, store: &Arc<TileStore>) -> io::Result<Tiled> {
-        let [columns, rows] = [self.width, self.height].map(|n| n.div_ceil(TILE));
-        let channel_bytes = if matches!(self.texels, Texels::Bytes(_)) { 1 } else { 4 };
-        let row_bytes = TILE * channels * channel_bytes;
-        // Written in one piece, because other images append to the same store concurrently
-        let mut all = vec![0; columns * rows * TILE * row_bytes];
-        for (tile, bytes) in all.chunks_exact_mut(TILE * row_bytes).enumerate() {
-            let (x0, y0) = (tile % columns * TILE, tile / columns * TILE);
-            let count = TILE.min(self.width - x0) * channels;
-            for (y, bytes) in (y0..self.height).zip(bytes.chunks_exact_mut(row_bytes)) {
-                let begin = (y * self.width + x0) * channels;
-                match &self.texels {
-                    Texels::Bytes(v) => bytes[..count].copy_from_slice(&v[begin..begin + count]),
-                    Texels::Floats(v) => {
-                        for (word, value) in bytes.chunks_exact_mut(4).zip(&v[begin..begin + count]) {
-                            word.copy_from_slice(&value.to_ne_bytes());
-                        }
-                    }
-                    Texels::Tiled(_) => {}
-                }
-            }
-        }
-        Ok(Tiled { store: Arc::clone(store), first: store.append(&all)?, columns, channel_bytes })
     }
 }
 

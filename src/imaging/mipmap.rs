@@ -12,7 +12,6 @@ use super::oiio::FilePyramid;
 use super::tiles::TileStore;
 use super::{ColorEncoding, Image};
 use lumiris_numbers::math::{DVec2, Rgb, Vec2};
-use std::io;
 use std::sync::Arc;
 
 /// Wrap mode: values outside the image.
@@ -90,12 +89,12 @@ pub enum Filter {
 /// A pyramid of an image of one or three channels.
 #[derive(Clone, Debug)]
 pub struct MipMap {
-    levels: Vec<Level>,
-    channels: usize,
-    wrap: Wrap,
-    filter: Filter,
+    pub(super) levels: Vec<Level>,
+    pub(super) channels: usize,
+    pub(super) wrap: Wrap,
+    pub(super) filter: Filter,
     /// Linear values of the bytes.
-    table: Box<[f32; 256]>,
+    pub(super) table: Box<[f32; 256]>,
 }
 
 impl MipMap {
@@ -217,14 +216,6 @@ impl MipMap {
     /// Number of levels.
     pub fn levels(&self) -> usize {
         self.levels.len()
-    }
-
-    /// Moves levels of more than a tile into `store`. `Err` if it cannot be written.
-    pub fn tiled(mut self, store: &Arc<TileStore>) -> io::Result<Self> {
-        for level in &mut self.levels {
-            level.put_into(store, self.channels)?;
-        }
-        Ok(self)
     }
 
     /// The store of its tiles, if it has any.

@@ -1,13 +1,12 @@
-//! Texels that do not fit into memory: tiles in a temporary file or in image files with pyramids, and a bounded cache
-//! of recently used tiles.
+//! Texels that do not fit into memory, or need not be there: tiles of files, and a bounded cache of recently used tiles.
 //!
-//! The temporary file has no name and vanishes with the program. Tiles have the same content as the levels of a pyramid
-//! in memory, so lookups give the same values.
+//! Images without a file of tiles go into a temporary file, which has no name and vanishes with the program. Tiles have
+//! the same content as the levels of a pyramid in memory, so lookups give the same values.
 
 use std::cell::RefCell;
 use std::collections::HashMap;
 use std::fs::File;
-use std::io;
+use std::io::{self, BufWriter, Write};
 use std::os::unix::fs::FileExt;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, OnceLock, PoisonError, RwLock};
@@ -21,10 +20,8 @@ const SHARD_BYTES: u64 = 4 * (TILE * TILE * 12) as u64;
 /// Tiles that each thread can access without a lock, in addition to the cache.
 const RECENT: usize = 32;
 
-/// Position of a tile in the temporary file, or, from [`OF_FILES`] on, among the tiles of all other files.
+/// Position of a tile among the bytes of all levels.
 type Key = u64;
-/// First key of tiles of other files.
-const OF_FILES: Key = 1 << 63;
 
 /// A shard of the cache.
 #[derive(Debug, Default)]
@@ -87,41 +84,61 @@ impl Shard {
 pub struct TileCounts {
     /// Bytes in the temporary file.
     pub stored: u64,
-    /// Tiles read from it and from other files.
+    /// Tiles read from files.
     pub read: u64,
     /// Bytes of the tiles in the cache.
     pub held: u64,
 }
 
-/// Reads a tile of an image file by its index.
+/// Reads a tile of a level by its index.
 pub(super) type ReadTile = dyn Fn(usize) -> Result<Vec<u8>, String> + Send + Sync;
 
-/// The tiles of other files, by level, and the next unused key.
-struct Files {
-    levels: Vec<FileLevel>,
+/// All levels, by their first keys, and the next unused key.
+#[derive(Default)]
+struct Levels {
+    list: Vec<TileLevel>,
     end: Key,
 }
 
 /// The tiles of a level.
 #[derive(Clone)]
-struct FileLevel {
+struct TileLevel {
     begin: Key,
     tile_bytes: usize,
     read: Arc<ReadTile>,
 }
 
-impl std::fmt::Debug for Files {
+impl std::fmt::Debug for Levels {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("Files").field("levels", &self.levels.len()).field("end", &self.end).finish()
+        f.debug_struct("Levels").field("levels", &self.list.len()).field("end", &self.end).finish()
+    }
+}
+
+/// Writes to a file from a position on.
+struct WriteAt<'a> {
+    file: &'a File,
+    position: u64,
+}
+
+impl Write for WriteAt<'_> {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        let count = self.file.write_at(bytes, self.position)?;
+        self.position += count as u64;
+        Ok(count)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
     }
 }
 
 /// Tiles in files, with a cache.
 #[derive(Debug)]
 pub struct TileStore {
-    file: File,
+    temporary: Arc<File>,
+    /// Bytes in the temporary file.
     end: Mutex<u64>,
-    files: RwLock<Files>,
+    levels: RwLock<Levels>,
     /// Maximum bytes of the cache.
     capacity: u64,
     shards: Vec<Mutex<Shard>>,
@@ -146,9 +163,9 @@ impl TileStore {
     pub fn new(capacity: u64) -> io::Result<Self> {
         static NEXT: AtomicU64 = AtomicU64::new(0);
         Ok(TileStore {
-            file: tempfile::tempfile()?,
-            end: Mutex::new(0),
-            files: RwLock::new(Files { levels: Vec::new(), end: OF_FILES }),
+            temporary: Arc::new(tempfile::tempfile()?),
+            end: Mutex::default(),
+            levels: RwLock::default(),
             capacity,
             shards: (0..(capacity / SHARD_BYTES).clamp(1, SHARDS)).map(|_| Mutex::default()).collect(),
             read: AtomicU64::new(0),
@@ -157,27 +174,28 @@ impl TileStore {
         })
     }
 
-    /// Maximum bytes of the cache.
+    /// Maximum bytes that the cache can take: its limit, or all tiles if they are fewer.
     pub fn capacity(&self) -> u64 {
-        self.capacity
+        self.capacity.min(self.levels.read().unwrap_or_else(PoisonError::into_inner).end)
     }
 
-    /// Appends bytes and returns their position.
-    pub fn append(&self, bytes: &[u8]) -> io::Result<u64> {
+    /// Appends to the temporary file by `write`. Returns the file, and the position where the new bytes begin.
+    pub(super) fn append(&self, write: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> io::Result<(Arc<File>, u64)> {
         let mut end = self.end.lock().unwrap_or_else(PoisonError::into_inner);
-        let begin = *end;
-        self.file.write_all_at(bytes, begin)?;
-        *end += bytes.len() as u64;
-        Ok(begin)
+        let mut out = BufWriter::new(WriteAt { file: &self.temporary, position: *end });
+        write(&mut out)?;
+        out.flush()?;
+        let begin = std::mem::replace(&mut *end, out.get_ref().position);
+        Ok((Arc::clone(&self.temporary), begin))
     }
 
     /// Adds a level with `tiles` tiles of `tile_bytes` each, which `read` reads on demand. Returns the key of the first
     /// tile.
     pub(super) fn add_level(&self, tiles: usize, tile_bytes: usize, read: Arc<ReadTile>) -> Key {
-        let mut files = self.files.write().unwrap_or_else(PoisonError::into_inner);
-        let begin = files.end;
-        files.end += (tiles * tile_bytes) as u64;
-        files.levels.push(FileLevel { begin, tile_bytes, read });
+        let mut levels = self.levels.write().unwrap_or_else(PoisonError::into_inner);
+        let begin = levels.end;
+        levels.end += (tiles * tile_bytes) as u64;
+        levels.list.push(TileLevel { begin, tile_bytes, read });
         begin
     }
 
@@ -208,7 +226,7 @@ impl TileStore {
             return tile;
         }
         // Without the lock, so that others need not wait for the disk
-        let bytes = self.read(key, len).unwrap_or_else(|reason| {
+        let bytes = self.read(key).unwrap_or_else(|reason| {
             self.failure.get_or_init(|| reason);
             vec![0; len]
         });
@@ -219,27 +237,20 @@ impl TileStore {
     }
 
     /// A tile from its file.
-    fn read(&self, key: Key, len: usize) -> Result<Vec<u8>, String> {
-        if key < OF_FILES {
-            let mut bytes = vec![0; len];
-            return match self.file.read_exact_at(&mut bytes, key) {
-                Ok(()) => Ok(bytes),
-                Err(error) => Err(format!("texels could not be read back from the temporary file: {error}")),
-            };
-        }
+    fn read(&self, key: Key) -> Result<Vec<u8>, String> {
         let level = {
-            let files = self.files.read().unwrap_or_else(PoisonError::into_inner);
-            let after = files.levels.partition_point(|level| level.begin <= key);
-            files.levels[after - 1].clone()
+            let levels = self.levels.read().unwrap_or_else(PoisonError::into_inner);
+            let after = levels.list.partition_point(|level| level.begin <= key);
+            levels.list[after - 1].clone()
         };
         (level.read)((key - level.begin) as usize / level.tile_bytes)
             .map_err(|reason| format!("texels could not be read: {reason}"))
     }
 
-    /// Truncates the file, to simulate a failing disk.
+    /// Truncates the temporary file, to simulate a failing disk.
     #[cfg(test)]
     pub(crate) fn lose(&self, len: u64) {
-        self.file.set_len(len).unwrap();
+        self.temporary.set_len(len).unwrap();
     }
 
     /// Reason why lookups returned zeros instead of texels, if they did.
@@ -266,9 +277,7 @@ mod tests {
 
     fn store(tiles: u64, capacity: u64) -> TileStore {
         let store = TileStore::new(capacity).unwrap();
-        for i in 0..tiles {
-            assert_eq!(store.append(&vec![(i % 251) as u8; LEN]).unwrap(), i * LEN as u64);
-        }
+        assert_eq!(store.add_level(tiles as usize, LEN, Arc::new(|i| Ok(vec![(i % 251) as u8; LEN]))), 0);
         store
     }
 
@@ -303,9 +312,9 @@ mod tests {
     fn a_small_cache_holds_the_largest_tiles_as_well() {
         let len = TILE * TILE * 12;
         let store = TileStore::new(2 * len as u64).unwrap();
-        let keys = [1, 2].map(|value| store.append(&vec![value; len]).unwrap());
+        let keys = [1, 2].map(|value| store.add_level(1, len, Arc::new(move |_| Ok(vec![value; len]))));
         keys.iter().for_each(|&key| drop(store.fetch(key, len)));
-        assert_eq!(store.counts(), TileCounts { stored: 2 * len as u64, read: 2, held: 2 * len as u64 });
+        assert_eq!(store.counts(), TileCounts { stored: 0, read: 2, held: 2 * len as u64 });
         keys.iter().for_each(|&key| drop(store.fetch(key, len)));
         assert_eq!(store.counts().read, 2);
     }
@@ -316,14 +325,29 @@ mod tests {
         for k in 0..10_000_u64 {
             store.with_tile(k % 100 * LEN as u64, LEN, |tile| assert_eq!(tile[0], (k % 100) as u8));
         }
-        assert_eq!(store.counts(), TileCounts { stored: 100_000, read: 100, held: 100_000 });
+        assert_eq!(store.counts(), TileCounts { stored: 0, read: 100, held: 100_000 });
     }
 
     #[test]
     fn what_cannot_be_read_is_zero_and_reported() {
-        let store = store(3, 1 << 20);
-        store.lose(2500);
+        let store = TileStore::new(1 << 20).unwrap();
+        let read = |i| if i < 2 { Ok(vec![7; LEN]) } else { Err("disk lost".to_owned()) };
+        store.add_level(3, LEN, Arc::new(read));
+        assert!(store.with_tile(1000, LEN, |tile| tile.iter().all(|&b| b == 7)) && store.failure().is_none());
         assert!(store.with_tile(2000, LEN, |tile| tile.iter().all(|&b| b == 0)));
-        assert!(store.failure().unwrap().contains("temporary file"));
+        assert!(store.failure().unwrap().contains("disk lost"));
+    }
+
+    #[test]
+    fn what_is_appended_begins_where_the_last_complete_append_ended() {
+        let store = TileStore::new(1 << 20).unwrap();
+        let begins = [3, 5].map(|len| store.append(|out| out.write_all(&vec![len; usize::from(len)])).unwrap().1);
+        assert_eq!(begins, [0, 3]);
+        let failed = store.append(|out| out.write_all(&[9; 100_000]).and(Err(io::Error::other("no"))));
+        assert!(failed.is_err());
+        let (file, begin) = store.append(|out| out.write_all(b"x")).unwrap();
+        let mut byte = [0];
+        file.read_exact_at(&mut byte, begin).unwrap();
+        assert_eq!((begin, byte), (8, *b"x"));
     }
 }

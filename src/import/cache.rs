@@ -6,11 +6,13 @@
 //! most. Text of scene files is not cached, since it changes between scenes.
 //!
 //! If the textures of a scene exceed a memory limit, the largest of them are stored in tiles of a temporary file
-//! ([`crate::imaging::tiles`]), and all others in memory. At least half of the limit remains for the tiles in use.
+//! ([`crate::imaging::tiles`]), and all others in memory. At least half of the limit remains for the tiles in use. With a
+//! folder for textures ([`super::texture_cache`]), all are read by tiles of its files.
 
 use super::face_maps::{FaceMapRequest, load_face_map};
 use super::images::{ImageChannels, ImageEncoding, ImageRequest, RgbImage, load_map, load_rgb, load_tiled_map};
 use super::measured::{MeasuredError, load_tables};
+use super::texture_cache::TextureCache;
 use super::volumes::{Volume, VolumeRequest, VolumeUse, load_volume};
 use crate::bsdfs::MeasuredTables;
 use crate::imaging::oiio::{ImageError, texture_bytes};
@@ -111,6 +113,8 @@ pub struct FileCache {
     shared: AtomicU64,
     /// Maximum memory of the textures of a scene (bytes).
     texture_memory: OnceLock<u64>,
+    /// Folder of textures for later runs.
+    texture_cache: OnceLock<Arc<TextureCache>>,
     /// Held while a texture is read into tiles: one at a time, since the whole texture is in memory meanwhile.
     tiling: Mutex<()>,
 }
@@ -120,7 +124,7 @@ pub struct FileCache {
 pub struct TexturePlan {
     /// Storage of tiles; `None` if everything fits into memory.
     store: Option<Arc<TileStore>>,
-    /// True for each image that is stored in tiles.
+    /// True for each image that is stored in tiles. Empty if a folder of textures has all.
     is_tiled: Vec<bool>,
 }
 
@@ -135,11 +139,29 @@ impl FileCache {
         self.texture_memory.get_or_init(|| bytes);
     }
 
+    /// Keeps textures in a folder for later runs. The first call is effective, later ones are ignored. Returns `Err` if
+    /// the folder cannot be created.
+    pub fn cache_textures(&self, folder: &Path) -> io::Result<()> {
+        let cache = Arc::new(TextureCache::new(folder)?);
+        self.texture_cache.get_or_init(|| cache);
+        Ok(())
+    }
+
+    /// Takes the warnings of the folder of textures since the last call.
+    pub fn take_texture_warnings(&self) -> Vec<String> {
+        self.texture_cache.get().map_or_else(Vec::new, |cache| cache.take_warnings())
+    }
+
     /// Plans the storage of the images of `requests`, by the sizes in their headers.
     ///
     /// Returns `Err` if the temporary file cannot be created.
     pub fn plan_textures<'a>(&self, requests: impl Iterator<Item = &'a ImageRequest>) -> io::Result<TexturePlan> {
-        let Some(&limit) = self.texture_memory.get() else { return Ok(TexturePlan::default()) };
+        let limit = self.texture_memory.get();
+        if self.texture_cache.get().is_some() {
+            let store = TileStore::new(limit.copied().unwrap_or(u64::MAX))?;
+            return Ok(TexturePlan { store: Some(Arc::new(store)), is_tiled: Vec::new() });
+        }
+        let Some(&limit) = limit else { return Ok(TexturePlan::default()) };
         // Coarser levels add a third. An unreadable image counts as 0; reading it reports the error
         let pyramid = |request: &ImageRequest| texture_bytes(&request.path).map_or(0, |b| b.saturating_add(b / 3));
         let bytes: Vec<u64> = requests.map(pyramid).collect();
@@ -167,11 +189,17 @@ impl FileCache {
         index: usize,
         request: &ImageRequest,
     ) -> Result<Arc<MipMap>, ImageError> {
-        let (Some(store), Some(true)) = (&plan.store, plan.is_tiled.get(index)) else { return self.map(request) };
-        let _alone = self.tiling.lock().unwrap_or_else(PoisonError::into_inner);
-        let tiled = load_tiled_map(request, store)?;
+        let map = match (&plan.store, self.texture_cache.get()) {
+            // Without a limit, several images may be in memory at once
+            (Some(store), Some(cache)) => cache.map(request, store, self.texture_memory.get().map(|_| &self.tiling))?,
+            (Some(store), None) if plan.is_tiled.get(index) == Some(&true) => {
+                let _alone = self.tiling.lock().unwrap_or_else(PoisonError::into_inner);
+                load_tiled_map(request, store)?
+            }
+            _ => return self.map(request),
+        };
         self.read.fetch_add(1, Ordering::Relaxed);
-        Ok(Arc::new(tiled))
+        Ok(Arc::new(map))
     }
 
     /// True if content is cached: a scene then gets copies of meshes.

@@ -1,7 +1,7 @@
 //! Image files as scenes ask for them, and how they are read.
 
 use crate::imaging::color_layers::ColorLayer;
-use crate::imaging::oiio::{self, FilePyramid, ImageError, ReadLimits};
+use crate::imaging::oiio::{self, FilePyramid, ImageError, ReadImage, ReadLimits};
 use crate::imaging::tiles::TileStore;
 use crate::imaging::{ColorChannels, ColorEncoding, Filter, MipMap, Wrap};
 use crate::textures::Udim;
@@ -11,8 +11,14 @@ use lumiris_numbers::math::{Mat3, Rgb, Vec3};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// Linear texels, rows from the top, and the size of the image.
-pub type RgbImage = (Vec<Rgb>, [usize; 2]);
+/// A linear image.
+#[derive(Clone, Debug)]
+pub struct RgbImage {
+    /// Rows from the top.
+    pub texels: Vec<Rgb>,
+    /// Width and height.
+    pub size: [usize; 2],
+}
 
 /// How the numbers of an image mean light.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -86,8 +92,17 @@ fn rec709_of(chromaticities: Option<&str>, channels: ImageChannels, of: Colored)
 /// What stands for the number of a tile in the name of an image file.
 pub const UDIM: &str = "<UDIM>";
 
+/// A tile of an image.
+#[derive(Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Tile {
+    /// Its number, from 1001.
+    pub number: u32,
+    /// Its file.
+    pub path: PathBuf,
+}
+
 /// The tiles of a path whose file name has [`UDIM`], in the order of their numbers; those that are there.
-pub fn tiles(path: &Path) -> Vec<(u32, PathBuf)> {
+pub fn tiles(path: &Path) -> Vec<Tile> {
     let name = path.file_name().and_then(|name| name.to_str()).unwrap_or_default();
     let Some((before, after)) = name.split_once(UDIM) else { return Vec::new() };
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
@@ -98,8 +113,10 @@ pub fn tiles(path: &Path) -> Vec<(u32, PathBuf)> {
         let is_number = digits.len() == 4 && digits.bytes().all(|b| b.is_ascii_digit());
         digits.parse().ok().filter(|&number| is_number && Udim::is_number(number))
     };
-    let tile = |entry: std::fs::DirEntry| Some((number(&nfc(entry.file_name().to_str()?))?, entry.path()));
-    let mut tiles: Vec<(u32, PathBuf)> = entries.filter_map(tile).collect();
+    let tile = |entry: std::fs::DirEntry| {
+        Some(Tile { number: number(&nfc(entry.file_name().to_str()?))?, path: entry.path() })
+    };
+    let mut tiles: Vec<Tile> = entries.filter_map(tile).collect();
     tiles.sort();
     tiles
 }
@@ -107,13 +124,13 @@ pub fn tiles(path: &Path) -> Vec<(u32, PathBuf)> {
 /// Reads an image as textures ask for it. A file that holds all levels of a pyramid, as `.tx` files do, gives them.
 pub fn load_map(request: &ImageRequest) -> Result<MipMap, ImageError> {
     match pyramid(request)? {
-        Some(file) => file_map(file, request, None),
+        Some(file) => map_of_levels(file, request, None),
         None => image_map(request),
     }
 }
 
 /// A file that holds all levels, in a colour space whose numbers can be taken as they are.
-fn pyramid(request: &ImageRequest) -> Result<Option<FilePyramid>, ImageError> {
+pub(super) fn pyramid(request: &ImageRequest) -> Result<Option<FilePyramid>, ImageError> {
     let is_as_it_is =
         |file: &FilePyramid| rec709_of(file.chromaticities(), request.channels, Colored::Factor).is_none();
     Ok(FilePyramid::open(&request.path)?.filter(is_as_it_is))
@@ -122,21 +139,47 @@ fn pyramid(request: &ImageRequest) -> Result<Option<FilePyramid>, ImageError> {
 /// The same with levels of more than a tile in `store`: read from the file when they are wanted, if it holds them.
 pub fn load_tiled_map(request: &ImageRequest, store: &Arc<TileStore>) -> Result<MipMap, ImageError> {
     if let Some(file) = pyramid(request)? {
-        return file_map(file, request, Some(store));
+        return map_of_levels(file, request, Some(store));
     }
-    image_map(request)?.tiled(store).map_err(|error| {
+    into_tiles(image_map(request)?, request, store)
+}
+
+/// Moves a pyramid into the temporary file of `store`.
+pub(super) fn into_tiles(map: MipMap, request: &ImageRequest, store: &Arc<TileStore>) -> Result<MipMap, ImageError> {
+    map.tiled(store).map_err(|error| {
         let reason = format!("does not fit into the temporary file for tiles of textures: {error}");
         ImageError::Unreadable { path: request.path.clone(), reason }
     })
 }
 
-/// The pyramid of an image.
-fn image_map(request: &ImageRequest) -> Result<MipMap, ImageError> {
+/// The pyramid of an image, computed.
+pub(super) fn image_map(request: &ImageRequest) -> Result<MipMap, ImageError> {
     let (mut read, layer) = oiio::read_colors(&request.path, &ReadLimits::default())?;
+    Ok(map_of(&mut read, &layer, request))
+}
+
+/// The pyramids of all that textures may ask for, with default lookups: of the colours, and of the opacity if there is
+/// one. `Err` if the file has them.
+pub fn all_maps(path: &Path, encoding: ImageEncoding) -> Result<Vec<MipMap>, ImageError> {
+    if FilePyramid::open(path)?.is_some() {
+        let reason = "has all levels already".to_owned();
+        return Err(ImageError::Unreadable { path: path.to_owned(), reason });
+    }
+    let (mut read, layer) = oiio::read_colors(path, &ReadLimits::default())?;
+    let (wrap, filter) = (Wrap::default(), Filter::default());
+    let request = |channels| ImageRequest { path: path.to_owned(), channels, encoding, wrap, filter };
+    // Colours last, because they may be converted in place
+    let alpha = layer.alpha.map(|_| map_of(&mut read, &layer, &request(ImageChannels::Alpha)));
+    let color = map_of(&mut read, &layer, &request(ImageChannels::Color));
+    Ok(std::iter::once(color).chain(alpha).collect())
+}
+
+/// The pyramid of an image that was read, whose colours may be converted in place.
+fn map_of(read: &mut ReadImage, layer: &ColorLayer, request: &ImageRequest) -> MipMap {
     let image = &mut read.image;
     let count = image.channels.len();
     let is_opaque = |a: usize| image.data.iter().skip(a).step_by(count).all(|&alpha| alpha >= 1.0);
-    let resolved = request.resolved(&layer, is_opaque);
+    let resolved = request.resolved(layer, is_opaque);
     let chromaticities = read.metadata.get(CHROMATICITIES).filter(|_| read.encoding == ColorEncoding::Linear);
     let matrix = rec709_of(chromaticities.map(String::as_str), request.channels, Colored::Factor);
     if let (Some(matrix), ColorChannels::Rgb(rgb)) = (matrix, layer.channels) {
@@ -145,29 +188,39 @@ fn image_map(request: &ImageRequest) -> Result<MipMap, ImageError> {
             rgb.iter().zip(color.to_array()).for_each(|(&c, value)| pixel[c] = value);
         }
     }
-    let (channels, encoding) = meaning(&resolved, &layer, read.encoding);
+    let Meaning { channels, encoding } = meaning(&resolved, layer, read.encoding);
     let how = (request.wrap, request.filter, encoding);
-    Ok(channels.map_or_else(|| without_channels(request), |channels| MipMap::of_channels(&read.image, &channels, how)))
+    channels.map_or_else(|| without_channels(request), |channels| MipMap::of_channels(&read.image, &channels, how))
 }
 
 /// The pyramid that a file holds.
-fn file_map(file: FilePyramid, request: &ImageRequest, store: Option<&Arc<TileStore>>) -> Result<MipMap, ImageError> {
+pub(super) fn map_of_levels(
+    file: FilePyramid,
+    request: &ImageRequest,
+    store: Option<&Arc<TileStore>>,
+) -> Result<MipMap, ImageError> {
     // A level of few texels tells whether all are opaque
     let small = file.sizes().iter().position(|size| size[0].max(size[1]) <= SMALL).unwrap_or(0);
     let is_opaque = |a| file.level(small, &[a]).is_ok_and(|level| level.iter().all(|&alpha| alpha >= 1.0));
     let request = &request.resolved(file.layer(), is_opaque);
-    let (channels, encoding) = meaning(request, file.layer(), file.encoding());
+    let Meaning { channels, encoding } = meaning(request, file.layer(), file.encoding());
     let how = (request.wrap, request.filter, encoding);
     channels.map_or_else(|| Ok(without_channels(request)), |channels| MipMap::of_file(file, channels, how, store))
 }
 
-/// Positions of the requested channels, if the image has them, and their encoding. `usual` is the usual encoding of the
-/// file.
-fn meaning(request: &ImageRequest, layer: &ColorLayer, usual: ColorEncoding) -> (Option<Vec<usize>>, ColorEncoding) {
+/// The requested channels of an image.
+struct Meaning {
+    /// Their positions, if the image has them.
+    channels: Option<Vec<usize>>,
+    encoding: ColorEncoding,
+}
+
+/// The requested channels. `usual` is the usual encoding of the file.
+fn meaning(request: &ImageRequest, layer: &ColorLayer, usual: ColorEncoding) -> Meaning {
     let channels = match request.channels {
         // Opacity is stored linear
         ImageChannels::Alpha => {
-            return (layer.alpha.map(|a| vec![a]), ColorEncoding::Linear);
+            return Meaning { channels: layer.alpha.map(|a| vec![a]), encoding: ColorEncoding::Linear };
         }
         ImageChannels::Color | ImageChannels::Number => Some(layer.channels.as_slice().to_vec()),
     };
@@ -179,7 +232,7 @@ fn meaning(request: &ImageRequest, layer: &ColorLayer, usual: ColorEncoding) -> 
         ImageEncoding::Linear => ColorEncoding::Linear,
         ImageEncoding::Gamma(gamma) => ColorEncoding::Gamma(gamma),
     };
-    (channels, encoding)
+    Meaning { channels, encoding }
 }
 
 /// What stands for channels that are not there: opaque, and black.
@@ -201,7 +254,7 @@ pub fn load_rgb(path: &Path) -> Result<RgbImage, ImageError> {
     let matrix = rec709_of(chromaticities, ImageChannels::Color, Colored::Light).unwrap_or(Mat3::IDENTITY);
     let color = |p: &[f32]| matrix * Vec3::from_array(channels.map(|c| read.encoding.to_linear(p[c])));
     let texels = pixels.map(|p| Rgb::from_array(color(p).to_array()));
-    Ok((texels.collect(), [image.width, image.height]))
+    Ok(RgbImage { texels: texels.collect(), size: [image.width, image.height] })
 }
 
 #[cfg(test)]
@@ -440,7 +493,7 @@ mod tests {
         let converted = |p: [f32; 3]| matrix.map(|row: [f32; 3]| row.iter().zip(p).map(|(a, b)| a * b).sum::<f32>());
         for (chromaticities, is_other) in [(None, false), (Some(rec709), false), (Some(rec2020), true)] {
             std::fs::write(&path, exr(false, chromaticities)).unwrap();
-            let (texels, _) = load_rgb(&path).unwrap();
+            let RgbImage { texels, .. } = load_rgb(&path).unwrap();
             let [colors, numbers] =
                 [ImageChannels::Color, ImageChannels::Number].map(|c| load_map(&request(&path, c)).unwrap());
             for (x, stored) in FLOATS.into_iter().enumerate() {
@@ -470,7 +523,7 @@ mod tests {
         let texel = |channels| load_map(&request(&path, channels)).unwrap().texel(0, 0, 0).to_array();
         assert_eq!(texel(ImageChannels::Color), [0.125, 0.5, 1.0]);
         assert_eq!(texel(ImageChannels::Alpha), [0.25; 3]);
-        assert_eq!(load_rgb(&path).unwrap().0, [Rgb::new(0.125, 0.5, 1.0)]);
+        assert_eq!(load_rgb(&path).unwrap().texels, [Rgb::new(0.125, 0.5, 1.0)]);
 
         write(&["left.R", "left.G", "left.B", "right.R", "right.G", "right.B"], &[1.0; 6]);
         let expected = "layers.exr: has several images, none of which is plain R G B: left, right";

@@ -12,10 +12,19 @@ use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+/// A request for a file, and the source position of its first use.
+#[derive(Debug)]
+pub struct Request<R> {
+    /// The file, and how it is read.
+    pub file: R,
+    /// Source position.
+    pub span: Span,
+}
+
 /// Requests for files, each once, in the order of first use.
 #[derive(Debug)]
 pub struct Requests<R> {
-    list: Vec<(R, Span)>,
+    list: Vec<Request<R>>,
     by_path: HashMap<PathBuf, Vec<u32>>,
 }
 
@@ -27,19 +36,19 @@ impl<R> Default for Requests<R> {
 
 impl<R: PartialEq> Requests<R> {
     /// The index of a request for the file `path`; equal requests share one. `span` is its source position.
-    pub fn index(&mut self, path: &Path, request: R, span: Span) -> u32 {
+    pub fn index(&mut self, path: &Path, file: R, span: Span) -> u32 {
         let indices = self.by_path.entry(path.to_owned()).or_default();
-        if let Some(&index) = indices.iter().find(|&&index| self.list[index as usize].0 == request) {
+        if let Some(&index) = indices.iter().find(|&&index| self.list[index as usize].file == file) {
             return index;
         }
         let index = self.list.len() as u32;
         indices.push(index);
-        self.list.push((request, span));
+        self.list.push(Request { file, span });
         index
     }
 
-    /// All requests, with the source positions of first use.
-    pub fn list(&self) -> &[(R, Span)] {
+    /// All requests.
+    pub fn list(&self) -> &[Request<R>] {
         &self.list
     }
 }
@@ -59,23 +68,26 @@ impl Resources {
 
     /// The files, in the order of the images.
     pub fn paths(&self) -> impl Iterator<Item = &Path> {
-        self.requests.list().iter().map(|(request, _)| request.path.as_path())
+        self.requests.list().iter().map(|request| request.file.path.as_path())
     }
 
     /// Reads all images, in the order of their ids; errors go to `d`.
     pub fn load(&self, files: &FileCache, d: &mut Diagnostics) -> Vec<Arc<MipMap>> {
         let requests = self.requests.list();
-        let plan = files.plan_textures(requests.iter().map(|(request, _)| request)).unwrap_or_else(|error| {
+        let plan = files.plan_textures(requests.iter().map(|request| &request.file)).unwrap_or_else(|error| {
             d.error_without_place(format!("there is no temporary file for tiles of textures: {error}"));
             TexturePlan::default()
         });
         let numbered = requests.par_iter().enumerate();
-        let loaded: Vec<_> = numbered.map(|(i, (request, _))| files.planned_map(&plan, i, request)).collect();
+        let loaded: Vec<_> = numbered.map(|(i, request)| files.planned_map(&plan, i, &request.file)).collect();
+        for warning in files.take_texture_warnings() {
+            d.warning_without_place(warning);
+        }
         let mut maps = Vec::with_capacity(loaded.len());
-        for (result, (request, span)) in loaded.into_iter().zip(requests) {
+        for (result, Request { file, span }) in loaded.into_iter().zip(requests) {
             match result {
                 Ok(map) => maps.push(map),
-                Err(error) => report(&error, &request.path, *span, d),
+                Err(error) => report(&error, &file.path, *span, d),
             }
         }
         maps

@@ -9,11 +9,12 @@ use crate::scene::{PixelSamples, RenderJob, SampleCountMap};
 use crate::settings::{Proposals, SampleCounts};
 use lumiris_lanes::camera::{Pinhole, PinholeRays};
 use lumiris_lanes::columns::{Column, Columns3, padded, reserve};
-use lumiris_lanes::{level, sampler};
+use lumiris_lanes::level;
+use lumiris_lanes::sampler::{self, Below};
 use lumiris_numbers::estimators::ocv::block_of;
 use lumiris_numbers::math::hash::pcg4d;
 use lumiris_numbers::math::{Ray, Vec2, Vec3};
-use lumiris_numbers::samplers::{NetPoint, SampleStream, SamplerKind};
+use lumiris_numbers::samplers::{SampleStream, SamplerKind, StreamColumns};
 use std::ops::Range;
 
 /// Random-number domains of a camera sample.
@@ -74,9 +75,7 @@ pub struct PixelSampleRange {
 #[derive(Debug, Default)]
 pub struct Scratch {
     pixels: Vec<PixelSampleRange>,
-    streams: Vec<SampleStream>,
-    /// Net points whose coordinates are the film positions.
-    points: Vec<NetPoint>,
+    streams: StreamColumns,
     u: [Column; 2],
     weight: Column,
     d: Columns3,
@@ -154,15 +153,13 @@ impl<'a> CameraSampler<'a> {
 
     /// Draws the random numbers of the film positions.
     fn draw_numbers(&self, pixels: impl Iterator<Item = PixelSampleRange>, seed: u32, scratch: &mut Scratch) {
-        let Scratch { pixels: of_pixels, streams, points, u: [x, y], weight, d, spread } = scratch;
+        let Scratch { pixels: of_pixels, streams, u: [x, y], weight, d, spread } = scratch;
         let kind = self.job.settings().sampling.sampler;
         // Streams, and the net points of samplers that are made of nets
         of_pixels.clear();
         streams.clear();
-        points.clear();
         for range in pixels {
-            let (pixel, samples) = (range.pixel, range.samples.clone());
-            SampleStream::append((kind, pixel, seed), samples, domain::FILM_AND_LENS, (streams, points));
+            streams.push_samples(kind, range.pixel, range.samples.clone(), seed);
             of_pixels.push(range);
         }
 
@@ -170,13 +167,8 @@ impl<'a> CameraSampler<'a> {
         let (n, len) = (streams.len(), padded(streams.len()));
         reserve(&mut [x, y, weight, spread], len);
         d.reserve(len);
-        if points.len() == n {
-            sampler::draw_points(level(), points, [&mut x[..n], &mut y[..n]]);
-        } else {
-            for ((x, y), stream) in x.iter_mut().zip(&mut *y).zip(&*streams) {
-                [*x, *y] = stream.domain(domain::FILM_AND_LENS).draw();
-            }
-        }
+        let numbers = [&mut x[..n], &mut y[..n]];
+        sampler::draw(level(), streams, 0..n, Below::Domain(domain::FILM_AND_LENS), numbers);
     }
 
     /// Turns random numbers into film positions and filter weights.
@@ -205,15 +197,18 @@ impl<'a> CameraSampler<'a> {
         let (mut first, [dx, dy, dz]) = (0, d.get(padded(streams.len())));
         for &PixelSampleRange { fit, pixel, ref samples } in pixels {
             let begin = out.len();
-            let Some(&stream) = streams.get(first) else { break };
-            let common = CameraSample { fit, pixel, ..CameraSample::of_ray(ray, 0.0, stream, self.sample_counts) };
+            if samples.is_empty() {
+                continue;
+            }
+            let of_ray = CameraSample::of_ray(ray, 0.0, streams.get(first), self.sample_counts);
+            let common = CameraSample { fit, pixel, ..of_ray };
             out.resize(begin + samples.len(), common);
             for ((of_pixel, sample), i) in out[begin..].iter_mut().zip(samples.clone()).zip(first..) {
                 of_pixel.ray.ray.d = Vec3::new(dx[i], dy[i], dz[i]);
                 of_pixel.ray.spread = spread[i];
                 of_pixel.weight = weight[i] * scene.film.scale;
-                of_pixel.stream = streams[i];
-                of_pixel.direct = streams[i];
+                of_pixel.stream = streams.get(i);
+                of_pixel.direct = of_pixel.stream;
                 of_pixel.share_group = sample;
             }
             first += samples.len();

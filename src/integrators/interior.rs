@@ -14,14 +14,15 @@
 //! log n.
 
 use super::domain;
-use super::segment::{BsdfTechnique, PathState};
+use super::last_vertices::BsdfTechnique;
+use super::path_state::PathState;
 use super::vertex_search::{FlightOutcome, TraceStep, VertexSearch};
 use crate::accel::Hit;
 use crate::bsdfs::dielectric::{Select, Transport};
 use crate::bsdfs::fresnel::fr_dielectric;
 use crate::bsdfs::{Bsdf, Dielectric, Phase};
 use crate::materials::SurfaceBsdf;
-use crate::media::{End, Flight, Glimpse, Medium, Numbers, Segment, Sides};
+use crate::media::{EmissionLookups, End, Flight, FlightSampler, Medium, Segment, Sides};
 use crate::scene::{RenderJob, SurfaceInteraction};
 use lumiris_numbers::math::{Ray, Rgb, Vec3};
 
@@ -53,8 +54,8 @@ impl VertexSearch {
         let (o, d) = (path.ray.o, path.ray.d / scale);
         let segment = Segment { o, d, length: hit.map_or(f32::INFINITY, |hit| hit.t * scale) };
         let stream = at.samples[path.sample as usize].stream;
-        let mut numbers = Numbers::new(stream.domain(domain::FLIGHT + at.vertex).domain(path.passed));
-        let Flight { end, .. } = medium.fly(&segment, path.beta, &mut numbers, || None, (0.0, |_: &Glimpse| 1.0));
+        let mut numbers = FlightSampler::new(stream.domain(domain::FLIGHT + at.vertex).domain(path.passed));
+        let Flight { end, .. } = medium.fly(&segment, path.beta, &mut numbers, || None, EmissionLookups::UNWEIGHTED);
         let (t, weight) = match end {
             End::Through { weight } => {
                 path.weaken(weight);
@@ -85,7 +86,7 @@ impl VertexSearch {
         medium: &Medium,
     ) -> Option<PathState> {
         let [u_survival, u0, u1] = self.walk_numbers(at, path);
-        let beta = survive(path.beta_beyond_emitter()? * weight, path, u_survival)?;
+        let beta = survive_walk(path.beta_beyond_emitter()? * weight, path, u_survival)?;
         let sample = Phase::new(medium.g()).sample(-d, [u0, u1])?;
         let next = PathState { width: path.width + path.spread * t, travelled: path.travelled + t, ..*path };
         Some(go_on(next, path.ray.o + d * t, sample.wi, beta))
@@ -157,7 +158,7 @@ fn chance_to_stay(interface: &Dielectric, wo: Vec3) -> f32 {
 }
 
 /// Russian roulette at an event of a walk. Returns the throughput of a path that survives.
-fn survive(beta: Rgb, path: &PathState, u: f32) -> Option<Rgb> {
+fn survive_walk(beta: Rgb, path: &PathState, u: f32) -> Option<Rgb> {
     if beta.is_black() || !beta.is_finite() {
         return None;
     }
@@ -192,7 +193,7 @@ mod tests {
             chain: Chain::NONE,
         };
         let mean = |beta: Rgb, passed| {
-            let survivors = (0..1000).filter_map(|i| survive(beta, &path(passed), (i as f32 + 0.5) / 1000.0));
+            let survivors = (0..1000).filter_map(|i| survive_walk(beta, &path(passed), (i as f32 + 0.5) / 1000.0));
             survivors.fold([0.0, 0.0], |[count, sum], survivor| [count + 1.0, sum + survivor.r / 1000.0])
         };
 
@@ -204,6 +205,6 @@ mod tests {
             let [count, sum] = mean(dim, passed);
             assert!((count / 1000.0 - share).abs() <= 1e-3 && (sum / 0.1 - 1.0).abs() < 0.01, "{passed} {count} {sum}");
         }
-        assert_eq!(survive(Rgb::BLACK, &path(0), 0.0), None);
+        assert_eq!(survive_walk(Rgb::BLACK, &path(0), 0.0), None);
     }
 }

@@ -1,9 +1,10 @@
 //! Light transport: from camera rays to radiance.
 //!
 //! All threads share one [`Integrator`]. It prepares the data of the samples, makes a [`Tracer`] for each thread, and
-//! reports [`Statistics`]. Reading order: [`path`] is the loop over vertices, `segment` the state of a path between two
-//! vertices, `vertex_search` traces to the next vertices, `interior` walks through the interiors of materials,
-//! `direct_light` adds L_d, and `scatter` samples the next segments. Neighbouring pixels may share paths ([`reuse`],
+//! reports [`Statistics`]. Reading order: [`path`] is the loop over vertices, `path_state` the state of a path between
+//! two vertices, `vertex_search` traces to the next vertices, `last_vertices` has the MIS weight of an emitter hit there,
+//! `interior` walks through the interiors of materials, `direct_light` adds L_d, `scatter` samples the next segments, and
+//! `roulette` ends paths. Neighbouring pixels may share paths ([`reuse`],
 //! [`cells`]), and light paths add caustics ([`light_paths`]). [`exclusions`] lists the features that exclude each
 //! other. [`irradiance_cache`] and [`photon_map`] replace the light reflected by Lambertian lobes (`diffuse`).
 //! [`camera_samples`] makes camera rays, and [`light_layers`] sums light by light group.
@@ -19,14 +20,16 @@ pub mod exclusions;
 mod integrator;
 mod interior;
 pub mod irradiance_cache;
+mod last_vertices;
 pub mod light_layers;
 pub mod light_paths;
 pub mod path;
+mod path_state;
 pub mod photon_map;
 mod recording;
 pub mod reuse;
+mod roulette;
 mod scatter;
-mod segment;
 mod statistics;
 mod vertex_search;
 

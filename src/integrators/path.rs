@@ -14,12 +14,13 @@
 use super::camera_sample::CameraSample;
 use super::cells::Blocks;
 use super::integrator::{Integrator, Tracer};
+use super::last_vertices::LastVertices;
 use super::light_layers::LayerSums;
 use super::light_paths::{LightImage, LightPilot};
+use super::path_state::PathState;
 pub use super::recording::Recording;
 use super::reuse::{self, LambertianVertex, Reuse};
 use super::scatter::{Continuation, Scatter};
-use super::segment::{LastVertices, PathState};
 use super::statistics::{PathStats, Statistics};
 use super::vertex_search::{TraceStep, VertexSearch};
 use crate::direct::{ColumnDirectLighting, Estimator, Fits, PointDirectLighting, ShadingPoint, Techniques, Vertices};
@@ -106,7 +107,7 @@ impl<'a, 'w> BatchVertices<'a, 'w> {
         (0..vertices.len()).map(move |i| {
             let path = &paths[vertices.path[i] as usize];
             let point = vertices.point(i, SampleCounts::default(), [path.sample, 0]);
-            PathVertex { path, point, stream: vertices.streams[i] }
+            PathVertex { path, point, stream: vertices.streams.get(i) }
         })
     }
 }

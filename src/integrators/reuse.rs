@@ -20,7 +20,7 @@
 use super::camera_sample::CameraSample;
 use super::cells::Blocks;
 use super::exclusions::{self, Feature};
-use super::segment::PathState;
+use super::path_state::PathState;
 use crate::accel::{Coherence, RayBatch};
 use crate::film::PixelSample;
 use crate::scene::RenderJob;

@@ -1,21 +1,22 @@
 //! BSDF sampling of the next path segments.
 
 use super::domain;
-use super::segment::{BsdfTechnique, PathState, survive};
+use super::last_vertices::BsdfTechnique;
+use super::path_state::PathState;
+use super::roulette::survive;
 use crate::bsdfs::Lobe;
 use crate::direct::vertices::BsdfSamples;
 use crate::direct::{Techniques, Vertices};
 use crate::settings::IntegratorSettings;
 use lumiris_lanes::columns::{Column, Columns3, padded, reserve};
+use lumiris_lanes::level;
+use lumiris_lanes::sampler::{self, Below};
 use lumiris_lanes::vertex as kernels;
-use lumiris_lanes::{level, sampler};
 use lumiris_numbers::math::{Ray, Rgb, Vec3};
-use lumiris_numbers::samplers::{Domain, SampleStream};
 
 /// Samples the directions of a batch; holds the buffers of one worker.
 #[derive(Debug, Default)]
 pub(super) struct Scatter {
-    drawn: Vec<SampleStream>,
     u: [Column; 3],
     samples: BsdfSamples,
     o: Columns3,
@@ -88,7 +89,7 @@ impl Scatter {
     /// Resamples M proposals at vertices whose BSDFs can only be evaluated.
     fn resample(&mut self, how: &Continuation<'_>, vertices: &Vertices<'_>) {
         for (i, bsdf) in vertices.bsdfs.iter().enumerate().filter(|(_, bsdf)| bsdf.bsdf.is_only_evaluated()) {
-            let (stream, count) = (&vertices.streams[i], how.settings.bsdf_proposals.max(1));
+            let (stream, count) = (vertices.streams.get(i), how.settings.bsdf_proposals.max(1));
             let proposal = |k| stream.split(domain::BSDF, count, k).draw::<3>();
             let [u_choice] = stream.domain(domain::RESAMPLE).draw::<1>();
             let BsdfSamples { wi, f_cos, pdf, lobe, eta } = &mut self.samples;
@@ -106,10 +107,8 @@ impl Scatter {
     fn draw(&mut self, vertices: &Vertices<'_>) {
         let (n, len) = (vertices.len(), padded(vertices.len()));
         reserve(&mut self.u.each_mut(), len);
-        self.drawn.clear();
-        let mut numbers = Domain::new(domain::BSDF);
-        self.drawn.extend(vertices.streams.iter().map(|stream| numbers.of(stream)));
-        sampler::draw(level(), &self.drawn, self.u.each_mut().map(|u| &mut u[..n]));
+        let numbers = self.u.each_mut().map(|u| &mut u[..n]);
+        sampler::draw(level(), &vertices.streams, 0..n, Below::Domain(domain::BSDF), numbers);
     }
 }
 
@@ -125,7 +124,7 @@ impl Continuation<'_> {
         }
 
         // Roulette
-        let survivor = survive(beta, eta_scale, &vertices.streams[row], self.vertex + 1, self.settings);
+        let survivor = survive(beta, eta_scale, &vertices.streams.get(row), self.vertex + 1, self.settings);
 
         // Density of light paths that could have sampled the same path
         let n = vertices.surface.n.vec3(row);

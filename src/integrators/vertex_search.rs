@@ -2,10 +2,11 @@
 
 use super::camera_sample::CameraSample;
 use super::domain;
+use super::last_vertices::LastVertices;
 use super::light_layers::LayerSums;
 use super::light_paths::{Chain, Guide};
+use super::path_state::PathState;
 use super::recording::Recording;
-use super::segment::{LastVertices, PathState};
 use super::statistics::PathStats;
 use crate::accel::{Coherence, Hit, RayBatch};
 use crate::direct::Vertices;
@@ -14,11 +15,12 @@ use crate::film::{FeatureSet, Features, PixelSample};
 use crate::geometry::{GeometryId, Shape, SurfaceHit};
 use crate::lights::LightCtx;
 use crate::materials::SurfaceBsdf;
-use crate::materials::dispersion::sample_wavelength;
-use crate::media::{End, Flight, Glimpse, Numbers, Segment, Sides};
+use crate::materials::dispersion::{WavelengthSample, sample_wavelength};
+use crate::media::{EmissionLookup, EmissionLookups, End, Flight, FlightSampler, Segment, Sides};
 use crate::scene::{RenderJob, SurfaceInteraction};
+use lumiris_lanes::{level, sampler};
 use lumiris_numbers::math::{Rgb, Vec3};
-use lumiris_numbers::samplers::{Domain, SampleStream};
+use lumiris_numbers::samplers::{SampleStream, StreamColumns};
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -51,6 +53,26 @@ pub(super) enum FlightOutcome {
     Ghost(PathState),
 }
 
+/// Random numbers of the camera samples of a batch.
+#[derive(Debug, Default)]
+struct SampleNumbers {
+    streams: StreamColumns,
+    /// Streams of direct light, if they differ.
+    direct: Option<StreamColumns>,
+}
+
+impl SampleNumbers {
+    fn set(&mut self, samples: &[CameraSample]) {
+        self.streams.clear();
+        self.streams.extend(samples.iter().map(|sample| &sample.stream));
+        self.direct = None;
+        if samples.iter().any(|sample| sample.direct != sample.stream) {
+            let direct = self.direct.insert(StreamColumns::default());
+            direct.extend(samples.iter().map(|sample| &sample.direct));
+        }
+    }
+}
+
 /// The active paths of a batch; holds the buffers of one worker.
 #[derive(Debug, Default)]
 pub(super) struct VertexSearch {
@@ -63,6 +85,10 @@ pub(super) struct VertexSearch {
     escaped: Vec<u32>,
     rays: RayBatch,
     hits: Vec<Option<Hit>>,
+    /// Random numbers of the camera samples.
+    numbers: SampleNumbers,
+    /// Camera samples of the vertices, in the order of these vertices.
+    sampled: Vec<u32>,
     /// Geometry and distance from the camera of first vertices on plain meshes, in the order of these vertices.
     plain: Vec<(GeometryId, f32)>,
     /// Counts and times.
@@ -85,6 +111,7 @@ impl VertexSearch {
         out.clear();
         out.resize(samples.len(), PixelSample::default());
         self.layers.begin(samples.len());
+        self.numbers.set(samples);
         self.active.clear();
 
         // One path per camera sample
@@ -169,14 +196,25 @@ impl VertexSearch {
     }
 
     /// Sets times and random numbers of the vertices.
-    fn set_numbers(&self, at: &mut TraceStep<'_, '_>) {
+    fn set_numbers(&mut self, at: &mut TraceStep<'_, '_>) {
         let Vertices { path, time, streams, direct, .. } = &mut *at.vertices;
-        let sample = |&path: &u32| &at.samples[self.active[path as usize].sample as usize];
+        let VertexSearch { active, sampled, numbers, .. } = self;
+        sampled.clear();
+        sampled.extend(path.iter().map(|&path| active[path as usize].sample));
+        time.extend(path.iter().map(|&path| active[path as usize].ray.time));
+
+        // Streams of the vertices, and below them the streams of direct light
         let key = domain::VERTEX + at.vertex;
-        let (mut of_vertex, mut outer, mut inner) = (Domain::new(key), Domain::new(key), Domain::new(domain::DIRECT));
-        time.extend(path.iter().map(|path| sample(path).ray.ray.time));
-        streams.extend(path.iter().map(|path| of_vertex.of(&sample(path).stream)));
-        direct.extend(path.iter().map(|path| inner.of(&outer.of(&sample(path).direct))));
+        streams.gather(&numbers.streams, sampled);
+        sampler::enter(level(), streams, key);
+        match &numbers.direct {
+            None => direct.copy_from(streams),
+            Some(of_samples) => {
+                direct.gather(of_samples, sampled);
+                sampler::enter(level(), direct, key);
+            }
+        }
+        sampler::enter(level(), direct, domain::DIRECT);
     }
 
     /// Sets the features of first vertices on plain meshes.
@@ -272,7 +310,7 @@ impl VertexSearch {
         if let Some(eta) = bsdf.bsdf.eta_mut()
             && let Some(dispersion) = interaction.dispersion(at.job)
         {
-            let (lambda, weight) = self.wavelength(at, path);
+            let WavelengthSample { lambda, weight } = self.wavelength(at, path);
             (*eta, path.wavelength, beta) = (dispersion.eta(lambda), Some(lambda), beta * weight);
         }
 
@@ -314,13 +352,13 @@ impl VertexSearch {
     }
 
     /// The wavelength of a path, and the throughput factor of its sampling.
-    fn wavelength(&self, at: &TraceStep<'_, '_>, path: &PathState) -> (f32, Rgb) {
+    fn wavelength(&self, at: &TraceStep<'_, '_>, path: &PathState) -> WavelengthSample {
         path.wavelength.map_or_else(
             || {
                 let stream = at.samples[path.sample as usize].stream;
                 sample_wavelength(stream.domain(domain::WAVELENGTH).draw::<1>()[0])
             },
-            |lambda| (lambda, Rgb::WHITE),
+            |lambda| WavelengthSample { lambda, weight: Rgb::WHITE },
         )
     }
 
@@ -343,16 +381,16 @@ impl VertexSearch {
         let (o, d) = (path.ray.o, path.ray.d / scale);
         let segment = Segment { o, d, length: hit.map_or(f32::INFINITY, |hit| hit.t * scale) };
         let stream = at.samples[path.sample as usize].stream;
-        let mut numbers = Numbers::new(stream.domain(domain::FLIGHT + at.vertex).domain(path.passed));
+        let mut numbers = FlightSampler::new(stream.domain(domain::FLIGHT + at.vertex).domain(path.passed));
         // Emission lookups with their MIS weight. Where light is sampled as well, no minimum rate of lookups is needed
         let technique = path.technique.filter(|technique| technique.pdf.is_some());
-        let least = if technique.is_none() { at.job.lights.glimpse_rate(id) } else { 0.0 };
-        let weigh = |glimpse: &Glimpse| {
-            let p = o + d * glimpse.t;
-            at.left.weight(path, |ctx| at.job.lights.pdf_glow(ctx, id, (glimpse, p)))
+        let min_rate = if technique.is_none() { at.job.lights.emission_lookup_rate(id) } else { 0.0 };
+        let weight = |lookup: &EmissionLookup| {
+            let p = o + d * lookup.t;
+            at.left.weight(path, |ctx| at.job.lights.pdf_volume(ctx, id, lookup, p))
         };
         let focus = || focus(at.job, &segment, &stream, at.vertex);
-        let flight = medium.fly(&segment, path.beta, &mut numbers, focus, (least, weigh));
+        let flight = medium.fly(&segment, path.beta, &mut numbers, focus, EmissionLookups { min_rate, weight });
         self.stats.collisions += u64::from(numbers.drawn);
 
         // Add the emission, and make the vertex

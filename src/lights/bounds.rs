@@ -45,11 +45,12 @@ impl LightBounds {
         // The axis of a two-sided light has no sign.
         let flip = self.two_sided && other.two_sided && self.axis.dot(other.axis) < 0.0;
         let other_axis = if flip { -other.axis } else { other.axis };
-        let (axis, cos_theta_o) = union_cones((self.axis, self.cos_theta_o), (other_axis, other.cos_theta_o));
+        let cone = Cone { axis: self.axis, cos: self.cos_theta_o };
+        let cone = cone.union(Cone { axis: other_axis, cos: other.cos_theta_o });
         LightBounds {
             bounds: self.bounds.union(other.bounds),
-            axis,
-            cos_theta_o,
+            axis: cone.axis,
+            cos_theta_o: cone.cos,
             cos_theta_e: self.cos_theta_e.min(other.cos_theta_e),
             two_sided: self.two_sided || other.two_sided,
             intensity: self.intensity + other.intensity,
@@ -82,39 +83,53 @@ fn angle_between(a: Vec3, b: Vec3) -> f32 {
     2.0 * (a - b).length().atan2((a + b).length())
 }
 
-/// A cone (axis, cosine of the half-angle) about two cones, a little wider than necessary against rounding.
-pub(super) fn union_cones(a: (Vec3, f32), b: (Vec3, f32)) -> (Vec3, f32) {
-    const SPHERE: (Vec3, f32) = (Vec3::Z, -1.0);
-    if a.1 <= -1.0 || b.1 <= -1.0 {
-        return SPHERE;
-    }
-    // One cone may contain the other.
-    let (theta_a, theta_b) = (a.1.clamp(-1.0, 1.0).acos(), b.1.clamp(-1.0, 1.0).acos());
-    let theta_d = angle_between(a.0, b.0);
-    if theta_d + theta_b <= theta_a {
-        return a;
-    }
-    if theta_d + theta_a <= theta_b {
-        return b;
-    }
+/// A cone of directions.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Cone {
+    /// Unit axis.
+    axis: Vec3,
+    /// Cosine of the half-angle.
+    cos: f32,
+}
 
-    // Rotate the axis of `a` towards the axis of `b` until the cone touches the far side of both.
-    let theta_o = 0.5 * (theta_a + theta_d + theta_b) + 1e-5;
-    if theta_o >= PI {
-        return SPHERE;
+impl Cone {
+    const SPHERE: Cone = Cone { axis: Vec3::Z, cos: -1.0 };
+
+    /// A cone about two cones, a little wider than necessary against rounding.
+    fn union(self, other: Cone) -> Cone {
+        let (a, b) = (self, other);
+        if a.cos <= -1.0 || b.cos <= -1.0 {
+            return Self::SPHERE;
+        }
+        // One cone may contain the other.
+        let (theta_a, theta_b) = (a.cos.clamp(-1.0, 1.0).acos(), b.cos.clamp(-1.0, 1.0).acos());
+        let theta_d = angle_between(a.axis, b.axis);
+        if theta_d + theta_b <= theta_a {
+            return a;
+        }
+        if theta_d + theta_a <= theta_b {
+            return b;
+        }
+
+        // Rotate the axis of `a` towards the axis of `b` until the cone touches the far side of both.
+        let theta_o = 0.5 * (theta_a + theta_d + theta_b) + 1e-5;
+        if theta_o >= PI {
+            return Self::SPHERE;
+        }
+        let difference = b.axis - a.axis * a.axis.dot(b.axis);
+        if difference.length_squared() <= 1e-8 {
+            // Parallel axes: widen one cone. Opposite axes have no preferred direction of rotation.
+            let widened = theta_d + theta_a.max(theta_b) + 1e-5;
+            let is_cone = a.axis.dot(b.axis) > 0.0 && widened < PI;
+            return if is_cone { Cone { cos: widened.cos(), ..a } } else { Self::SPHERE };
+        }
+        // Orthogonalise twice: rounding tilts the first difference of nearly parallel axes.
+        let towards_b = difference.normalize();
+        let towards_b = (towards_b - a.axis * a.axis.dot(towards_b)).normalize();
+        let (sin, cos) = (theta_o - theta_a).sin_cos();
+        let axis = (a.axis * cos + towards_b * sin).normalize_or_zero();
+        if axis == Vec3::ZERO || !axis.is_finite() { Self::SPHERE } else { Cone { axis, cos: theta_o.cos() } }
     }
-    let difference = b.0 - a.0 * a.0.dot(b.0);
-    if difference.length_squared() <= 1e-8 {
-        // Parallel axes: widen one cone. Opposite axes have no preferred direction of rotation.
-        let widened = theta_d + theta_a.max(theta_b) + 1e-5;
-        return if a.0.dot(b.0) > 0.0 && widened < PI { (a.0, widened.cos()) } else { SPHERE };
-    }
-    // Orthogonalise twice: rounding tilts the first difference of nearly parallel axes.
-    let towards_b = difference.normalize();
-    let towards_b = (towards_b - a.0 * a.0.dot(towards_b)).normalize();
-    let (sin, cos) = (theta_o - theta_a).sin_cos();
-    let axis = (a.0 * cos + towards_b * sin).normalize_or_zero();
-    if axis == Vec3::ZERO || !axis.is_finite() { SPHERE } else { (axis, theta_o.cos()) }
 }
 
 #[cfg(test)]
@@ -128,25 +143,27 @@ mod tests {
     fn the_union_of_cones_holds_both() {
         let mut stream = pcg32([1, 1, 2]);
         for i in 0..20_000 {
-            let mut cone =
-                || (sample_uniform_sphere(stream.random::<[f32; 2]>()), 1.0 - 2.0 * stream.random::<f32>().powi(3));
+            let mut cone = || Cone {
+                axis: sample_uniform_sphere(stream.random::<[f32; 2]>()),
+                cos: 1.0 - 2.0 * stream.random::<f32>().powi(3),
+            };
 
             // Same axes, opposite axes, nearly equal and nearly opposite axes, and random axes
             let a = cone();
             let b = match i % 6 {
-                0 => (a.0, cone().1),
-                1 => (-a.0, cone().1),
-                2 => ((a.0 + cone().0 * 1e-4).normalize(), 1.0),
-                3 => ((cone().0 * 1e-4 - a.0).normalize(), a.1),
+                0 => Cone { axis: a.axis, ..cone() },
+                1 => Cone { axis: -a.axis, ..cone() },
+                2 => Cone { axis: (a.axis + cone().axis * 1e-4).normalize(), cos: 1.0 },
+                3 => Cone { axis: (cone().axis * 1e-4 - a.axis).normalize(), cos: a.cos },
                 _ => cone(),
             };
 
             // The edges of both cones are inside of the union
-            let (axis, cos) = union_cones(a, b);
+            let Cone { axis, cos } = a.union(b);
             assert!(axis.is_finite() && (axis.length() - 1.0).abs() < 1e-5 && cos.is_finite());
             for c in [a, b] {
-                let edge = sample_uniform_cone([ONE_MINUS_EPSILON, stream.random::<f32>()], 1.0 - c.1);
-                let w = Frame::from_z(c.0).to_world(edge);
+                let edge = sample_uniform_cone([ONE_MINUS_EPSILON, stream.random::<f32>()], 1.0 - c.cos);
+                let w = Frame::from_z(c.axis).to_world(edge);
                 assert!(w.dot(axis) >= cos - 2e-6, "{a:?} {b:?} -> {axis} {cos}");
             }
         }

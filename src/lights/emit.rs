@@ -18,33 +18,24 @@
 //! on the side the light comes from [Pharr et al. 2023, §12.2, §12.5]. Flux that misses the scene is included.
 
 use super::kinds::area::AreaLight;
-use super::kinds::spot;
 use super::light::Light;
-use super::light_sample::{EmissionSample, EmittingPoint};
+use super::light_sample::{EmissionSample, EmittingPoint, Sphere};
 use lumiris_numbers::math::warp::{
-    direction, pdf_uniform_sphere, sample_cosine_hemisphere, sample_uniform_disk_concentric, sample_uniform_sphere,
+    pdf_uniform_sphere, sample_cosine_hemisphere, sample_uniform_disk_concentric, sample_uniform_sphere,
 };
 use lumiris_numbers::math::{Frame, ONE_MINUS_EPSILON, Rgb, Vec3};
-use std::f32::consts::{PI, TAU};
+use std::f32::consts::PI;
 
 impl Light {
-    /// Samples light that leaves this source into a scene with a bounding sphere of the given centre and radius (m).
+    /// Samples light that leaves this source into a scene with the given bounding sphere.
     /// Returns `None` if the sample carries no power. The first number of `u_direction` also chooses the side of a
     /// two-sided surface.
-    pub fn sample_le(&self, scene: (Vec3, f32), u_position: [f32; 2], u_direction: [f32; 2]) -> Option<EmissionSample> {
+    pub fn sample_le(&self, scene: Sphere, u_position: [f32; 2], u_direction: [f32; 2]) -> Option<EmissionSample> {
         match self {
-            Light::Point { p, intensity } => {
-                EmissionSample::in_space(*p, sample_uniform_sphere(u_direction), *intensity * (4.0 * PI))
-            }
-            Light::Spot { p, axis, cos_total, cos_falloff_start, intensity } => {
-                // In proportion to the falloff, so that the power is constant
-                let cos = spot::sample_spot_cos(u_direction[0], *cos_total, *cos_falloff_start);
-                let d = Frame::from_z(*axis).to_world(direction(cos, TAU * u_direction[1]));
-                let solid_angle = spot::spot_solid_angle(*cos_total, *cos_falloff_start);
-                EmissionSample::in_space(*p, d.normalize(), *intensity * solid_angle)
-            }
+            Light::Point(light) => light.sample_le(u_direction),
+            Light::Spot(light) => light.sample_le(u_direction),
             Light::Image(light) => light.sample_le(u_direction),
-            Light::Distant { wi_world, l } => from_infinity(scene, u_position, *wi_world, *l),
+            Light::Distant(light) => from_infinity(scene, u_position, light.wi, light.l),
             Light::Area(area) => area.sample_le(u_position, u_direction),
             Light::InfiniteConstant { l } => {
                 from_infinity(scene, u_position, sample_uniform_sphere(u_direction), *l / pdf_uniform_sphere())
@@ -54,7 +45,7 @@ impl Light {
                 from_infinity(scene, u_position, *world_from_light * s.w, s.le * (*scale / s.pdf))
             }
             Light::Portal(light) => light.sample_le(scene, u_position, u_direction),
-            Light::Glow(_) => None,
+            Light::Volume(_) => None,
         }
     }
 }
@@ -62,13 +53,13 @@ impl Light {
 /// Light from the unit direction `wi` through the disk that the scene projects to; `irradiance` is the irradiance of
 /// the disk.
 fn from_infinity(
-    (centre, radius): (Vec3, f32),
+    Sphere { center, radius }: Sphere,
     u_position: [f32; 2],
     wi: Vec3,
     irradiance: Rgb,
 ) -> Option<EmissionSample> {
-    let place = sample_uniform_disk_concentric(u_position);
-    let p = centre + Frame::from_z(wi).to_world(place.extend(1.0)) * radius;
+    let on_disk = sample_uniform_disk_concentric(u_position);
+    let p = center + Frame::from_z(wi).to_world(on_disk.extend(1.0)) * radius;
     EmissionSample::in_space(p, -wi, irradiance * (PI * radius * radius))
 }
 

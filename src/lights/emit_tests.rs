@@ -5,8 +5,8 @@ use super::light_tests::{
     triangle_surface,
 };
 use super::{
-    Emission, EmissionImage, EmissionSample, EnvironmentFilter, EnvironmentMap, EnvironmentMapping, ImageLight,
-    ImageMapping, Light, LightCtx, Portal, PortalLight, area_lights_of,
+    DistantLight, Emission, EmissionImage, EmissionSample, EnvironmentFilter, EnvironmentMap, EnvironmentMapping,
+    ImageLight, ImageMapping, Light, LightCtx, PointLight, Portal, PortalLight, Sphere, SpotLight, area_lights_of,
 };
 use crate::geometry::{BilinearMesh, Quadric, QuadricKind, Shape, TriangleMesh};
 use lumiris_numbers::math::warp::azimuth;
@@ -17,7 +17,7 @@ use std::f32::consts::TAU;
 use std::sync::Arc;
 
 /// A sphere that holds the receivers below.
-const SCENE: (Vec3, f32) = (Vec3::new(0.2, -0.1, 0.4), 2.5);
+const SCENE: Sphere = Sphere { center: Vec3::new(0.2, -0.1, 0.4), radius: 2.5 };
 
 fn sphere(flip_normal: bool, placement: Affine3A) -> Shape {
     let kind = QuadricKind::Sphere { radius: 0.6, z_min: -0.6, z_max: 0.6, phi_max: TAU };
@@ -52,7 +52,7 @@ fn skylight() -> Light {
 fn picture(mapping: ImageMapping, size: [usize; 2]) -> Light {
     let texels = (0..size[0] * size[1]).map(|i| Rgb::new((i % 5) as f32, (i * i % 7) as f32, 1.0)).collect();
     let down = Mat3::from_rotation_x(2.8) * Mat3::from_rotation_z(0.3);
-    let light = ImageLight::new(Vec3::new(0.1, 0.3, 1.4), down, mapping, (texels, size)).unwrap();
+    let light = ImageLight::new(Vec3::new(0.1, 0.3, 1.4), down, mapping, texels, size).unwrap();
     Light::Image(Arc::new(light.scaled(Rgb::new(0.5, 1.0, 3.0))))
 }
 
@@ -78,21 +78,23 @@ fn lights() -> Vec<(&'static str, Light)> {
     let tube = QuadricKind::Cylinder { radius: 0.3, z_min: -0.5, z_max: 0.5, phi_max: TAU };
     let disk = QuadricKind::Disk { height: -1.2, radius: 0.8, inner_radius: 0.3, phi_max: 4.0 };
     let facing = Affine3A::from_rotation_x(std::f32::consts::PI);
-    let spot = |cos_total, cos_falloff_start| Light::Spot {
-        p: Vec3::new(0.4, 0.0, 1.8),
-        axis: Vec3::new(-0.1, 0.2, -0.8).normalize(),
-        cos_total,
-        cos_falloff_start,
-        intensity: l,
+    let spot = |cos_total, cos_falloff_start| {
+        Light::Spot(SpotLight {
+            p: Vec3::new(0.4, 0.0, 1.8),
+            axis: Vec3::new(-0.1, 0.2, -0.8).normalize(),
+            cos_total,
+            cos_falloff_start,
+            intensity: l,
+        })
     };
     vec![
-        ("point", Light::Point { p: Vec3::new(0.3, 0.2, 1.0), intensity: l }),
+        ("point", Light::Point(PointLight { p: Vec3::new(0.3, 0.2, 1.0), intensity: l })),
         ("spot", spot(0.7, 0.95)),
         ("spot without falloff", spot(0.8, 0.8)),
         ("spot wider than a half-space", spot(-0.6, 0.1)),
         ("goniometric", picture(ImageMapping::Sphere, [6, 6])),
         ("projection", picture(ImageMapping::Plane { half: [0.9, 0.6] }, [6, 4])),
-        ("distant", Light::Distant { wi_world: Vec3::new(0.3, -0.4, 0.7).normalize(), l }),
+        ("distant", Light::Distant(DistantLight { wi: Vec3::new(0.3, -0.4, 0.7).normalize(), l })),
         ("triangle", area(&triangle, &both)),
         ("triangle of three colours", area(&colored, &Emission { has_vertex_colors: true, ..both.clone() })),
         ("rectangle", area(&down, &one)),
@@ -132,7 +134,7 @@ fn the_mean_power_of_every_light_is_its_flux() {
             power.add(s.map_or(0.0, |s| f64::from(s.power.luminance())));
         }
         // Areas of curved surfaces and integrals of images are sums over cells, hence the tolerance.
-        power.assert_mean(f64::from(light.phi(SCENE.1)), 1e-5, 3e-4);
+        power.assert_mean(f64::from(light.phi(SCENE.radius)), 1e-5, 3e-4);
     }
 }
 
@@ -259,10 +261,10 @@ fn surfaces_emit_by_area_and_cosine_on_both_sides() {
 #[test]
 fn light_from_infinity_comes_through_a_disk_that_covers_the_scene() {
     let wi = Vec3::new(0.3, -0.4, 0.7).normalize();
-    let samples = emitted(&Light::Distant { wi_world: wi, l: Rgb::WHITE }, 8);
+    let samples = emitted(&Light::Distant(DistantLight { wi, l: Rgb::WHITE }), 8);
     let frame = Frame::from_z(wi);
     assert_uniform(samples.iter().map(|s| {
-        let p = frame.to_local((s.p - SCENE.0) / SCENE.1);
+        let p = frame.to_local((s.p - SCENE.center) / SCENE.radius);
         assert!(s.d == -wi && s.n == Vec3::ZERO && (p.z - 1.0).abs() < 1e-5);
         [p.truncate().length_squared(), azimuth(p) / TAU]
     }));
@@ -270,9 +272,9 @@ fn light_from_infinity_comes_through_a_disk_that_covers_the_scene() {
     let has_disk = |light: &Light| light.is_infinite() && !matches!(light, Light::Portal(_));
     for (name, light) in lights().into_iter().filter(|(_, light)| has_disk(light)) {
         for s in emitted(&light, 9).iter().take(2000) {
-            let from_centre = s.p - SCENE.0;
-            assert!((from_centre.dot(-s.d) / SCENE.1 - 1.0).abs() < 1e-4, "{name}");
-            assert!((from_centre + s.d * SCENE.1).length() < SCENE.1 * 1.0001, "{name}");
+            let from_centre = s.p - SCENE.center;
+            assert!((from_centre.dot(-s.d) / SCENE.radius - 1.0).abs() < 1e-4, "{name}");
+            assert!((from_centre + s.d * SCENE.radius).length() < SCENE.radius * 1.0001, "{name}");
         }
     }
 }
@@ -308,7 +310,7 @@ fn check_directions(samples: &[EmissionSample], frame: Frame, density: impl Fn(V
 #[test]
 fn directions_from_points_and_from_infinity_follow_their_densities() {
     let world = Frame { x: Vec3::X, y: Vec3::Y, z: Vec3::Z };
-    let point = Light::Point { p: Vec3::ONE, intensity: Rgb::WHITE };
+    let point = Light::Point(PointLight { p: Vec3::ONE, intensity: Rgb::WHITE });
     let uniform = |_: Vec3| f64::from(lumiris_numbers::math::warp::pdf_uniform_sphere());
     check_directions(&emitted(&point, 10), world, uniform);
     check_directions(&emitted(&Light::InfiniteConstant { l: Rgb::WHITE }, 11), world, uniform);
@@ -316,11 +318,11 @@ fn directions_from_points_and_from_infinity_follow_their_densities() {
     // Spot lights
     let axis = Vec3::new(0.48, 0.6, 0.64);
     for (cos_total, cos_falloff_start) in [(0.5, 0.875), (-0.5, 0.25), (0.75, 0.75)] {
-        let light = Light::Spot { p: Vec3::ONE, axis, cos_total, cos_falloff_start, intensity: Rgb::WHITE };
-        let solid_angle = super::spot::spot_solid_angle(cos_total, cos_falloff_start);
-        let falloff = |w: Vec3| super::spot::spot_falloff(w.dot(axis), cos_total, cos_falloff_start);
+        let spot = SpotLight { p: Vec3::ONE, axis, cos_total, cos_falloff_start, intensity: Rgb::WHITE };
+        let solid_angle = spot.solid_angle();
+        let falloff = |w: Vec3| spot.falloff(w.dot(axis));
         let density = |w| f64::from(falloff(w) / solid_angle);
-        check_directions(&emitted(&light, 12), Frame::from_z(axis), density);
+        check_directions(&emitted(&Light::Spot(spot), 12), Frame::from_z(axis), density);
     }
 
     // Environment maps
@@ -337,14 +339,15 @@ fn what_emits_nothing_sends_no_photons() {
     let line = TriangleMesh::new(vec![Vec3::ZERO, Vec3::X, Vec3::X * 2.0], vec![[0, 1, 2]]).unwrap();
     let dark =
         EnvironmentMap::new(vec![Rgb::BLACK; 4], [2, 2], EnvironmentMapping::EqualArea, EnvironmentFilter::Nearest);
-    let no_picture = ImageLight::new(Vec3::ZERO, Mat3::IDENTITY, ImageMapping::Sphere, (vec![Rgb::BLACK; 4], [2, 2]));
+    let no_picture = ImageLight::new(Vec3::ZERO, Mat3::IDENTITY, ImageMapping::Sphere, vec![Rgb::BLACK; 4], [2, 2]);
     let area = |shape: &Shape, emission: &Emission| Light::Area(area_lights_of(shape, emission).lights.remove(0));
-    let closed =
-        |intensity| Light::Spot { p: Vec3::ZERO, axis: Vec3::Z, cos_total: 1.0, cos_falloff_start: 1.0, intensity };
+    let closed = |intensity| {
+        Light::Spot(SpotLight { p: Vec3::ZERO, axis: Vec3::Z, cos_total: 1.0, cos_falloff_start: 1.0, intensity })
+    };
     for light in [
-        Light::Point { p: Vec3::ZERO, intensity: Rgb::BLACK },
+        Light::Point(PointLight { p: Vec3::ZERO, intensity: Rgb::BLACK }),
         closed(Rgb::WHITE),
-        Light::Distant { wi_world: Vec3::Z, l: Rgb::BLACK },
+        Light::Distant(DistantLight { wi: Vec3::Z, l: Rgb::BLACK }),
         area(&Shape::Bilinear(bent_patch()), &black),
         area(&Shape::Mesh(line), &Emission::constant(Rgb::WHITE)),
         Light::InfiniteConstant { l: Rgb::BLACK },

@@ -16,7 +16,7 @@
 use super::choice::set::LightSet;
 use super::kinds::area::{AreaLight, AreaShape};
 use super::light::Light;
-use super::light_sample::LightId;
+use super::light_sample::{LightId, Sphere, SurfacePoint};
 use crate::geometry::GeometryId;
 use glam::DVec3;
 use lumiris_numbers::math::{Rgb, Vec3, sqr};
@@ -59,12 +59,12 @@ impl Irradiances {
         self.environment * PI + self.area.iter().map(area).sum()
     }
 
-    /// The radiance that E includes for an area light, from a point with the normal `n_light` to `p` along `−wi`. `wi`
-    /// is above the horizon of `n`.
-    pub fn l(&self, set: &LightSet, light: LightId, (p, n): (Vec3, Vec3), wi: Vec3, n_light: Vec3) -> Rgb {
+    /// The radiance that E includes for an area light, from a point with the normal `n_light` to `at` along `−wi`. `wi`
+    /// is above the horizon.
+    pub fn l(&self, set: &LightSet, light: LightId, at: SurfacePoint, wi: Vec3, n_light: Vec3) -> Rgb {
         let Light::Area(area) = &set.lights[light as usize] else { return Rgb::BLACK };
         let mean_l = self.mean_l[light as usize];
-        if !mean_l.is_black() && faces(area, p, n, wi, n_light) { mean_l } else { Rgb::BLACK }
+        if !mean_l.is_black() && faces(area, at, wi, n_light) { mean_l } else { Rgb::BLACK }
     }
 
     /// The radiance that E includes for infinite lights, the same in every direction above the horizon.
@@ -86,13 +86,13 @@ fn mean_l(light: &Light) -> Rgb {
             AreaShape::Quadric(_) | AreaShape::Patch(_) => Rgb::BLACK,
         },
         Light::InfiniteConstant { l } => *l,
-        Light::Point { .. }
-        | Light::Spot { .. }
+        Light::Point(_)
+        | Light::Spot(_)
         | Light::Image(_)
-        | Light::Distant { .. }
+        | Light::Distant(_)
         | Light::InfiniteImage { .. }
         | Light::Portal(_)
-        | Light::Glow(_) => Rgb::BLACK,
+        | Light::Volume(_) => Rgb::BLACK,
     };
     if l.is_finite() && l.luminance() > 0.0 { l } else { Rgb::BLACK }
 }
@@ -109,11 +109,11 @@ fn corners(area: &AreaLight) -> Option<[Vec3; 4]> {
     }
 }
 
-/// Centre and radius of a sphere that is wholly above the horizon and does not contain `p`.
-fn sphere_above(area: &AreaLight, p: Vec3, n: Vec3) -> Option<(Vec3, f32)> {
+/// A sphere that is wholly above the horizon and does not contain `p`.
+fn sphere_above(area: &AreaLight, p: Vec3, n: Vec3) -> Option<Sphere> {
     let AreaShape::Quadric(quadric) = &area.shape else { return None };
-    let (center, radius) = quadric.outward_sphere()?;
-    (n.dot(center - p) > radius && !area.is_dark_from(p)).then_some((center, radius))
+    let sphere = quadric.outward_sphere()?;
+    (n.dot(sphere.center - p) > sphere.radius && !area.is_dark_from(p)).then_some(sphere)
 }
 
 /// True if a flat light with the given normal illuminates `p` and is not edge-on.
@@ -123,8 +123,8 @@ fn shines_on(area: &AreaLight, corners: &[Vec3; 4], n_light: Vec3, p: Vec3) -> b
     (if area.emission.two_sided { height.abs() } else { height }) > EDGE_ON * extent
 }
 
-/// True if E at `p` includes the light in the direction `wi`.
-fn faces(area: &AreaLight, p: Vec3, n: Vec3, wi: Vec3, n_light: Vec3) -> bool {
+/// True if E at the point includes the light in the direction `wi`.
+fn faces(area: &AreaLight, SurfacePoint { p, n }: SurfacePoint, wi: Vec3, n_light: Vec3) -> bool {
     match &area.shape {
         AreaShape::Triangle(t) => corners(area).is_some_and(|c| shines_on(area, &c, t.n, p)),
         AreaShape::Rectangle(r) => corners(area).is_some_and(|c| shines_on(area, &c, r.n, p)),
@@ -145,7 +145,7 @@ fn form(area: &AreaLight, p: Vec3, n: Vec3) -> f32 {
             polygon_irradiance(&corners.map(|c| c.as_dvec3() - p.as_dvec3()), n.as_dvec3()) as f32
         }
         Some(_) => 0.0,
-        None => sphere_above(area, p, n).map_or(0.0, |(center, radius)| {
+        None => sphere_above(area, p, n).map_or(0.0, |Sphere { center, radius }| {
             let d = center - p;
             let distance = d.length();
             PI * sqr(radius / distance) * n.dot(d) / distance
@@ -192,7 +192,7 @@ mod tests {
     use super::*;
     use crate::geometry::{Quadric, QuadricKind, Shape, TriangleMesh};
     use crate::lights::{
-        Emission, EmissionImage, LightCtx, LightHit, LightSamplerKind, LightSampling, LightSetBuilder,
+        DistantLight, Emission, EmissionImage, LightCtx, LightHit, LightSamplerKind, LightSampling, LightSetBuilder,
     };
     use lumiris_numbers::math::warp::sample_uniform_sphere;
     use lumiris_numbers::math::{Affine3A, Bounds3, Vec2};
@@ -235,14 +235,14 @@ mod tests {
             Light::Area(AreaLight { shape: AreaShape::Triangle(t), .. }) => t.n.dot(p - t.p[0]).abs() < 0.1,
             Light::Area(AreaLight { shape: AreaShape::Rectangle(r), .. }) => r.n.dot(p - r.corner).abs() < 0.1,
             Light::Area(_)
-            | Light::Point { .. }
-            | Light::Spot { .. }
+            | Light::Point(_)
+            | Light::Spot(_)
             | Light::Image(_)
-            | Light::Distant { .. }
+            | Light::Distant(_)
             | Light::InfiniteConstant { .. }
             | Light::InfiniteImage { .. }
             | Light::Portal(_)
-            | Light::Glow(_) => false,
+            | Light::Volume(_) => false,
         })
     }
 
@@ -270,7 +270,7 @@ mod tests {
                     let l = if set.infinite.contains(&light) {
                         known.environment()
                     } else {
-                        known.l(set, light, (p, n), s.wi, s.n)
+                        known.l(set, light, SurfacePoint { p, n }, s.wi, s.n)
                     };
                     f64::from(l.g * n.dot(s.wi).max(0.0) / s.pdf)
                 }));
@@ -298,7 +298,7 @@ mod tests {
         assert_eq!(assert_integrates(&set(&[sphere(Vec3::ZERO, 3.0, true)], &emission), &mut stream), 0);
         let mut builder = LightSetBuilder::default();
         builder.add(Light::InfiniteConstant { l: Rgb::splat(0.5) });
-        builder.add(Light::Distant { wi_world: Vec3::Z, l: Rgb::WHITE });
+        builder.add(Light::Distant(DistantLight { wi: Vec3::Z, l: Rgb::WHITE }));
         let environment = Arc::new(builder.build(&Bounds3::EMPTY));
         assert_eq!(assert_integrates(&environment, &mut stream), POINTS);
     }
@@ -332,6 +332,6 @@ mod tests {
         assert!((e(&set, false) - e(&constant, false)).abs() < 1e-6 && e(&set, false) > 0.0);
         assert_eq!(e(&set, true), 0.0);
         let hit = LightHit { t: 1.0, p: Vec3::new(0.5, 0.5, 1.0), n: -Vec3::Z, uv: Vec2::ZERO };
-        assert!(Irradiances::new(&set, |_| true).l(&set, 0, (p, n), Vec3::Z, hit.n).is_black());
+        assert!(Irradiances::new(&set, |_| true).l(&set, 0, SurfacePoint { p, n }, Vec3::Z, hit.n).is_black());
     }
 }

@@ -50,7 +50,7 @@ impl LightLayers {
 pub fn fault_of_name(name: &str) -> Option<String> {
     let is_allowed = |c: char| c.is_alphanumeric() || matches!(c, '_' | '-');
     match name.chars().find(|&c| !is_allowed(c)) {
-        _ if name == OTHERS => Some(format!("the light group `{OTHERS}` is that of lights that name none")),
+        _ if name == OTHERS => Some(format!("the light group `{OTHERS}` is reserved for lights without a group")),
         _ if name.is_empty() => Some("the name of a light group is empty".to_owned()),
         Some(c) => Some(format!("the name of a light group has letters, digits, `_` and `-`, and no `{c}`")),
         None => None,

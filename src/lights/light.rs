@@ -2,15 +2,16 @@
 
 use super::bounds::LightBounds;
 use super::kinds::area::{AreaLight, AreaShape};
+use super::kinds::distant::DistantLight;
 use super::kinds::environment::{EnvironmentMap, infinite_sample, orthogonal};
-use super::kinds::glow::Glow;
 use super::kinds::image_light::ImageLight;
-use super::kinds::point::sample_li_from;
+use super::kinds::point::PointLight;
 use super::kinds::portal::PortalLight;
-use super::kinds::spot::{spot_falloff, spot_solid_angle};
-use super::light_sample::{LightCtx, LightHit, LightSample};
+use super::kinds::spot::SpotLight;
+use super::kinds::volume_light::VolumeLight;
+use super::light_sample::{LeAndPdf, LightCtx, LightHit, LightSample};
 use lumiris_numbers::math::warp::{pdf_uniform_sphere, sample_uniform_sphere};
-use lumiris_numbers::math::{Affine3A, Bounds3, Mat3, Rgb, Vec3};
+use lumiris_numbers::math::{Affine3A, Mat3, Rgb, Vec3};
 use std::f32::consts::PI;
 use std::sync::Arc;
 
@@ -18,34 +19,13 @@ use std::sync::Arc;
 #[derive(Clone, Debug)]
 pub enum Light {
     /// Emits from a point, the same in all directions.
-    Point {
-        /// Position.
-        p: Vec3,
-        /// Radiant intensity (radiance times area).
-        intensity: Rgb,
-    },
-    /// Emits from a point into a cone; see [`spot_falloff`].
-    Spot {
-        /// Position.
-        p: Vec3,
-        /// Unit axis of the cone.
-        axis: Vec3,
-        /// Cosine of the half-angle beyond which it does not emit.
-        cos_total: f32,
-        /// Cosine of the half-angle up to which it has the full intensity.
-        cos_falloff_start: f32,
-        /// Radiant intensity on the axis.
-        intensity: Rgb,
-    },
+    Point(PointLight),
+    /// Emits from a point into a cone.
+    Spot(SpotLight),
     /// Emits from a point by an image: goniometric and projection lights.
     Image(Arc<ImageLight>),
     /// Parallel light from infinity.
-    Distant {
-        /// Unit direction to the light.
-        wi_world: Vec3,
-        /// Irradiance on a surface that faces it.
-        l: Rgb,
-    },
+    Distant(DistantLight),
     /// An emitting surface.
     Area(AreaLight),
     /// The same radiance from everywhere.
@@ -64,18 +44,18 @@ pub enum Light {
     },
     /// Radiance by an image, through a rectangle.
     Portal(Arc<PortalLight>),
-    /// An emitting part of a medium; see [`Glow`].
-    Glow(Box<Glow>),
+    /// An emitting part of a medium; see [`VolumeLight`].
+    Volume(Box<VolumeLight>),
 }
 
 impl Light {
     /// Name of the kind of light, for messages.
     pub fn kind_name(&self) -> &'static str {
         match self {
-            Light::Point { .. } => "point",
-            Light::Spot { .. } => "spot",
+            Light::Point(_) => "point",
+            Light::Spot(_) => "spot",
             Light::Image(light) => light.kind_name(),
-            Light::Distant { .. } => "distant",
+            Light::Distant(_) => "distant",
             Light::Area(area) => match area.shape {
                 AreaShape::Triangle(_) => "triangle",
                 AreaShape::Rectangle(_) => "rectangle",
@@ -85,7 +65,7 @@ impl Light {
             Light::InfiniteConstant { .. } => "infinite, constant",
             Light::InfiniteImage { .. } => "infinite, image",
             Light::Portal(_) => "infinite, portal",
-            Light::Glow(_) => "glow",
+            Light::Volume(_) => "volume",
         }
     }
 
@@ -98,15 +78,10 @@ impl Light {
     #[inline]
     pub fn sample_li(&self, ctx: &LightCtx, u: [f32; 2]) -> Option<LightSample> {
         match self {
-            Light::Point { p, intensity } => sample_li_from(*p, ctx, |_| *intensity),
-            Light::Spot { p, axis, cos_total, cos_falloff_start, intensity } => {
-                sample_li_from(*p, ctx, |w| *intensity * spot_falloff(w.dot(*axis), *cos_total, *cos_falloff_start))
-            }
+            Light::Point(light) => light.sample_li(ctx),
+            Light::Spot(light) => light.sample_li(ctx),
             Light::Image(light) => light.sample_li(ctx),
-            Light::Distant { wi_world, l } => {
-                let s = infinite_sample(*wi_world, *l, 1.0);
-                (!l.is_black()).then_some(LightSample { is_delta: true, ..s })
-            }
+            Light::Distant(light) => light.sample_li(),
             Light::Area(area) => area.sample_li(ctx, u),
             Light::InfiniteConstant { l } => {
                 let wi = sample_uniform_sphere(u);
@@ -117,21 +92,21 @@ impl Light {
                 Some(infinite_sample(*world_from_light * s.w, s.le * *scale, s.pdf))
             }
             Light::Portal(light) => light.sample_li(ctx, u),
-            Light::Glow(glow) => glow.sample_li(ctx, u),
+            Light::Volume(light) => light.sample_li(ctx, u),
         }
     }
 
     /// Density per steradian of [`sample_li`](Self::sample_li) in the direction `wi`, which hits this light at `hit`. 0
-    /// for delta lights, and for media, since rays do not end at their points (see [`Glow::pdf`]).
+    /// for delta lights, and for media, since rays do not end at their points (see [`VolumeLight::pdf`]).
     #[inline]
     pub fn pdf_li(&self, ctx: &LightCtx, wi: Vec3, hit: &LightHit) -> f32 {
         match self {
-            Light::Point { .. } | Light::Spot { .. } | Light::Image(_) | Light::Distant { .. } | Light::Glow(_) => 0.0,
+            Light::Point(_) | Light::Spot(_) | Light::Image(_) | Light::Distant(_) | Light::Volume(_) => 0.0,
             Light::Area(area) => area.pdf_li(ctx, wi, hit),
             Light::InfiniteConstant { l } if l.is_black() => 0.0,
             Light::InfiniteConstant { .. } => pdf_uniform_sphere(),
             Light::InfiniteImage { map, world_from_light, .. } => map.pdf(world_from_light.transpose() * wi),
-            Light::Portal(light) => light.le_and_pdf(ctx.p, wi).1,
+            Light::Portal(light) => light.le_and_pdf(ctx.p, wi).pdf,
         }
     }
 
@@ -156,31 +131,33 @@ impl Light {
             Light::InfiniteConstant { l } => *l,
             Light::InfiniteImage { map, world_from_light, scale } => map.le(world_from_light.transpose() * w) * *scale,
             Light::Portal(light) => light.le(p, w),
-            Light::Point { .. }
-            | Light::Spot { .. }
+            Light::Point(_)
+            | Light::Spot(_)
             | Light::Image(_)
-            | Light::Distant { .. }
+            | Light::Distant(_)
             | Light::Area(_)
-            | Light::Glow(_) => Rgb::BLACK,
+            | Light::Volume(_) => Rgb::BLACK,
         }
     }
 
     /// [`le`](Self::le) of an infinite light and [`pdf_li`](Self::pdf_li) at `p` in the direction `w`.
     #[inline]
-    pub fn le_and_pdf(&self, p: Vec3, w: Vec3) -> (Rgb, f32) {
+    pub fn le_and_pdf(&self, p: Vec3, w: Vec3) -> LeAndPdf {
         match self {
             Light::InfiniteImage { map, world_from_light, scale } => {
-                let (le, pdf) = map.le_and_pdf(world_from_light.transpose() * w);
-                (le * *scale, pdf)
+                let LeAndPdf { le, pdf } = map.le_and_pdf(world_from_light.transpose() * w);
+                LeAndPdf { le: le * *scale, pdf }
             }
             Light::Portal(light) => light.le_and_pdf(p, w),
-            Light::Point { .. }
-            | Light::Spot { .. }
+            Light::Point(_)
+            | Light::Spot(_)
             | Light::Image(_)
-            | Light::Distant { .. }
+            | Light::Distant(_)
             | Light::Area(_)
-            | Light::Glow(_)
-            | Light::InfiniteConstant { .. } => (self.le(p, w), self.pdf_li(&LightCtx::at(p), w, &LightHit::INFINITE)),
+            | Light::Volume(_)
+            | Light::InfiniteConstant { .. } => {
+                LeAndPdf { le: self.le(p, w), pdf: self.pdf_li(&LightCtx::at(p), w, &LightHit::INFINITE) }
+            }
         }
     }
 
@@ -190,15 +167,19 @@ impl Light {
         n: usize,
         p: impl Fn(usize) -> Vec3,
         w: impl Fn(usize) -> Vec3,
-        mut out: impl FnMut(usize, Rgb, f32),
+        mut out: impl FnMut(usize, LeAndPdf),
     ) {
+        // Images have lookups that overlap their cache misses
         if let Light::InfiniteImage { map, world_from_light, scale } = self {
             let to_light = world_from_light.transpose();
-            map.le_and_pdf_many(n, |i| to_light * w(i), |i, le, pdf| out(i, le * *scale, pdf));
+            map.le_and_pdf_many(
+                n,
+                |i| to_light * w(i),
+                |i, LeAndPdf { le, pdf }| out(i, LeAndPdf { le: le * *scale, pdf }),
+            );
         } else {
             for i in 0..n {
-                let (le, pdf) = self.le_and_pdf(p(i), w(i));
-                out(i, le, pdf);
+                out(i, self.le_and_pdf(p(i), w(i)));
             }
         }
     }
@@ -208,17 +189,15 @@ impl Light {
     pub fn phi(&self, scene_radius: f32) -> f32 {
         let disk = PI * scene_radius * scene_radius;
         let phi = match self {
-            Light::Point { intensity, .. } => 4.0 * PI * intensity.luminance(),
-            Light::Spot { cos_total, cos_falloff_start, intensity, .. } => {
-                intensity.luminance() * spot_solid_angle(*cos_total, *cos_falloff_start)
-            }
+            Light::Point(light) => light.phi(),
+            Light::Spot(light) => light.phi(),
             Light::Image(light) => light.phi(),
-            Light::Distant { l, .. } => l.luminance() * disk,
+            Light::Distant(light) => light.l.luminance() * disk,
             Light::Area(area) => area.phi(),
             Light::InfiniteConstant { l } => 4.0 * PI * l.luminance() * disk,
             Light::InfiniteImage { map, scale, .. } => map.luminance_integral() * *scale * disk,
             Light::Portal(light) => light.phi(),
-            Light::Glow(_) => 0.0,
+            Light::Volume(_) => 0.0,
         };
         if phi.is_finite() { phi.max(0.0) } else { 0.0 }
     }
@@ -228,37 +207,25 @@ impl Light {
     pub fn is_infinite(&self) -> bool {
         matches!(
             self,
-            Light::Distant { .. } | Light::InfiniteConstant { .. } | Light::InfiniteImage { .. } | Light::Portal(_)
+            Light::Distant(_) | Light::InfiniteConstant { .. } | Light::InfiniteImage { .. } | Light::Portal(_)
         )
     }
 
     /// True for delta lights, which no ray can hit: only light sampling includes them.
     #[inline]
     pub fn is_delta(&self) -> bool {
-        matches!(self, Light::Point { .. } | Light::Spot { .. } | Light::Image(_) | Light::Distant { .. })
+        matches!(self, Light::Point(_) | Light::Spot(_) | Light::Image(_) | Light::Distant(_))
     }
 
     /// Bounds for the light tree; `None` for infinite lights and for lights that emit nothing.
     pub fn bounds(&self) -> Option<LightBounds> {
-        let at = |p: Vec3, axis, cos_theta_o, cos_theta_e, intensity: Rgb| LightBounds {
-            bounds: Bounds3 { min: p, max: p },
-            axis,
-            cos_theta_o,
-            cos_theta_e,
-            two_sided: false,
-            intensity: intensity.luminance(),
-        };
         let bounds = match self {
-            Light::Point { p, intensity } => at(*p, Vec3::Z, -1.0, 0.0, *intensity),
-            Light::Spot { p, axis, cos_total, cos_falloff_start, intensity } => {
-                // The falloff ends cos⁻¹(cos_total) − cos⁻¹(cos_falloff_start) beyond the inner cone.
-                let theta_e = (cos_total.acos() - cos_falloff_start.acos()).max(0.0);
-                at(*p, *axis, *cos_falloff_start, theta_e.cos(), *intensity)
-            }
+            Light::Point(light) => light.bounds(),
+            Light::Spot(light) => light.bounds(),
             Light::Image(light) => light.bounds(),
             Light::Area(area) => area.bounds(),
-            Light::Glow(glow) => glow.bounds(),
-            Light::Distant { .. } | Light::InfiniteConstant { .. } | Light::InfiniteImage { .. } | Light::Portal(_) => {
+            Light::Volume(light) => light.bounds(),
+            Light::Distant(_) | Light::InfiniteConstant { .. } | Light::InfiniteImage { .. } | Light::Portal(_) => {
                 return None;
             }
         };

@@ -69,6 +69,38 @@ pub struct LightSample {
     pub is_delta: bool,
 }
 
+/// Radiance from a direction, and the density of sampling that direction.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LeAndPdf {
+    /// Radiance.
+    pub le: Rgb,
+    /// Density (1/sr).
+    pub pdf: f32,
+}
+
+impl LeAndPdf {
+    /// No radiance, and no samples.
+    pub const ZERO: LeAndPdf = LeAndPdf { le: Rgb::BLACK, pdf: 0.0 };
+}
+
+/// A point of a surface.
+#[derive(Clone, Copy, Debug)]
+pub struct SurfacePoint {
+    /// Position.
+    pub p: Vec3,
+    /// Unit normal on the illuminated or visible side.
+    pub n: Vec3,
+}
+
+/// A sphere.
+#[derive(Clone, Copy, Debug)]
+pub struct Sphere {
+    /// Centre.
+    pub center: Vec3,
+    /// Radius (m).
+    pub radius: f32,
+}
+
 /// The intersection of a ray in direction wi with a light.
 #[derive(Clone, Copy, Debug)]
 pub struct LightHit {

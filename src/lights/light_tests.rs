@@ -1,6 +1,6 @@
 //! The sampling routine of every area light compared with its pdf, and with irradiances in closed form.
 
-use super::{AreaLight, AreaShape, Emission, Light, LightCtx, LightHit, area_lights_of};
+use super::{AreaLight, AreaShape, DistantLight, Emission, Light, LightCtx, LightHit, area_lights_of};
 use crate::geometry::{BilinearMesh, Quadric, QuadricKind, Shape, TriangleMesh};
 use lumiris_numbers::math::warp::{invert_uniform_triangle, sample_uniform_triangle};
 use lumiris_numbers::math::{Affine3A, Mat3, Quat, Rgb, Vec2, Vec3};
@@ -475,7 +475,7 @@ fn vertex_colours_are_a_factor_of_radiance_power_and_importance() {
 
 #[test]
 fn delta_and_infinite_lights_are_consistent() {
-    let distant = Light::Distant { wi_world: Vec3::Y, l: Rgb::splat(2.0) };
+    let distant = Light::Distant(DistantLight { wi: Vec3::Y, l: Rgb::splat(2.0) });
     let s = distant.sample_li(&LightCtx::at(Vec3::ONE), [0.1, 0.2]).unwrap();
     assert!(s.is_delta && s.pdf == 1.0 && s.wi == Vec3::Y && s.t == f32::INFINITY && s.li == Rgb::splat(2.0));
     assert_eq!(distant.pdf_li(&LightCtx::at(Vec3::ONE), Vec3::Y, &LightHit::INFINITE), 0.0);

@@ -43,14 +43,23 @@ fn white() -> &'static White {
     })
 }
 
-/// Samples a wavelength (nm) with density p; returns also r/p.
+/// A sampled wavelength.
+#[derive(Clone, Copy, Debug)]
+pub struct WavelengthSample {
+    /// The wavelength (nm).
+    pub lambda: f32,
+    /// r/p.
+    pub weight: Rgb,
+}
+
+/// Samples a wavelength with density p.
 #[inline]
-pub fn sample_wavelength(u: f32) -> (f32, Rgb) {
+pub fn sample_wavelength(u: f32) -> WavelengthSample {
     let white = white();
     // White light has power, so there is always a sample
-    white.density.sample(u).map_or((white.first, Rgb::BLACK), |s| {
+    white.density.sample(u).map_or(WavelengthSample { lambda: white.first, weight: Rgb::BLACK }, |s| {
         let bins = white.density.len() as f32;
-        (white.first + s.x * bins - 0.5, white.weights[s.index])
+        WavelengthSample { lambda: white.first + s.x * bins - 0.5, weight: white.weights[s.index] }
     })
 }
 
@@ -93,7 +102,7 @@ mod tests {
         const N: u32 = 1 << 16;
         let (mut sum, mut greatest) = ([0.0_f64; 3], 0.0_f32);
         for i in 0..N {
-            let (lambda, weight) = sample_wavelength((i as f32 + 0.5) / N as f32);
+            let WavelengthSample { lambda, weight } = sample_wavelength((i as f32 + 0.5) / N as f32);
             (0..3).for_each(|c| sum[c] += f64::from(weight[c]) / f64::from(N));
             greatest = greatest.max(weight.max_component());
             assert!((359.0..787.0).contains(&lambda) && weight.r >= 0.0 && weight.g >= 0.0 && weight.b >= 0.0);
@@ -112,7 +121,7 @@ mod tests {
         let (mut observed, count) = (vec![0.0; CELLS], 100_000);
         let cell = |lambda: f32| (((lambda - 359.5) / 426.0 * CELLS as f32) as usize).min(CELLS - 1);
         for _ in 0..count {
-            observed[cell(sample_wavelength(stream.random::<f32>()).0)] += 1.0;
+            observed[cell(sample_wavelength(stream.random::<f32>()).lambda)] += 1.0;
         }
         let mut expected = vec![0.0; CELLS];
         for i in 0..426 * 60 {

@@ -1,6 +1,6 @@
 //! Parameters that materials have in common, and their values at a point.
 
-use crate::bsdfs::{Base, Conductor, Dielectric, Layered, TrowbridgeReitz};
+use crate::bsdfs::{Base, ComplexIor, Conductor, Dielectric, Layered, TrowbridgeReitz};
 use crate::textures::{FloatTextureId, RgbTextureId, TextureContext, TextureSet};
 use lumiris_numbers::math::Rgb;
 
@@ -87,8 +87,8 @@ impl Textures<'_> {
 
     /// The metal under a medium with index of refraction `outside`.
     pub(super) fn conductor(&self, spectrum: ConductorSpectrum, roughness: Roughness, outside: f32) -> Conductor {
-        let (eta, k) = match spectrum {
-            ConductorSpectrum::EtaK { eta, k } => (self.rgb(eta), self.rgb(k)),
+        let ComplexIor { eta, k } = match spectrum {
+            ConductorSpectrum::EtaK { eta, k } => ComplexIor { eta: self.rgb(eta), k: self.rgb(k) },
             ConductorSpectrum::Reflectance(r) => Conductor::eta_k_of_reflectance(self.rgb(r)),
         };
         Conductor { distribution: self.distribution(roughness), eta: eta / outside, k: k / outside }

@@ -1,6 +1,6 @@
 //! A BSDF in the shading frame of a hit, for directions in world space.
 
-use crate::bsdfs::{Bsdf, BsdfSample, Lambertian, Phase, ProposalDensity, Resampled, resample};
+use crate::bsdfs::{Bsdf, BsdfSample, BsdfValue, Lambertian, Phase, ProposalDensity, Resampled, resample};
 use lumiris_lanes::kernels::{One, Values, evaluate_one};
 use lumiris_numbers::math::{Frame, Rgb, Vec3};
 
@@ -46,12 +46,12 @@ impl<'a> SurfaceBsdf<'a> {
     /// f·|cos θi| about the shading normal (1/sr).
     #[inline]
     pub fn f_cos(&self, wo: Vec3, wi: Vec3) -> Rgb {
-        self.f_cos_and_pdf(wo, wi).0
+        self.f_cos_and_pdf(wo, wi).f_cos
     }
 
     /// [`Self::f_cos`] and [`Self::pdf`].
     #[inline]
-    pub fn f_cos_and_pdf(&self, wo: Vec3, wi: Vec3) -> (Rgb, f32) {
+    pub fn f_cos_and_pdf(&self, wo: Vec3, wi: Vec3) -> BsdfValue {
         self.bsdf.f_cos_and_pdf(self.frame.to_local(wo), self.frame.to_local(wi))
     }
 
@@ -92,7 +92,7 @@ impl<'a> SurfaceBsdf<'a> {
         let wo = self.frame.to_local(wo);
         for i in 0..pdf.len() {
             let wi = self.frame.to_local(Vec3::new(wi[0][i], wi[1][i], wi[2][i]));
-            let (value, density) = self.bsdf.f_cos_and_pdf(wo, wi);
+            let BsdfValue { f_cos: value, pdf: density } = self.bsdf.f_cos_and_pdf(wo, wi);
             for c in 0..3 {
                 f_cos[c][i] = value[c];
             }

@@ -17,8 +17,8 @@
 use super::cloud::Cloud;
 use super::coefficients::Coefficients;
 use super::grid::{RgbGrid, Scalars, UniformGrid};
-use super::majorants::{MajorantGrid, Pieces};
-use super::track::{End, Flight, Glimpse, Numbers, Segment};
+use super::majorants::{MajorantGrid, MajorantIterator};
+use super::track::{EmissionLookup, EmissionLookups, End, Flight, FlightSampler, Segment};
 use lumiris_numbers::math::{Affine3A, Bounds3, DAffine3, DVec3, Rgb, Vec3};
 
 /// The spatially varying field.
@@ -108,13 +108,13 @@ impl Heterogeneous {
     }
 
     /// σ_a L_e at a point of the unit cube.
-    pub fn glow(&self, p: Vec3) -> Rgb {
+    pub fn emission(&self, p: Vec3) -> Rgb {
         let Coefficients { sigma_a, le, .. } = self.at(p);
         sigma_a * le
     }
 
     /// Default rate of a path's emission lookups at a point of the unit cube (1/m).
-    pub fn glimpse_rate(&self, p: Vec3) -> f32 {
+    pub fn emission_lookup_rate(&self, p: Vec3) -> f32 {
         self.majorants.at(p)
     }
 
@@ -164,42 +164,42 @@ impl Heterogeneous {
     fn collisions(&self, segment: &Segment) -> Collisions<'_> {
         let o = self.unit_point(segment.o);
         let d = self.unit_from_world.transform_vector3(segment.d);
-        let pieces = self.majorants.pieces(o, d, segment.length);
-        Collisions { medium: self, o, d, pieces, from: 0.0, to: 0.0, majorant: 0.0 }
+        let segments = self.majorants.segments(o, d, segment.length);
+        Collisions { medium: self, o, d, segments, from: 0.0, to: 0.0, majorant: 0.0 }
     }
 
-    /// The emission lookups along a segment. `offset` is the position of the first lookup in its interval; `least` is
-    /// the minimum rate (1/m).
-    fn glimpses(&self, segment: &Segment, (least, offset): (f32, f32)) -> Glimpses<'_> {
-        let Collisions { o, d, pieces, .. } = self.collisions(segment);
-        Glimpses { o, d, pieces, least, from: 0.0, to: 0.0, rate: 0.0, left: offset, count: 0 }
+    /// The emission lookups along a segment. `offset` is the position of the first lookup in its interval;
+    /// `min_rate` in 1/m.
+    fn lookups(&self, segment: &Segment, min_rate: f32, offset: f32) -> LookupsAlong<'_> {
+        let Collisions { o, d, segments, .. } = self.collisions(segment);
+        LookupsAlong { o, d, segments, min_rate, from: 0.0, to: 0.0, rate: 0.0, left: offset, count: 0 }
     }
 
-    /// A flight along a segment of a path of throughput `beta`; `least` and `weigh` as in [`super::Medium::fly`].
+    /// A flight along a segment of a path of throughput `beta`; `lookups` if it is emissive.
     pub(super) fn fly(
         &self,
         segment: &Segment,
         beta: Rgb,
-        numbers: &mut Numbers,
-        (least, weigh): (f32, impl Fn(&Glimpse) -> f32),
+        numbers: &mut FlightSampler,
+        EmissionLookups { min_rate, weight: mis_weight }: EmissionLookups<impl Fn(&EmissionLookup) -> f32>,
     ) -> Flight {
         // Adds the emission of the lookups up to the distance t
         let (mut weight, mut emitted) = (Rgb::WHITE, Rgb::BLACK);
         let mut collisions = self.collisions(segment);
-        let mut glimpses = self.is_emissive().then(|| self.glimpses(segment, (least, numbers.offset())));
-        let mut glow_before = |t: f32, weight: Rgb, numbers: &mut Numbers| {
-            let Some(glimpses) = &mut glimpses else { return };
-            while let Some(glimpse) = glimpses.next_before(t) {
+        let mut lookups = self.is_emissive().then(|| self.lookups(segment, min_rate, numbers.offset()));
+        let mut add_emission_before = |t: f32, weight: Rgb, numbers: &mut FlightSampler| {
+            let Some(lookups) = &mut lookups else { return };
+            while let Some(lookup) = lookups.next_before(t) {
                 numbers.drawn += 1;
-                let l = weight * self.glow(glimpse.unit) / glimpse.rate;
+                let l = weight * self.emission(lookup.unit) / lookup.rate;
                 if !l.is_black() {
-                    emitted += l * weigh(&glimpse);
+                    emitted += l * mis_weight(&lookup);
                 }
             }
         };
         let mut u = numbers.pair();
         while let Some(Collision { t, majorant, at: Coefficients { sigma_a, sigma_s, .. } }) = collisions.next(u[0]) {
-            glow_before(t, weight, numbers);
+            add_emission_before(t, weight, numbers);
 
             // Probability of scattering
             let sigma_n = (sigma_a + sigma_s).map(|sigma_t| majorant - sigma_t);
@@ -216,12 +216,12 @@ impl Heterogeneous {
             weight = weight * sigma_n / (majorant * (1.0 - p));
             u = numbers.pair();
         }
-        glow_before(f32::INFINITY, weight, numbers);
+        add_emission_before(f32::INFINITY, weight, numbers);
         Flight { emitted, end: End::Through { weight } }
     }
 
     /// T along a segment by ratio tracking: the product of σ_n/σ̄ over the tentative collisions [Novák et al. 2014].
-    pub(super) fn transmittance(&self, segment: &Segment, numbers: &mut Numbers) -> Rgb {
+    pub(super) fn transmittance(&self, segment: &Segment, numbers: &mut FlightSampler) -> Rgb {
         let mut weight = Rgb::WHITE;
         let mut collisions = self.collisions(segment);
         let mut u = numbers.pair();
@@ -254,8 +254,8 @@ struct Collisions<'a> {
     /// The line in the unit cube.
     o: Vec3,
     d: Vec3,
-    pieces: Pieces<'a>,
-    /// The rest of the current piece.
+    segments: MajorantIterator<'a>,
+    /// The rest of the current part.
     from: f32,
     to: f32,
     majorant: f32,
@@ -273,34 +273,34 @@ impl Collisions<'_> {
                 return Some(Collision { t, majorant: self.majorant, at });
             }
             depth = (depth - self.majorant * (self.to - self.from)).max(0.0);
-            let piece = self.pieces.next()?;
-            (self.from, self.to, self.majorant) = (piece.begin, piece.end, piece.majorant);
+            let part = self.segments.next()?;
+            (self.from, self.to, self.majorant) = (part.begin, part.end, part.majorant);
         }
     }
 }
 
 /// Emission lookups of a flight: stratified, one in each of equal intervals, at a given rate.
-struct Glimpses<'a> {
+struct LookupsAlong<'a> {
     /// The line in the unit cube.
     o: Vec3,
     d: Vec3,
-    pieces: Pieces<'a>,
+    segments: MajorantIterator<'a>,
     /// Minimum rate where the medium is not empty (1/m).
-    least: f32,
-    /// The current piece, and its rate.
+    min_rate: f32,
+    /// The current part, and its rate.
     from: f32,
     to: f32,
     rate: f32,
-    /// Remaining fraction of an interval before the first lookup of the piece, and the number of lookups in the piece.
+    /// Remaining fraction of an interval before the first lookup of the part, and the number of lookups in the part.
     left: f32,
     count: u32,
 }
 
-impl Glimpses<'_> {
+impl LookupsAlong<'_> {
     /// The next lookup up to the distance `end`.
-    // A lookup in the current piece
-    fn next_before(&mut self, end: f32) -> Option<Glimpse> {
+    fn next_before(&mut self, end: f32) -> Option<EmissionLookup> {
         loop {
+            // A lookup in the current part
             let passed = self.left + self.count as f32;
             let t = self.from + passed / self.rate;
             if self.rate > 0.0 && t < self.to {
@@ -308,18 +308,18 @@ impl Glimpses<'_> {
                     return None;
                 }
                 self.count += 1;
-                return Some(Glimpse { t, unit: self.o + self.d * t, rate: self.rate });
+                return Some(EmissionLookup { t, unit: self.o + self.d * t, rate: self.rate });
             }
             if self.to > end {
                 return None;
             }
 
-            // Carry the remaining interval over to the next piece
+            // Carry the remaining interval over to the next part
             self.left = (passed - self.rate * (self.to - self.from)).max(0.0);
             self.count = 0;
-            let piece = self.pieces.next()?;
-            let rate = if piece.majorant > 0.0 { piece.majorant.max(self.least) } else { 0.0 };
-            (self.from, self.to, self.rate) = (piece.begin, piece.end, rate);
+            let part = self.segments.next()?;
+            let rate = if part.majorant > 0.0 { part.majorant.max(self.min_rate) } else { 0.0 };
+            (self.from, self.to, self.rate) = (part.begin, part.end, rate);
         }
     }
 }

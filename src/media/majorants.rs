@@ -12,7 +12,7 @@ pub struct MajorantGrid {
 
 /// A part of a ray in one cell.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Piece {
+pub struct MajorantSegment {
     /// Ray parameter of its begin.
     pub begin: f32,
     /// Ray parameter of its end.
@@ -79,7 +79,7 @@ impl MajorantGrid {
     }
 
     /// The parts of the ray `o + t·d`, 0 < t < `t_max`, in the unit cube, cell by cell [Amanatides and Woo 1987].
-    pub fn pieces(&self, o: Vec3, d: Vec3, t_max: f32) -> Pieces<'_> {
+    pub fn segments(&self, o: Vec3, d: Vec3, t_max: f32) -> MajorantIterator<'_> {
         // The part inside the cube
         let (mut begin, mut end) = (0.0_f32, t_max);
         for axis in 0..3 {
@@ -92,33 +92,40 @@ impl MajorantGrid {
             let [a, b] = [-o[axis] / d[axis], (1.0 - o[axis]) / d[axis]];
             (begin, end) = (begin.max(a.min(b)), end.min(a.max(b)));
         }
-        let mut walk =
-            Pieces { grid: self, t: begin, end, cell: [0; 3], next: [f32::INFINITY; 3], step: [0.0; 3], up: [true; 3] };
+        let mut iterator = MajorantIterator {
+            grid: self,
+            t: begin,
+            end,
+            cell: [0; 3],
+            next: [f32::INFINITY; 3],
+            step: [0.0; 3],
+            up: [true; 3],
+        };
         if !(begin < end) {
-            walk.t = f32::INFINITY;
-            return walk;
+            iterator.t = f32::INFINITY;
+            return iterator;
         }
         // The first cell, and the ray parameters of its exits
         let p = o + d * begin;
         for axis in 0..3 {
             let (n, cell) = (self.resolution[axis], self.cell(p, axis));
-            walk.cell[axis] = cell;
-            walk.up[axis] = d[axis] > 0.0;
+            iterator.cell[axis] = cell;
+            iterator.up[axis] = d[axis] > 0.0;
             if d[axis] != 0.0 {
-                let wall = (cell + usize::from(walk.up[axis])) as f32 / n as f32;
-                walk.next[axis] = (wall - o[axis]) / d[axis];
-                walk.step[axis] = 1.0 / (n as f32 * d[axis].abs());
+                let wall = (cell + usize::from(iterator.up[axis])) as f32 / n as f32;
+                iterator.next[axis] = (wall - o[axis]) / d[axis];
+                iterator.step[axis] = 1.0 / (n as f32 * d[axis].abs());
             }
         }
-        walk
+        iterator
     }
 }
 
-/// The iterator of [`MajorantGrid::pieces`].
+/// The iterator of [`MajorantGrid::segments`].
 #[derive(Clone, Debug)]
-pub struct Pieces<'a> {
+pub struct MajorantIterator<'a> {
     grid: &'a MajorantGrid,
-    /// Begin of the next piece; infinite after the last.
+    /// Begin of the next segment; infinite after the last.
     t: f32,
     end: f32,
     cell: [usize; 3],
@@ -128,11 +135,11 @@ pub struct Pieces<'a> {
     up: [bool; 3],
 }
 
-impl Iterator for Pieces<'_> {
-    type Item = Piece;
+impl Iterator for MajorantIterator<'_> {
+    type Item = MajorantSegment;
 
     #[inline]
-    fn next(&mut self) -> Option<Piece> {
+    fn next(&mut self) -> Option<MajorantSegment> {
         if !(self.t < self.end) {
             return None;
         }
@@ -141,7 +148,7 @@ impl Iterator for Pieces<'_> {
         let axis = (0..3).fold(0, |best, axis| if self.next[axis] < self.next[best] { axis } else { best });
         // Rounding may put a wall slightly before the begin
         let end = self.next[axis].max(self.t).min(self.end);
-        let piece = Piece { begin: self.t, end, majorant };
+        let segment = MajorantSegment { begin: self.t, end, majorant };
         self.t = end;
         self.next[axis] += self.step[axis];
         let is_last =
@@ -153,7 +160,7 @@ impl Iterator for Pieces<'_> {
         } else {
             self.cell[axis] -= 1;
         }
-        Some(piece)
+        Some(segment)
     }
 }
 
@@ -180,21 +187,21 @@ mod tests {
             let d = if i % 5 == 0 { axis_aligned } else { sample_uniform_sphere(stream.random::<[f32; 2]>()) };
             let d = d * (0.1 + stream.random::<f32>());
             let t_max = if i % 2 == 0 { f32::INFINITY } else { 3.0 * stream.random::<f32>() };
-            let pieces: Vec<Piece> = grid.pieces(o, d, t_max).collect();
+            let segments: Vec<MajorantSegment> = grid.segments(o, d, t_max).collect();
             let is_inside = |t: f32| (0..3).all(|axis| (1e-4..1.0 - 1e-4).contains(&o.lerp(o + d, t)[axis]));
-            for pair in pieces.windows(2) {
+            for pair in segments.windows(2) {
                 assert_eq!(pair[0].end, pair[1].begin);
             }
-            for piece in pieces.iter().filter(|p| p.end - p.begin > 1e-3) {
-                let p = o + d * (0.5 * (piece.begin + piece.end));
-                assert_eq!(piece.majorant, key(p), "{p}");
+            for segment in segments.iter().filter(|p| p.end - p.begin > 1e-3) {
+                let p = o + d * (0.5 * (segment.begin + segment.end));
+                assert_eq!(segment.majorant, key(p), "{p}");
             }
             let end = if t_max.is_finite() { t_max } else { 60.0 };
             for k in 0..50 {
                 let t = end * (k as f32 + 0.5) / 50.0;
-                let is_covered = pieces.iter().any(|p| (p.begin..=p.end).contains(&t));
+                let is_covered = segments.iter().any(|p| (p.begin..=p.end).contains(&t));
                 covered += usize::from(is_covered);
-                assert!(is_covered || !is_inside(t), "{o} {d} {t} {pieces:?}");
+                assert!(is_covered || !is_inside(t), "{o} {d} {t} {segments:?}");
             }
         }
         assert!(covered > 10_000, "{covered}");

@@ -2,7 +2,7 @@
 
 use super::heterogeneous::Heterogeneous;
 use super::homogeneous::Homogeneous;
-use super::track::{Flight, Glimpse, Numbers, Segment};
+use super::track::{EmissionLookup, EmissionLookups, Flight, FlightSampler, Segment};
 use lumiris_numbers::math::{Rgb, Vec3};
 use std::sync::Arc;
 
@@ -63,28 +63,26 @@ impl Medium {
     }
 
     /// A flight along a segment of a path of throughput `beta`: see [`Flight`]. `focus` chooses a point of a light for
-    /// equiangular sampling in homogeneous media. Heterogeneous media look up their emission at the rate of the
-    /// majorant, or `least` (1/m) if that is greater. `weigh` is the MIS weight of a lookup, if another technique also
-    /// samples the emission.
+    /// equiangular sampling in homogeneous media. Heterogeneous media collect their emission by `lookups`.
     #[inline]
     pub fn fly(
         &self,
         segment: &Segment,
         beta: Rgb,
-        numbers: &mut Numbers,
+        numbers: &mut FlightSampler,
         focus: impl FnOnce() -> Option<Vec3>,
-        (least, weigh): (f32, impl Fn(&Glimpse) -> f32),
+        lookups: EmissionLookups<impl Fn(&EmissionLookup) -> f32>,
     ) -> Flight {
         match self {
             Medium::Homogeneous(m) | Medium::Interior(m) => m.fly(segment, beta, numbers.first(), focus),
-            Medium::Heterogeneous(m) => m.fly(segment, beta, numbers, (least, weigh)),
+            Medium::Heterogeneous(m) => m.fly(segment, beta, numbers, lookups),
         }
     }
 
     /// An unbiased estimate of T along a segment: exact in homogeneous media, which need no random numbers; by ratio
     /// tracking [Novák et al. 2014] in heterogeneous ones.
     #[inline]
-    pub fn transmittance(&self, segment: &Segment, numbers: &mut Numbers) -> Rgb {
+    pub fn transmittance(&self, segment: &Segment, numbers: &mut FlightSampler) -> Rgb {
         match self {
             Medium::Homogeneous(m) | Medium::Interior(m) => m.transmittance(segment.length),
             Medium::Heterogeneous(m) => m.transmittance(segment, numbers),

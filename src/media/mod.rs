@@ -24,4 +24,4 @@ pub use heterogeneous::{Field, Heterogeneous};
 pub use homogeneous::Homogeneous;
 pub use medium::{Medium, MediumId, MediumSet, Sides};
 pub use sparse::{Cube, SparseGrid, SparseSamples};
-pub use track::{End, Flight, Glimpse, Numbers, Segment};
+pub use track::{EmissionLookup, EmissionLookups, End, Flight, FlightSampler, Segment};

@@ -32,13 +32,27 @@ pub struct Flight {
 
 /// An emission lookup of a flight through a heterogeneous medium.
 #[derive(Clone, Copy, Debug)]
-pub struct Glimpse {
+pub struct EmissionLookup {
     /// Distance from the origin (m).
     pub t: f32,
     /// The point in the unit cube of the medium.
     pub unit: Vec3,
     /// Rate of the lookups (1/m).
     pub rate: f32,
+}
+
+/// How a flight collects the emission of a heterogeneous medium.
+#[derive(Clone, Copy, Debug)]
+pub struct EmissionLookups<F> {
+    /// Minimum rate of the lookups (1/m); it is otherwise the rate of the majorant.
+    pub min_rate: f32,
+    /// MIS weight of a lookup, if another technique also samples the emission.
+    pub weight: F,
+}
+
+impl EmissionLookups<fn(&EmissionLookup) -> f32> {
+    /// Lookups without weights, at the rate of the majorant.
+    pub const UNWEIGHTED: Self = EmissionLookups { min_rate: 0.0, weight: |_| 1.0 };
 }
 
 /// The end of a flight.
@@ -61,7 +75,7 @@ pub enum End {
 /// The random numbers of a flight. The first ones are well distributed over the samples of a pixel, later ones are
 /// independent.
 #[derive(Clone, Copy, Debug)]
-pub struct Numbers {
+pub struct FlightSampler {
     stream: SampleStream,
     rest: Option<HashStream>,
     /// Number of pairs drawn: one per tentative collision (a lookup of the medium) or end of a line.
@@ -71,13 +85,13 @@ pub struct Numbers {
 /// Domain of the random numbers of later collisions.
 const REST: u32 = 1;
 /// Domain of the offsets of emission lookups.
-const GLIMPSES: u32 = 2;
+const EMISSION_LOOKUPS: u32 = 2;
 
-impl Numbers {
+impl FlightSampler {
     /// The random numbers of a stream.
     #[inline]
     pub fn new(stream: SampleStream) -> Self {
-        Numbers { stream, rest: None, drawn: 0 }
+        FlightSampler { stream, rest: None, drawn: 0 }
     }
 
     /// Four numbers in [0, 1), for flights that need no more.
@@ -89,7 +103,7 @@ impl Numbers {
     /// A number in [0, 1) for the offset of emission lookups.
     #[inline]
     pub fn offset(&self) -> f32 {
-        self.stream.domain(GLIMPSES).draw::<1>()[0]
+        self.stream.domain(EMISSION_LOOKUPS).draw::<1>()[0]
     }
 
     /// Two numbers in [0, 1).

@@ -124,33 +124,40 @@ pub fn trace_importons(job: &RenderJob, settings: &ImportanceSettings) -> Result
     }
 
     // The map
-    let (importons, mut rays) = trace(job, settings.seed ^ SEEDS[0], settings.paths, settings.max_depth, false);
+    let Importons { importons, rays } = trace(job, settings.seed ^ SEEDS[0], settings.paths, settings.max_depth, false);
     let map = PhotonMap::new(importons);
     let search =
         Search::Nearest { count: settings.count.max(2), max_radius: settings.max_radius * job.lights.scene_radius };
 
     // The scale, from the first diffuse surfaces visible to the camera
-    let (seen, test_rays) = trace(job, settings.seed ^ SEEDS[1], settings.test_rays, settings.max_depth, true);
-    rays += test_rays;
-    let of_place = |scratch: &mut GatherScratch, seen: &Photon| density(&map, seen.p(), seen.n(), search, scratch);
-    let mut found: Vec<f32> = seen.par_iter().map_init(GatherScratch::default, of_place).collect();
-    found.retain(|&importance| importance > 0.0 && importance.is_finite());
-    found.sort_by(f32::total_cmp);
-    let index = (settings.quantile.clamp(0.0, 1.0) * found.len() as f32) as usize;
-    let min = found.get(index.min(found.len().saturating_sub(1))).ok_or(PhotonError::CameraSeesNothing)?;
+    let visible = trace(job, settings.seed ^ SEEDS[1], settings.test_rays, settings.max_depth, true);
+    let rays = rays + visible.rays;
+    let importance = |scratch: &mut GatherScratch, at: &Photon| density(&map, at.p(), at.n(), search, scratch);
+    let mut sorted: Vec<f32> = visible.importons.par_iter().map_init(GatherScratch::default, importance).collect();
+    sorted.retain(|&importance| importance > 0.0 && importance.is_finite());
+    sorted.sort_by(f32::total_cmp);
+    let index = (settings.quantile.clamp(0.0, 1.0) * sorted.len() as f32) as usize;
+    let min = sorted.get(index.min(sorted.len().saturating_sub(1))).ok_or(PhotonError::CameraSeesNothing)?;
     Ok(Importance { scale: 1.0 / min, map, search, low_importance: settings.low_importance, rays })
 }
 
 /// Importons at their arrivals: `paths` paths of at most `max_depth` scattering events.
 pub fn importons(job: &RenderJob, seed: u32, paths: u64, max_depth: u32) -> Vec<Photon> {
-    trace(job, seed ^ SEEDS[0], paths, max_depth, false).0
+    trace(job, seed ^ SEEDS[0], paths, max_depth, false).importons
 }
 
-/// Importons at their arrivals, and the number of rays. If `only_first`, only the first hit of each path.
-fn trace(job: &RenderJob, seed: u32, count: u64, max_depth: u32, only_first: bool) -> (Vec<Photon>, u64) {
+/// Importons at their arrivals.
+struct Importons {
+    importons: Vec<Photon>,
+    /// Number of rays.
+    rays: u64,
+}
+
+/// Traces importons. If `only_first`, only the first hit of each path.
+fn trace(job: &RenderJob, seed: u32, count: u64, max_depth: u32, only_first: bool) -> Importons {
     let settings = WalkSettings { transport: Transport::Radiance, max_depth };
     let power = Rgb::splat((1.0 / count as f64) as f32);
-    let batches: Vec<(Vec<Photon>, u64)> = (0..count.div_ceil(BATCH) as usize)
+    let batches: Vec<Importons> = (0..count.div_ceil(BATCH) as usize)
         .into_par_iter()
         .with_max_len(1)
         .map_init(Walker::default, |walker, i| {
@@ -175,11 +182,12 @@ fn trace(job: &RenderJob, seed: u32, count: u64, max_depth: u32, only_first: boo
             if only_first {
                 importons.dedup_by_key(|(index, _)| *index);
             }
-            (importons.into_iter().map(|(_, importon)| importon).collect(), walker.traced)
+            let importons = importons.into_iter().map(|(_, importon)| importon).collect();
+            Importons { importons, rays: walker.traced }
         })
         .collect();
-    let rays = batches.iter().map(|(_, rays)| rays).sum();
-    (batches.into_iter().flat_map(|(importons, _)| importons).collect(), rays)
+    let rays = batches.iter().map(|batch| batch.rays).sum();
+    Importons { importons: batches.into_iter().flat_map(|batch| batch.importons).collect(), rays }
 }
 
 /// An importon that leaves the camera at a random point of the image.

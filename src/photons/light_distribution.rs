@@ -4,6 +4,7 @@
 //! Lights are chosen by inversion, so that with stratified random numbers each light gets its expected number of paths
 //! up to a few.
 
+use crate::lights::sample_columns::ChosenLight;
 use crate::lights::{LightId, LightSet};
 use lumiris_numbers::math::cumulative;
 
@@ -40,15 +41,15 @@ impl LightDistribution {
         Some(LightDistribution { lights: lit.into_iter().map(|(light, _)| light).collect(), cumulative })
     }
 
-    /// A light and its probability, by two random numbers of 24 bits: `u[1]` fills the gaps between the values of
+    /// Chooses a light by two random numbers of 24 bits: `u[1]` fills the gaps between the values of
     /// `u[0]`, which exceed the probabilities if there are many lights.
     #[inline]
-    pub fn sample(&self, u: [f32; 2]) -> (LightId, f32) {
+    pub fn sample(&self, u: [f32; 2]) -> ChosenLight {
         const STEPS: f64 = 16_777_216.0;
         let u = ((f64::from(u[0]) * STEPS).floor() + f64::from(u[1])) / STEPS;
         let last = self.lights.len() - 1;
         let i = cumulative::find(&self.cumulative, u * self.cumulative[last]).min(last);
-        (self.lights[i], self.pmf_at(i))
+        ChosenLight { light: self.lights[i], pmf: self.pmf_at(i) }
     }
 
     /// Probability of a light; 0 if it has no emission.
@@ -65,14 +66,14 @@ impl LightDistribution {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::lights::{Light, LightSetBuilder};
+    use crate::lights::{Light, LightSetBuilder, PointLight};
     use lumiris_numbers::math::{Bounds3, Rgb, Vec3};
     use lumiris_numbers::samplers::{SampleStream, SamplerKind};
 
     fn points(intensities: &[f32]) -> LightSet {
         let mut builder = LightSetBuilder::default();
         for &i in intensities {
-            builder.add(Light::Point { p: Vec3::ZERO, intensity: Rgb::splat(i) });
+            builder.add(Light::Point(PointLight { p: Vec3::ZERO, intensity: Rgb::splat(i) }));
         }
         builder.build(&Bounds3 { min: Vec3::ZERO, max: Vec3::ONE })
     }
@@ -95,7 +96,7 @@ mod tests {
         let count = 1 << 16;
         let mut counts = vec![0.0_f64; intensities.len()];
         for i in 0..count {
-            let (light, pmf) =
+            let ChosenLight { light, pmf } =
                 light_distribution.sample(SampleStream::new(SamplerKind::Sobol, [0, 0], i, 5).draw::<2>());
             assert_eq!(pmf, light_distribution.pmf(light));
             counts[light as usize] += 1.0;

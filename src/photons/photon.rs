@@ -65,7 +65,7 @@ impl Photon {
     /// surface on the side of `wi`, unit. `power` (W) is not negative; NaN counts as 0.
     #[inline]
     pub fn new(p: Vec3, wi: Vec3, n: Vec3, power: Rgb, origin: Origin) -> Self {
-        let (exponent, [r, g, b]) = pack_power(power);
+        let PackedPower { exponent, mantissas: [r, g, b] } = pack_power(power);
         Photon {
             p: p.to_array(),
             wi: pack_unit(wi) | exponent << PACKED_BITS,
@@ -105,7 +105,7 @@ impl Photon {
     /// Scales the power by `factor`.
     #[must_use]
     pub fn scaled(&self, factor: f32) -> Self {
-        let (exponent, [r, g, b]) = pack_power(self.power() * factor);
+        let PackedPower { exponent, mantissas: [r, g, b] } = pack_power(self.power() * factor);
         let mask = (1 << PACKED_BITS) - 1;
         Photon {
             p: self.p,
@@ -142,19 +142,25 @@ fn power_of_two(e: i32) -> f64 {
     f64::from_bits(((1023 + e) as u64) << 52)
 }
 
-/// The f32 exponent of the largest channel, and the mantissas; powers below the smallest normal number are 0.
+/// A power with a common exponent: the f32 exponent of the largest channel.
+struct PackedPower {
+    exponent: u32,
+    mantissas: [u32; 3],
+}
+
+/// Packs a power; powers below the smallest normal number are 0.
 #[inline]
-fn pack_power(power: Rgb) -> (u32, [u32; 3]) {
+fn pack_power(power: Rgb) -> PackedPower {
     let power = power.map(|c| c.clamp(0.0, f32::MAX)).to_array().map(|c| if c.is_nan() { 0.0 } else { c });
     let largest = power[0].max(power[1]).max(power[2]);
     let exponent = largest.to_bits() >> 23;
     if exponent == 0 {
-        return (0, [0; 3]);
+        return PackedPower { exponent: 0, mantissas: [0; 3] };
     }
     // largest is in [2^(e − 1), 2^e), e = exponent − 126; values that round up to 2^e are clamped
     let scale = power_of_two(MANTISSA_BITS as i32 + 126 - exponent as i32);
     let mantissa = |c: f32| ((f64::from(c) * scale + 0.5) as u32).min((1 << MANTISSA_BITS) - 1);
-    (exponent, power.map(mantissa))
+    PackedPower { exponent, mantissas: power.map(mantissa) }
 }
 
 #[inline]

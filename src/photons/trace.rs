@@ -18,6 +18,7 @@ use super::photon::{Origin, Photon};
 use super::walk::{Particle, ParticleHit, WalkSettings, Walker};
 use crate::bsdfs::dielectric::Transport;
 use crate::lights::LightSet;
+use crate::lights::sample_columns::ChosenLight;
 use crate::scene::RenderJob;
 use lumiris_numbers::math::Ray;
 use lumiris_numbers::math::hash::pcg4d;
@@ -314,10 +315,9 @@ impl<'a> Run<'a> {
     fn emit(&self, index: u32, path: u64) -> Option<Particle> {
         let scene = &self.job.world.scene;
         let stream = path_stream(self.tracing.seed, path);
-        let (light, pmf) = self.light_distribution.sample(stream.domain(domain::LIGHT).draw::<2>());
+        let ChosenLight { light, pmf } = self.light_distribution.sample(stream.domain(domain::LIGHT).draw::<2>());
         let [p0, p1, d0, d1] = stream.domain(domain::EMISSION).draw::<4>();
-        let sphere = (scene.lights.scene_centre, scene.lights.scene_radius);
-        let s = scene.lights.lights[light as usize].sample_le(sphere, [p0, p1], [d0, d1])?;
+        let s = scene.lights.lights[light as usize].sample_le(scene.lights.scene_sphere(), [p0, p1], [d0, d1])?;
         let o = if s.n == glam::Vec3::ZERO { s.p } else { offset_origin(s.p, s.p_error, s.n, s.d) };
         let [u_time] = stream.domain(domain::TIME).draw::<1>();
         let ray = Ray { o, d: s.d, t_max: f32::INFINITY, time: u_time };
@@ -333,6 +333,7 @@ impl<'a> Run<'a> {
         fills_global: bool,
         scratch: &mut GatherScratch,
     ) {
+        // The map, by the last scattering event
         let particle = hit.particle;
         let deposits = match particle.origin {
             Origin::Caustic => &mut batch.caustic,
@@ -343,6 +344,8 @@ impl<'a> Run<'a> {
             }
             Origin::Primary(_) | Origin::Diffuse => &mut batch.global,
         };
+
+        // Russian roulette by visual importance
         let p = self.importance.map_or(1.0, |importance| importance.probability(hit.p, hit.n, scratch));
         if hit.xi() < p {
             let power = particle.power * (1.0 / p);

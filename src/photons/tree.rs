@@ -65,6 +65,7 @@ impl Tree {
     /// `offset`: vector from `p` to the nearest point of the node's cell.
     fn visit_node(&self, node: usize, p: Vec3, offset: Vec3, visitor: &mut impl Visit) {
         let Node { value, kind } = self.nodes[node];
+        // Photons of a leaf
         if kind & 3 == IS_LEAF {
             let begin = value as usize;
             for (i, photon) in (begin..).zip(&self.photons[begin..begin + (kind >> 2) as usize]) {
@@ -76,6 +77,8 @@ impl Tree {
             }
             return;
         }
+
+        // The child on the side of `p`, then the other if it is near enough
         let axis = (kind & 3) as usize;
         let across = f32::from_bits(value) - p[axis];
         let (first, second) = (node + 1, node + (kind >> 2) as usize);

@@ -111,7 +111,7 @@ impl Walker {
         for vertex in 0..=settings.max_depth {
             self.next.clear();
             while !self.active.is_empty() {
-                self.step(job, settings, (vertex, coherence), &mut on_hit);
+                self.step(job, settings, vertex, coherence, &mut on_hit);
                 coherence = Coherence::Incoherent;
             }
             std::mem::swap(&mut self.active, &mut self.next);
@@ -138,7 +138,8 @@ impl Walker {
         &mut self,
         job: &RenderJob,
         settings: &WalkSettings,
-        (vertex, coherence): (u32, Coherence),
+        vertex: u32,
+        coherence: Coherence,
         on_hit: &mut impl FnMut(&ParticleHit<'_>),
     ) {
         self.rays.clear();
@@ -202,12 +203,19 @@ struct Scattering<'a> {
     proposals: u32,
 }
 
+/// The part of a BSDF that scatters a particle.
+struct ChosenPart {
+    /// Its f over the probability of the choice.
+    f: Rgb,
+    origin: Origin,
+}
+
 impl Scattering<'_> {
     /// The particle after the scattering event; `None` if it ends there.
     fn scatter(&self, particle: &Particle, transport: Transport) -> Option<Particle> {
         let drawn = self.draw()?;
         let (wo, wi) = (self.interaction.wo, drawn.wi);
-        let (f, origin) = self.of_part(&drawn);
+        let ChosenPart { f, origin } = self.choose_part(&drawn);
 
         // Weight
         let cosine = match transport {
@@ -247,20 +255,21 @@ impl Scattering<'_> {
         Some(Resampled { f: s.f, wi: s.wi, weight: 1.0 / s.pdf, lobe: s.lobe, eta: s.eta })
     }
 
-    /// The f of the chosen part over the probability of the choice, and the resulting origin.
-    fn of_part(&self, drawn: &Resampled) -> (Rgb, Origin) {
-        let Some(part) = self.part else { return (drawn.f, Origin::Caustic) };
-        let Some(rest) = part.rest else { return (drawn.f, Origin::Diffuse) };
+    /// Chooses the Lambertian part or the rest.
+    fn choose_part(&self, drawn: &Resampled) -> ChosenPart {
+        let Some(part) = self.part else { return ChosenPart { f: drawn.f, origin: Origin::Caustic } };
+        let Some(rest) = part.rest else { return ChosenPart { f: drawn.f, origin: Origin::Diffuse } };
         if drawn.lobe.is_specular() {
-            return (drawn.f, Origin::Caustic);
+            return ChosenPart { f: drawn.f, origin: Origin::Caustic };
         }
         let rest = SurfaceBsdf { bsdf: rest, ..*self.bsdf };
         let f_rest = rest.f(self.interaction.wo, drawn.wi);
         let p_rest = (f_rest.average() / drawn.f.average()).clamp(0.0, 1.0);
         if self.stream.draw_random(domain::PART) < p_rest {
-            (f_rest / p_rest, Origin::Caustic)
+            ChosenPart { f: f_rest / p_rest, origin: Origin::Caustic }
         } else {
-            ((drawn.f - f_rest).map(|c| c.max(0.0)) / (1.0 - p_rest), Origin::Diffuse)
+            let f = (drawn.f - f_rest).map(|c| c.max(0.0)) / (1.0 - p_rest);
+            ChosenPart { f, origin: Origin::Diffuse }
         }
     }
 }

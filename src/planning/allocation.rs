@@ -17,12 +17,12 @@
 //!
 //! The counts depend on scene, settings and seed only. Costs are counted in rays and proposals, not in seconds.
 
-use super::allocation_counts::{ALONE, Pixel, Rules, SHARED, Share, counts};
+use super::allocation_counts::{ALONE, Pixel, PixelCounts, Rules, SHARED, Share, counts};
 use super::constants::{
     COST_TILE, EDGE_FACTOR, EDGE_RATIO, EMISSION_DIVISOR, EMISSION_RADIUS, EMISSION_RAY_COST, EMISSION_SPP, FEW_PIXELS,
     MAX_SPP_FOR_NOISE, PILOT_SPP, TILES_AT_ONCE,
 };
-use super::noise::counts_for;
+use super::noise_target::counts_for;
 use super::preparation::{PlanError, Preparation, Stage};
 use super::probe::{LeftToLightPaths, Probe, around};
 use crate::direct::Estimator;
@@ -55,10 +55,10 @@ pub(super) fn allocate(job: &RenderJob, how: &Preparation<'_>) -> Result<Option<
     let mut pilot = Pilot::new(job, how);
     let spp = settings.sampling.spp;
     pilot.measure();
-    let (counts, emission_rays) = counts(&pilot.estimates(|_| true, &[0, 1]), &pilot.rules, spp);
+    let PixelCounts { samples, emission_rays } = counts(&pilot.estimates(|_| true, &[0, 1]), &pilot.rules, spp);
     let is_better = pilot.gain(spp) >= pilot.rules.min_gain;
     how.goes_on()?;
-    Ok(is_better.then_some(PixelSamples { bounds: pilot.bounds, spp, counts, emission_rays }))
+    Ok(is_better.then_some(PixelSamples { bounds: pilot.bounds, spp, counts: samples, emission_rays }))
 }
 
 /// Completes settings with a target noise: sets the maximum number of samples per pixel unless `has_spp`. `Err` names
@@ -90,7 +90,7 @@ pub(super) fn may_split(settings: &Settings, of_paths: &IntegratorSettings) -> b
 
 /// Statistics of the pilot's samples of a pixel. Compact, because a pilot holds all pixels of an image at once.
 #[derive(Clone, Copy, Debug, Default)]
-struct Measured {
+struct PixelStatistics {
     count: u32,
     /// Σ of the samples without visible emission.
     radiance: [f32; 3],
@@ -110,11 +110,11 @@ struct Measured {
 /// The material of pixels without a surface.
 const NO_MATERIAL: u32 = u32::MAX;
 
-impl Measured {
+impl PixelStatistics {
     fn of(samples: &PixelAccumulator, emission: &EmissionSums, [cost, ray_cost]: [f64; 2]) -> Self {
         let sums = samples.sums();
         let [a, b] = emission.sets.each_ref().map(PixelAccumulator::sums);
-        Measured {
+        PixelStatistics {
             count: sums.count as u32,
             radiance: sums.radiance.map(|x| x as f32),
             variance: variance(&sums).map(|v| v as f32),
@@ -162,7 +162,7 @@ struct Pilot<'a> {
     left: LeftToLightPaths,
     bounds: PixelBounds,
     /// Row by row.
-    pixels: Vec<Measured>,
+    pixels: Vec<PixelStatistics>,
 }
 
 #[derive(Clone, Copy)]
@@ -193,8 +193,8 @@ impl<'a> Pilot<'a> {
             emission: (sampling.pilot_spp() / EMISSION_DIVISOR).clamp(EMISSION_SPP[0], EMISSION_SPP[1]),
         };
         let bounds = job.world.scene.film.bounds;
-        let pixels = vec![Measured::default(); bounds.area()];
-        let stage = Stage::new(how, "measuring where the noise is", bounds.tiles(COST_TILE).len());
+        let pixels = vec![PixelStatistics::default(); bounds.area()];
+        let stage = Stage::new(how, "measuring the noise of each pixel", bounds.tiles(COST_TILE).len());
         Pilot { job, stage, stop: how.stop, sampling, rules, left: LeftToLightPaths::new(job, how), bounds, pixels }
     }
 
@@ -275,7 +275,7 @@ impl<'a> Pilot<'a> {
             self.pixels.iter().filter(|p| p.cost > 0.0).fold((0.0, 0), |(sum, n), p| (sum + f64::from(p.cost), n + 1));
         let mean = (sum / f64::from(count.max(1))) as f32;
         let of_pixel = |(i, [sum, count]): (usize, [f64; 2])| {
-            let Measured { cost, ray_cost, .. } = self.pixels[i];
+            let PixelStatistics { cost, ray_cost, .. } = self.pixels[i];
             let cost = if cost == 0.0 && ray_cost > 0.0 { mean } else { cost };
             let rest = (sum.max(0.0) / count.max(1.0)) as f32;
             Pixel { rest, emission: self.emission_variance_around(i, sets) as f32, cost, ray_cost }
@@ -295,7 +295,7 @@ impl<'a> Pilot<'a> {
         }
         let mean = all[0] / all[1].max(1.0);
         let with_mean = |[sum, count]: [f64; 2]| [sum + FEW_PIXELS * mean, count + FEW_PIXELS];
-        let of = |pixel: &Measured| with_mean(of_material.get(&pixel.material).copied().unwrap_or_default());
+        let of = |pixel: &PixelStatistics| with_mean(of_material.get(&pixel.material).copied().unwrap_or_default());
         self.pixels.iter().map(of).collect()
     }
 
@@ -326,16 +326,16 @@ impl<'a> Pilot<'a> {
         // Counts from even pixels and the first set
         let width = self.bounds.width() as usize;
         let is_even = |i: usize| (i % width + i / width).is_multiple_of(2);
-        let (counts, emission_rays) = counts(&self.estimates(is_even, &[0]), &self.rules, spp);
+        let PixelCounts { samples, emission_rays } = counts(&self.estimates(is_even, &[0]), &self.rules, spp);
 
         // Errors and costs of odd pixels by the second set, uniform and adaptive
         let (mut uniform, mut adaptive) = ([0.0; 3], [0.0; 3]);
-        for i in (0..counts.len()).filter(|&i| !is_even(i)) {
+        for i in (0..samples.len()).filter(|&i| !is_even(i)) {
             let Some(relative) = self.relative_variance(i) else { continue };
             let p = &self.pixels[i];
             let [rest, emission] =
                 [p.variance, p.emission_variance[1]].map(|v| v.iter().map(|v| f64::from(*v)).sum::<f64>());
-            let share = Share { samples: f64::from(counts[i]) / f64::from(spp), emission_rays: emission_rays[i] };
+            let share = Share { samples: f64::from(samples[i]) / f64::from(spp), emission_rays: emission_rays[i] };
             for (sums, share) in [(&mut uniform, Share::ONE), (&mut adaptive, share)] {
                 let pixel = |rest: f64, emission: f64| Pixel {
                     rest: rest as f32,
@@ -389,7 +389,7 @@ fn pilot_tile(
     probe: &mut Probe<'_>,
     tile: &PixelBounds,
     PilotSampling { spp, fraction, seed, edge, emission: emission_spp }: PilotSampling,
-) -> Vec<Measured> {
+) -> Vec<PixelStatistics> {
     // Choose blocks of pixels
     let settings = &Estimator::without_fits(&job.settings().integrator, 0);
     let origin = job.world.scene.film.bounds;
@@ -420,7 +420,7 @@ fn pilot_tile(
     let emission_rays: u64 =
         emission.iter().flat_map(|emission| &emission.sets).map(|sums| u64::from(sums.radiance.count)).sum();
     let costs = [cost, EMISSION_RAY_COST * probe.take_cost(emission_rays as usize)];
-    sums.iter().zip(&emission).map(|(samples, emission)| Measured::of(samples, emission, costs)).collect()
+    sums.iter().zip(&emission).map(|(samples, emission)| PixelStatistics::of(samples, emission, costs)).collect()
 }
 
 /// Two sets of emission rays, of pixels in rows of the given width. Pixels whose neighbours differ get more of them.

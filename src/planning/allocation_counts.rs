@@ -102,10 +102,18 @@ impl Share {
     }
 }
 
-/// Samples per pixel, and emission rays per sample. Minimises the error at the cost of `spp` samples everywhere. With
+/// Counts for all pixels.
+pub(super) struct PixelCounts {
+    /// Samples per pixel.
+    pub(super) samples: Vec<u32>,
+    /// Emission rays per sample.
+    pub(super) emission_rays: Vec<u8>,
+}
+
+/// Computes the counts. Minimises the error at the cost of `spp` samples everywhere. With
 /// [`Rules::doubles`], counts are 1, 2, 4 or 8 times `spp`, and minimise error × cost of the image. Pixels of cost 0,
 /// without estimates, are not counted.
-pub(super) fn counts(pixels: &[Pixel], rules: &Rules, spp: u32) -> (Vec<u32>, Vec<u8>) {
+pub(super) fn counts(pixels: &[Pixel], rules: &Rules, spp: u32) -> PixelCounts {
     let sums = |rate: f64| -> [f64; 2] {
         let of_chunk = |pixels: &[Pixel]| {
             pixels.iter().filter(|pixel| pixel.cost > 0.0).fold([0.0; 2], |sum, pixel| {
@@ -137,7 +145,8 @@ pub(super) fn counts(pixels: &[Pixel], rules: &Rules, spp: u32) -> (Vec<u32>, Ve
         let Share { samples, emission_rays } = Share::best(pixel, rate, rules);
         (((samples * f64::from(spp)).round() as u32).max(1), emission_rays)
     };
-    pixels.par_iter().map(share).unzip()
+    let (samples, emission_rays) = pixels.par_iter().map(share).unzip();
+    PixelCounts { samples, emission_rays }
 }
 
 #[cfg(test)]
@@ -153,14 +162,14 @@ mod tests {
 
     /// Sample counts of pixels without visible emission.
     fn numbers(variances: &[f32], costs: &[f32], rules: &Rules, spp: u32) -> Vec<u32> {
-        let (counts, emission_rays) = counts(&pixels(variances, costs), rules, spp);
+        let PixelCounts { samples, emission_rays } = counts(&pixels(variances, costs), rules, spp);
         assert!(emission_rays.iter().all(|n| *n == 1));
-        counts
+        samples
     }
 
     /// Error and cost of pixels with the computed counts.
-    fn error_and_cost(pixels: &[Pixel], (counts, emission_rays): &(Vec<u32>, Vec<u8>), spp: u32) -> [f64; 2] {
-        let all = pixels.iter().zip(counts.iter().zip(emission_rays));
+    fn error_and_cost(pixels: &[Pixel], PixelCounts { samples, emission_rays }: &PixelCounts, spp: u32) -> [f64; 2] {
+        let all = pixels.iter().zip(samples.iter().zip(emission_rays));
         all.fold([0.0; 2], |sum, (pixel, (&n, &emission_rays))| {
             let [error, cost] = Share { samples: f64::from(n) / f64::from(spp), emission_rays }.of(pixel);
             [sum[0] + error, sum[1] + cost]
@@ -204,7 +213,7 @@ mod tests {
         let all: Vec<Pixel> = (0..1000).map(pixel).collect();
         for rules in [ALONE, SHARED] {
             let given = counts(&all, &rules, 64);
-            let (edge, other) = ((given.0[0], given.1[0]), (given.0[1], given.1[1]));
+            let [edge, other] = [0, 1].map(|i| (given.samples[i], given.emission_rays[i]));
             assert_eq!(other.1, 1);
             // √(s c/(r c_look)) if neither count is at a limit
             assert!((50..64).contains(&edge.1), "{edge:?} {other:?}");
@@ -218,16 +227,17 @@ mod tests {
             // Much better than samples alone, and better than half or twice as many emission rays
             let alone: Vec<Pixel> =
                 all.iter().map(|p| Pixel { rest: p.rest + p.emission, emission: 0.0, ..*p }).collect();
-            let loss = |given: &(Vec<u32>, Vec<u8>)| error_and_cost(&all, given, 64).iter().product::<f64>();
+            let loss = |given: &PixelCounts| error_and_cost(&all, given, 64).iter().product::<f64>();
             assert!(loss(&given) < 0.65 * loss(&counts(&alone, &rules, 64)));
             for emission_rays in [edge.1 / 2, 2 * edge.1] {
-                let changed = given.1.iter().map(|&n| if n > 1 { emission_rays } else { 1 }).collect();
-                assert!(loss(&given) <= 1.001 * loss(&(given.0.clone(), changed)), "{emission_rays}");
+                let changed = given.emission_rays.iter().map(|&n| if n > 1 { emission_rays } else { 1 }).collect();
+                let changed = PixelCounts { samples: given.samples.clone(), emission_rays: changed };
+                assert!(loss(&given) <= 1.001 * loss(&changed), "{emission_rays}");
             }
         }
         // If the rest varies as much, few additional emission rays are worth their cost
         let still: Vec<Pixel> = all.iter().map(|p| Pixel { rest: 400.0, ..*p }).collect();
-        assert!(counts(&still, &ALONE, 64).1.iter().all(|n| *n <= 3));
+        assert!(counts(&still, &ALONE, 64).emission_rays.iter().all(|n| *n <= 3));
     }
 
     #[test]
@@ -237,9 +247,9 @@ mod tests {
             let [rest, emission] = [1, 9].map(|by| 0.1 * power_of_two(i, by).exp2());
             Pixel { rest, emission: 4.0 * emission, cost: 20.0, ray_cost: 2.0 }
         };
-        let (numbers, emission_rays) = counts(&(0..810).map(pixel).collect::<Vec<_>>(), &ALONE, 64);
+        let PixelCounts { samples, emission_rays } = counts(&(0..810).map(pixel).collect::<Vec<_>>(), &ALONE, 64);
         assert!(emission_rays.iter().any(|n| *n > 2));
-        assert!(numbers.iter().zip(&emission_rays).all(|(&n, &emission_rays)| emission_rays == 1 || n >= 64));
+        assert!(samples.iter().zip(&emission_rays).all(|(&n, &emission_rays)| emission_rays == 1 || n >= 64));
     }
 
     #[test]
@@ -250,8 +260,8 @@ mod tests {
         for rules in [ALONE, SHARED] {
             let alone = counts(&some, &rules, 64);
             let beside: Vec<Pixel> = some.iter().copied().chain(vec![Pixel::default(); 600]).collect();
-            let (numbers, emission_rays) = counts(&beside, &rules, 64);
-            assert_eq!((&numbers[..300], &emission_rays[..300]), (&alone.0[..], &alone.1[..]));
+            let PixelCounts { samples: numbers, emission_rays } = counts(&beside, &rules, 64);
+            assert_eq!((&numbers[..300], &emission_rays[..300]), (&alone.samples[..], &alone.emission_rays[..]));
         }
     }
 
@@ -272,7 +282,10 @@ mod tests {
         let weights: Vec<f32> = (0..1000).map(weight).collect();
         let counts = numbers(&weights, &[2.0; 1000], &SHARED, 12);
         let all = pixels(&weights, &[2.0; 1000]);
-        let loss = |counts: &[u32]| error_and_cost(&all, &(counts.to_vec(), vec![1; 1000]), 12).iter().product::<f64>();
+        let loss = |samples: &[u32]| {
+            let counts = PixelCounts { samples: samples.to_vec(), emission_rays: vec![1; 1000] };
+            error_and_cost(&all, &counts, 12).iter().product::<f64>()
+        };
         assert_eq!(counts[7], 96);
         assert!(
             counts

@@ -2,7 +2,7 @@
 
 /// Sample counts of paths, and the size of the blocks that share them.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Numbers {
+pub(super) struct PathSamples {
     /// Samples of direct light at the first vertex.
     pub(super) first: u32,
     /// Samples of direct light at later vertices.
@@ -21,11 +21,11 @@ pub(super) const LIGHT_SAMPLES: u32 = 4;
 /// Samples per estimate if only direct light is rendered.
 pub(super) const DIRECT_SAMPLES: u32 = 8;
 /// Sample counts of shared paths with few bounces, indoors and outdoors.
-pub(super) const INDOORS: Numbers = Numbers { first: 4, later: 3, edge: 6 };
-pub(super) const OUTDOORS: Numbers = Numbers { first: 6, later: 3, edge: 4 };
+pub(super) const INDOORS: PathSamples = PathSamples { first: 4, later: 3, edge: 6 };
+pub(super) const OUTDOORS: PathSamples = PathSamples { first: 6, later: 3, edge: 4 };
 /// Sample counts of longer shared paths, and of paths that are not shared.
-pub(super) const LONG: Numbers = Numbers { first: 3, later: 2, edge: 4 };
-pub(super) const UNSHARED: Numbers = Numbers { first: 8, later: 2, edge: 1 };
+pub(super) const LONG: PathSamples = PathSamples { first: 3, later: 2, edge: 4 };
+pub(super) const UNSHARED: PathSamples = PathSamples { first: 8, later: 2, edge: 1 };
 /// Fraction of BSDF samples at first vertices where paths are not shared, mostly on surfaces that are not diffuse.
 pub(super) const GLOSSY_BSDF: f32 = 0.375;
 /// Maximum bounces of paths without Russian roulette.

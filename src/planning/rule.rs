@@ -21,7 +21,7 @@ use super::constants::{
 use super::facts::Facts;
 use super::visibility_cache::{build_visibility_cache, visible_points};
 use crate::integrators::exclusions::{self, Feature};
-use crate::lights::{LightCtx, LightId};
+use crate::lights::{LightCtx, PhotonCount, SurfacePoint};
 use crate::scene::RenderJob;
 use crate::settings::{Allocation, ContributingSettings, EstimatorKind, IntegratorKind, IntegratorSettings, Settings};
 use std::collections::BTreeSet;
@@ -40,14 +40,14 @@ pub(super) fn apply(job: &mut RenderJob) -> Option<Facts> {
     if !matches!(base.kind, IntegratorKind::Direct | IntegratorKind::Path) {
         return None;
     }
-    // Glowing media are lights only if the path continues by the one BSDF sample
-    if job.lights.find_glows() && base.bsdf_fraction.is_none() {
+    // Emitting media are lights only if the path continues by the one BSDF sample
+    if job.lights.samples_volumes() && base.bsdf_fraction.is_none() {
         job.change(|s| s.integrator.bsdf_fraction = Some(0.0));
     }
     let facts = Facts::of(job);
     let shares = sampling.allocation == Allocation::Auto && exclusions::allows(job, Feature::Sharing);
-    job.change(|s| s.integrator = with_numbers(&s.integrator, &facts, shares));
-    if facts.lights >= MANY_LIGHTS && !job.lights.find_glows() {
+    job.change(|s| s.integrator = with_samples(&s.integrator, &facts, shares));
+    if facts.lights >= MANY_LIGHTS && !job.lights.samples_volumes() {
         choose_contributing(job, &facts);
     }
     if base.light_paths.is_none()
@@ -60,7 +60,7 @@ pub(super) fn apply(job: &mut RenderJob) -> Option<Facts> {
 }
 
 /// `mis` with the sample counts for a scene with these facts, where they are open.
-fn with_numbers(settings: &IntegratorSettings, facts: &Facts, shares: bool) -> IntegratorSettings {
+fn with_samples(settings: &IntegratorSettings, facts: &Facts, shares: bool) -> IntegratorSettings {
     let mut s = *settings;
     let is_mixed = facts.lights > 1 && facts.sky > 0.0 && facts.sky < 1.0;
     if is_mixed && s.infinite_fraction.is_none() {
@@ -74,19 +74,19 @@ fn with_numbers(settings: &IntegratorSettings, facts: &Facts, shares: bool) -> I
     let has_pairs = facts.diffuse_pairs >= MIN_PAIRS;
     let is_long = s.depth() > FEW_BOUNCES;
     let is_outdoors = facts.sky > 0.0 && facts.open >= OPEN;
-    let numbers = match (shares && has_pairs, is_long, is_outdoors) {
+    let chosen = match (shares && has_pairs, is_long, is_outdoors) {
         (false, ..) => UNSHARED,
         (true, true, _) => LONG,
         (true, false, true) => OUTDOORS,
         (true, false, false) => INDOORS,
     };
     // The path continues by the one BSDF sample of later vertices
-    if numbers == UNSHARED && s.samples.is_none() && s.later_samples.is_none() {
+    if chosen == UNSHARED && s.samples.is_none() && s.later_samples.is_none() {
         s.bsdf_fraction = s.bsdf_fraction.or(Some(GLOSSY_BSDF));
     }
-    s.samples = s.samples.or(Some(numbers.first));
-    s.later_samples = s.later_samples.or(Some(numbers.later));
-    s.path_reuse = s.path_reuse.or(Some(numbers.edge));
+    s.samples = s.samples.or(Some(chosen.first));
+    s.later_samples = s.later_samples.or(Some(chosen.later));
+    s.path_reuse = s.path_reuse.or(Some(chosen.edge));
     // A shared path serves many pixels, so roulette does not pay
     let is_default = s.roulette_depth == IntegratorSettings::default().roulette_depth;
     if s.path_reuse.is_some_and(|edge| edge > 1) && !is_long && is_default {
@@ -103,18 +103,23 @@ fn choose_contributing(job: &mut RenderJob, facts: &Facts) {
     if s.leaves_lights_out() || exclusions::refusal(job, &s).is_some() {
         return;
     }
-    let Some((cache, _)) = build_visibility_cache(job) else { return };
+
+    // Photons that come straight from lights
+    let Some(cache) = build_visibility_cache(job) else { return };
     job.lights.set_visibility_cache(Some(cache));
     let points = visible_points(job);
+
     // Some triangles of a lamp face away from any point, so lamps are counted instead of triangles
     let sources = job.world.scene.lights.sources();
-    let lamp = |&(light, _): &(LightId, u32)| sources[light as usize].map_or((1, light), |source| (0, source));
-    let found = |&(p, n): &_| {
+    let lamp = |&PhotonCount { light, .. }: &_| sources[light as usize].map_or((1, light), |source| (0, source));
+    let count = |&SurfacePoint { p, n }: &_| {
         let contributing = job.lights.contributing_lights(&LightCtx::on(p, n));
         contributing.lights.iter().map(lamp).collect::<BTreeSet<_>>().len()
     };
-    let visible = points.iter().map(found).sum::<usize>() as f64;
+    let visible = points.iter().map(count).sum::<usize>() as f64;
     let all = (points.len() * facts.lights) as f64;
+
+    // Keep the cache if most lights are hidden
     if points.is_empty() || 1.0 - visible / all < MOST_HIDDEN {
         job.lights.set_visibility_cache(None);
         return;

@@ -35,7 +35,7 @@ pub(super) struct Trials {
 /// Result of a trial: CPU time per camera sample (ns), and sums of |d| and d² over the pixels of each cell. d is the
 /// difference of the two images.
 #[derive(Clone, Debug)]
-pub(super) struct Measured {
+pub(super) struct TrialResult {
     pub(super) nanoseconds: f64,
     of_cells: Vec<[f64; 2]>,
     /// True if the error is the squared mean of |d|: direct light, whose adaptive samples follow the noise.
@@ -56,8 +56,8 @@ impl Trials {
         Trials { cells, spp, seeds, left: LeftToLightPaths::new(job, how), scales: Vec::new(), emission: Vec::new() }
     }
 
-    /// Measures the settings of the job on the threads of the current pool.
-    pub(super) fn measure(&mut self, job: &RenderJob) -> Measured {
+    /// Renders with the settings of the job on the threads of the current pool.
+    pub(super) fn measure(&mut self, job: &RenderJob) -> TrialResult {
         // Light that is left to light paths
         let Settings { integrator: settings, .. } = job.settings();
         let knows_light = light_paths::per_sample(job) > 0.0;
@@ -110,7 +110,7 @@ impl Trials {
         // Divide the CPU time by the number of samples
         let samples = self.cells.iter().map(Vec::len).sum::<usize>() as f64 * f64::from(2 * self.spp);
         let seconds: f64 = images.iter().map(|(_, seconds)| seconds).sum();
-        Measured {
+        TrialResult {
             nanoseconds: seconds * 1e9 / samples.max(1.0),
             of_cells: (0..images.len()).map(sums).collect(),
             by_deviations: settings.depth() <= 1,
@@ -129,7 +129,15 @@ impl Trials {
     }
 }
 
-impl Measured {
+/// Logarithm of a relative efficiency.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct LogGain {
+    pub(super) value: f64,
+    /// Its standard error.
+    pub(super) error: f64,
+}
+
+impl TrialResult {
     /// Relative error of an image up to a constant factor, by all cells except `without`. It is the squared mean of
     /// |d|, or its geometric mean with the mean of d², because adaptive sampling follows the noise.
     fn error(&self, without: Option<usize>) -> f64 {
@@ -141,8 +149,8 @@ impl Measured {
         if self.by_deviations { squared } else { (squared * variance).sqrt() }
     }
 
-    /// Logarithm of the efficiency relative to `other`, and its standard error.
-    pub(super) fn gain_over(&self, other: &Measured) -> (f64, f64) {
+    /// The efficiency relative to `other`.
+    pub(super) fn gain_over(&self, other: &TrialResult) -> LogGain {
         let gain =
             |without| (other.error(without) * other.nanoseconds).ln() - (self.error(without) * self.nanoseconds).ln();
         let all: f64 = gain(None);
@@ -151,13 +159,13 @@ impl Measured {
         let mean = left_out.iter().sum::<f64>() / n.max(1) as f64;
         let variance =
             left_out.iter().map(|g| (g - mean).powi(2)).sum::<f64>() * (n.max(1) - 1) as f64 / n.max(1) as f64;
-        (if all.is_finite() { all } else { 0.0 }, variance.sqrt())
+        LogGain { value: if all.is_finite() { all } else { 0.0 }, error: variance.sqrt() }
     }
 
     /// True if the gain is significant.
-    pub(super) fn is_better_than(&self, other: &Measured) -> bool {
-        let (gain, error) = self.gain_over(other);
-        gain > MIN_GAIN.ln().max(MIN_ERRORS * error)
+    pub(super) fn is_better_than(&self, other: &TrialResult) -> bool {
+        let LogGain { value, error } = self.gain_over(other);
+        value > MIN_GAIN.ln().max(MIN_ERRORS * error)
     }
 }
 
@@ -165,19 +173,19 @@ impl Measured {
 mod tests {
     use super::*;
 
-    fn measured(nanoseconds: f64, deviations: impl Fn(usize) -> f64) -> Measured {
+    fn measured(nanoseconds: f64, deviations: impl Fn(usize) -> f64) -> TrialResult {
         let of_cell = |i: usize| {
             let d = deviations(i);
             [d * f64::from(3 * CELL * CELL), d * d * f64::from(3 * CELL * CELL)]
         };
-        Measured { nanoseconds, of_cells: (0..24).map(of_cell).collect(), by_deviations: false }
+        TrialResult { nanoseconds, of_cells: (0..24).map(of_cell).collect(), by_deviations: false }
     }
 
     #[test]
     fn half_the_deviation_in_twice_the_time_is_twice_as_efficient() {
         let noise = |i: usize| 1.0 + 0.1 * (i % 5) as f64;
         let (one, other) = (measured(100.0, noise), measured(200.0, |i| 0.5 * noise(i)));
-        let (gain, error) = other.gain_over(&one);
+        let LogGain { value: gain, error } = other.gain_over(&one);
         assert!((gain - 2_f64.ln()).abs() < 1e-9 && error < 1e-9, "{gain} {error}");
         assert!(other.is_better_than(&one) && !one.is_better_than(&other));
     }
@@ -186,7 +194,7 @@ mod tests {
     fn one_cell_alone_may_be_chance() {
         let all = measured(100.0, |i| if i == 7 { 6.0 } else { 1.0 });
         let without = measured(100.0, |_| 1.0);
-        let (gain, error) = without.gain_over(&all);
+        let LogGain { value: gain, error } = without.gain_over(&all);
         assert!(gain > 0.2 && error > 0.9 * gain, "{gain} {error}");
         assert!(!without.is_better_than(&all));
     }

@@ -8,7 +8,7 @@ use super::constants::{MANY_LIGHTS, MIN_ERRORS, OTHERS, TUNE_CELLS, TUNE_GAIN, T
 use super::facts::Facts;
 use super::preparation::{PlanError, Preparation};
 use super::processor_time;
-use super::trials::{Measured, Trials};
+use super::trials::{LogGain, TrialResult, Trials};
 use super::visibility_cache::build_visibility_cache;
 use crate::integrators::exclusions::{self, Feature};
 use crate::scene::RenderJob;
@@ -65,7 +65,7 @@ pub(super) fn tune(
         job.change(|s| s.integrator = settings);
         trials.measure(job)
     });
-    let (gain, error) = found_measured.gain_over(&rule_measured);
+    let LogGain { value: gain, error } = found_measured.gain_over(&rule_measured);
     let is_taken = gain > TUNE_GAIN.ln().max(MIN_ERRORS * error);
 
     // Keep the better settings
@@ -84,7 +84,7 @@ fn steps(open: &Settings, facts: &Facts, job: &RenderJob) -> Vec<Vec<Change>> {
     let i = open.integrator;
     let mut steps: Vec<Vec<Change>> = Vec::new();
     let is_possible = |estimator| exclusions::refusal(job, &IntegratorSettings { estimator, ..i }).is_none();
-    if facts.lights >= MANY_LIGHTS && is_possible(EstimatorKind::Contributing) && !job.lights.find_glows() {
+    if facts.lights >= MANY_LIGHTS && is_possible(EstimatorKind::Contributing) && !job.lights.samples_volumes() {
         steps.push(vec![Change::Contributing]);
     }
     if i.infinite_fraction.is_none() && facts.sky > 0.0 && facts.lights > 1 {
@@ -94,7 +94,7 @@ fn steps(open: &Settings, facts: &Facts, job: &RenderJob) -> Vec<Vec<Change>> {
     // Sample counts
     let numbers = [
         (i.samples.is_none(), vec![Change::Double, Change::Halve]),
-        (i.bsdf_fraction.is_none() && !job.lights.find_glows(), vec![Change::Bsdf(0.5), Change::Bsdf(0.0)]),
+        (i.bsdf_fraction.is_none() && !job.lights.samples_volumes(), vec![Change::Bsdf(0.5), Change::Bsdf(0.0)]),
         (i.later_samples.is_none() && i.depth() > 1, vec![Change::MoreLater, Change::FewerLater]),
     ];
 
@@ -110,7 +110,7 @@ fn steps(open: &Settings, facts: &Facts, job: &RenderJob) -> Vec<Vec<Change>> {
     if i.samples.is_none() {
         steps.push(vec![Change::Double, Change::Halve]);
     }
-    if is_possible(EstimatorKind::Ris) && !job.lights.find_glows() {
+    if is_possible(EstimatorKind::Ris) && !job.lights.samples_volumes() {
         steps.push(vec![Change::Resampling]);
     }
     steps
@@ -174,7 +174,7 @@ impl Change {
             }
             Change::Sky(fraction) => format!("{fraction} of the light samples for the sky"),
             Change::Resampling => "resampling (RIS)".to_owned(),
-            Change::Contributing => "lights that photons find".to_owned(),
+            Change::Contributing => "samples of contributing lights".to_owned(),
         }
     }
 }
@@ -182,8 +182,8 @@ impl Change {
 /// State of the search.
 struct Search {
     best: IntegratorSettings,
-    measured: Measured,
-    rule: Measured,
+    measured: TrialResult,
+    rule: TrialResult,
     pilot: Trials,
     /// Settings that were tried.
     tried: Vec<IntegratorSettings>,
@@ -213,7 +213,7 @@ impl Search {
                 how.goes_on()?;
                 self.tried.push(settings);
                 if settings.uses_visibility_cache() && job.lights.visibility_cache().is_none() {
-                    job.lights.set_visibility_cache(build_visibility_cache(job).map(|(cache, _)| cache));
+                    job.lights.set_visibility_cache(build_visibility_cache(job));
                 }
                 job.change(|s| s.integrator = settings);
 
@@ -234,7 +234,7 @@ impl Search {
     }
 }
 
-fn trial(name: String, measured: &Measured, rule: &Measured) -> Trial {
-    let (gain, error) = measured.gain_over(rule);
+fn trial(name: String, measured: &TrialResult, rule: &TrialResult) -> Trial {
+    let LogGain { value: gain, error } = measured.gain_over(rule);
     Trial { name, nanoseconds: measured.nanoseconds, efficiency: gain.exp(), error }
 }

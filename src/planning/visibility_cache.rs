@@ -5,18 +5,17 @@
 //! cache are therefore independent of the number of lights elsewhere.
 
 use super::constants::{IMPORTON_DEPTH, IMPORTON_PATHS, PHOTON_PATHS, UNIFORM_FRACTION};
-use crate::lights::{LightCtx, VisibilityCache};
-use crate::photons::{PhotonBudget, Tracing, importons, trace_photons};
+use crate::lights::{LightCtx, PathCount, PrimaryPhoton, SurfacePoint, VisibilityCache};
+use crate::photons::{Photon, PhotonBudget, Tracing, importons, trace_photons};
 use crate::scene::RenderJob;
 use crate::settings::IntegratorKind;
-use lumiris_numbers::math::Vec3;
 use lumiris_numbers::math::hash::{pcg4d, unit_f32};
 
 const IMPORTON_SEED: u32 = 0x6c69_6768;
 
-/// Traces photons from the lights to the first surface, on all threads of the current pool. Returns the cache and the
-/// number of photons. `None` if no photon hits a surface; estimators then work without a cache.
-pub fn build_visibility_cache(job: &RenderJob) -> Option<(VisibilityCache, usize)> {
+/// Traces photons from the lights to the first surface, on all threads of the current pool. `None` if no photon
+/// hits a surface; estimators then work without a cache.
+pub fn build_visibility_cache(job: &RenderJob) -> Option<VisibilityCache> {
     // Choose lights at visible points
     let lights = &job.lights;
     let paths = job.settings().integrator.photons.visibility_photons.map_or(PHOTON_PATHS, u64::from);
@@ -33,21 +32,19 @@ pub fn build_visibility_cache(job: &RenderJob) -> Option<(VisibilityCache, usize
         ..Tracing::default()
     };
     let traced = trace_photons(job, &tracing, None, PhotonBudget::Paths(paths)).ok()?;
-    let primary: Vec<_> =
-        traced.global.iter().filter_map(|photon| Some((photon.p(), photon.n(), photon.light()?))).collect();
+    let primary: Vec<PrimaryPhoton> = traced.global.iter().filter_map(primary_photon).collect();
     if primary.is_empty() {
         return None;
     }
 
     // Build the cache
     let distribution = tracing.light_distribution(lights)?;
-    let paths = lights.lit.iter().map(|&light| (light, paths as f32 * distribution.pmf(light)));
-    let cache = VisibilityCache::adapted_to(&visible, &primary, lights.scene_radius).with_paths(paths);
-    Some((cache, primary.len()))
+    let paths = lights.lit.iter().map(|&light| PathCount { light, paths: paths as f32 * distribution.pmf(light) });
+    Some(VisibilityCache::adapted(&visible, &primary, lights.scene_radius).with_paths(paths))
 }
 
-/// Points visible to the camera, directly or after bounces: positions and normals of importons.
-pub(super) fn visible_points(job: &RenderJob) -> Vec<(Vec3, Vec3)> {
+/// Points visible to the camera, directly or after bounces: where importons arrive.
+pub(super) fn visible_points(job: &RenderJob) -> Vec<SurfacePoint> {
     let settings = job.settings();
     let depth = match settings.integrator.kind {
         IntegratorKind::Direct => 0,
@@ -56,15 +53,23 @@ pub(super) fn visible_points(job: &RenderJob) -> Vec<(Vec3, Vec3)> {
         }
     };
     let importons = importons(job, settings.sampling.seed, IMPORTON_PATHS, depth);
-    importons.iter().map(|importon| (importon.p(), importon.n())).collect()
+    importons.iter().map(surface_point).collect()
+}
+
+fn surface_point(photon: &Photon) -> SurfacePoint {
+    SurfacePoint { p: photon.p(), n: photon.n() }
+}
+
+fn primary_photon(photon: &Photon) -> Option<PrimaryPhoton> {
+    Some(PrimaryPhoton { at: surface_point(photon), light: photon.light()? })
 }
 
 /// How often the light tree chooses each light at the given points; `None` if it chooses none.
-fn weights_at(job: &RenderJob, points: &[(Vec3, Vec3)]) -> Option<Vec<f32>> {
+fn weights_at(job: &RenderJob, points: &[SurfacePoint]) -> Option<Vec<f32>> {
     let lights = &job.lights;
     let tree = lights.tree_choice();
     let mut weights = vec![0.0; lights.lights.len()];
-    for (i, &(p, n)) in (0..).zip(points) {
+    for (i, &SurfacePoint { p, n }) in (0..).zip(points) {
         let [u, ..] = pcg4d([i, job.settings().sampling.seed, IMPORTON_SEED, 0]).map(unit_f32);
         if let Some(choice) = tree.sample(&LightCtx::on(p, n), u) {
             weights[choice.light as usize] += 1.0;

@@ -81,7 +81,7 @@ impl Cryptomatte {
     /// Names, indexed by the first part of the key.
     fn names(self, scene: &Scene) -> Vec<String> {
         match self {
-            Cryptomatte::Object => unique(scene.surfaces.iter().map(|s| s.name.as_str())),
+            Cryptomatte::Object => unique(scene.surfaces.iter().map(|s| &*s.name)),
             Cryptomatte::Material => unique(scene.materials.entries().iter().map(|m| m.name.as_str())),
         }
     }

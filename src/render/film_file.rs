@@ -45,7 +45,7 @@ impl FilmFile {
         storage: Storage,
         warn: impl Fn(&str) + Send + Sync + 'static,
     ) -> Result<FilmFile, PartError> {
-        let fingerprint = files.fingerprint().map_err(|(path, error)| PartError::io(&path, error))?;
+        let fingerprint = files.fingerprint().map_err(|file| PartError::io(&file.path, file.error))?;
         let described = asked.described(job, settings);
         let notes = asked.notes(storage.plan, &job.world.scene.camera);
         let mut header = FilmHeader::new(job, settings, spp, fingerprint, [described, notes]);

@@ -56,7 +56,7 @@ pub struct Surface {
     /// Its material.
     pub material: MaterialId,
     /// A readable name: the file or shape of origin.
-    pub name: String,
+    pub name: Arc<str>,
     /// The media on its sides; `None` where both sides are in the same, whatever it is.
     pub sides: Option<Sides>,
 }

@@ -151,7 +151,7 @@ fn plain_reflectance(scene: &Scene, geometry: GeometryId) -> Option<Rgb> {
 /// The choice of lights. Segments reach emitting media only by passing interfaces.
 fn light_choice(settings: &IntegratorSettings, shadows_pass: bool) -> LightChoice {
     let choice = settings.light_choice();
-    LightChoice { glows: choice.glows && shadows_pass, ..choice }
+    LightChoice { volumes: choice.volumes && shadows_pass, ..choice }
 }
 
 /// Maximum number of light groups: the components of a mixture without `lobes`.

@@ -7,7 +7,7 @@ use super::photon_map::PhotonMapSettings;
 use super::ris::RisSettings;
 use crate::bsdfs::ProposalDensity;
 use crate::lights::{LightChoice, LightSamplerKind};
-use lumiris_numbers::estimators::mis::Heuristic;
+use lumiris_numbers::estimators::heuristics::Heuristic;
 use lumiris_numbers::estimators::ocv::MAX_COMPONENTS;
 use strum::{EnumString, IntoStaticStr, VariantNames};
 
@@ -131,13 +131,13 @@ impl IntegratorSettings {
 
     /// The choice of lights.
     pub fn light_choice(&self) -> LightChoice {
-        let glows = self.finds_glows_at(0) && self.finds_glows_at(1);
-        LightChoice { kind: self.light_sampler, infinite_fraction: self.infinite_fraction, glows }
+        let volumes = self.samples_volumes_at(0) && self.samples_volumes_at(1);
+        LightChoice { kind: self.light_sampler, infinite_fraction: self.infinite_fraction, volumes }
     }
 
     /// True if light samples at a path vertex, counted from 0, may include the emission of media. The path is then
     /// their only BSDF sample, which samples that emission too.
-    fn finds_glows_at(&self, vertex: u32) -> bool {
+    fn samples_volumes_at(&self, vertex: u32) -> bool {
         let is_mis = matches!(self.estimator, EstimatorKind::Auto | EstimatorKind::Mis);
         let samples = self.sample_counts_at(vertex).samples;
         is_mis && samples >= 2 && bsdf_samples(samples, self.bsdf_fraction()) == 1

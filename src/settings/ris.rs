@@ -3,8 +3,8 @@
 use lumiris_numbers::estimators::ris::choice::Costs;
 use strum::{EnumString, IntoStaticStr, VariantNames};
 
-/// Relative costs of a proposal, T1, and of a sample, T2. M/N = T2/T1 = 3 [Talbot 2005, Eq. 4.4] is the fixed ratio
-/// with the greatest mean efficiency in the measured scenes (`docs/measurements/efficiency`, "how many proposals").
+/// Relative costs of a proposal, T1, and of a sample, T2: M/N = T2/T1 = 3 [Talbot 2005, Eq. 4.4]. The measured ratio of
+/// the times is 1 to 7, depending on scene and processor (`docs/measurements/resampling/README.md`).
 pub const COSTS: Costs = Costs { t1: 1.0, t2: 3.0 };
 
 /// Resampled importance sampling [Talbot et al. 2005; Talbot 2005].

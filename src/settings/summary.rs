@@ -25,6 +25,7 @@ impl Settings {
     }
 
     fn direct_light(&self) -> String {
+        // Samples at the first vertex
         let i = &self.integrator;
         let [first, later] = [0, 1].map(|vertex| i.sample_counts_at(vertex));
         let SampleCounts { samples, proposals } = first;
@@ -38,9 +39,11 @@ impl Settings {
             EstimatorKind::Correlated => format!("{} (correlated sampling)", count(samples)),
             EstimatorKind::Contributing => {
                 let others = i.contributing.noncontributing_samples();
-                format!("{} of the lights that photons find, {others} of others", count(samples))
+                format!("{} of contributing lights, {others} of others", count(samples))
             }
         };
+
+        // Samples at later vertices
         if i.depth() > 1 && later.samples != samples {
             format!("{at_first}, {} at later vertices", later.samples)
         } else {

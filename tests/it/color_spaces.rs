@@ -3,7 +3,7 @@
 use lumiris::film::PixelBounds;
 use lumiris::import::cache::FileCache;
 use lumiris::import::{LoadOptions, Loaded, load_text};
-use lumiris::lights::Light;
+use lumiris::lights::{DistantLight, Light};
 use lumiris_numbers::math::Rgb;
 use std::path::Path;
 
@@ -16,7 +16,7 @@ fn loaded(head: &str, world: &str) -> Result<Loaded, String> {
 /// The radiance of the only light.
 fn light(world: &str) -> Rgb {
     match loaded("", world).unwrap().scene.lights.lights[0] {
-        Light::InfiniteConstant { l } | Light::Distant { l, .. } => l,
+        Light::InfiniteConstant { l } | Light::Distant(DistantLight { l, .. }) => l,
         ref other => panic!("{other:?}"),
     }
 }

@@ -102,7 +102,7 @@ fn directives_that_are_alike_share_a_geometry() {
     let all = line.repeat(1000);
     let loaded = try_load(&format!("{all}Material \"hair\"\n{all}Translate 1 0 0\n{all}")).unwrap();
     let set = &loaded.scene.geometry;
-    assert_eq!((set.geometries.len(), set.curve_counts().0), (3, 3000));
+    assert_eq!((set.geometries.len(), set.primitive_counts().curves), (3, 3000));
 }
 
 #[test]

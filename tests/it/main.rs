@@ -38,6 +38,7 @@ mod same_light;
 mod sample_allocation;
 mod subsurface;
 mod surfaces;
+mod texture_cache;
 mod texture_pyramids;
 mod texture_tiles;
 mod udim;

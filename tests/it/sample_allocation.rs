@@ -276,7 +276,7 @@ fn pilots_say_what_they_do_and_how_much_of_it_is_done() {
     });
     prepare(&mut job, &Preparation { observe: &observe, ..Preparation::on(Some(1)) }).unwrap();
     let told = told.into_inner().unwrap();
-    let name = "measuring where the noise is";
+    let name = "measuring the noise of each pixel";
     let done = told.get(name).unwrap_or_else(|| panic!("{name}: {:?}", told.keys()));
     assert!(done.is_sorted() && done.iter().all(|done| (0.0..=1.0).contains(done)), "{name}: {done:?}");
     assert!(done.first().is_some_and(|first| *first < 0.2) && done.last().is_some_and(|last| *last > 0.7), "{done:?}");

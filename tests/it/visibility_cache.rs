@@ -9,7 +9,7 @@ use lumiris::accel::{Coherence, RayBatch};
 use lumiris::film::PixelSums;
 use lumiris::import::cache::FileCache;
 use lumiris::import::{LoadOptions, load, load_text};
-use lumiris::lights::{LightId, LightSamplerKind, VisibilityCache};
+use lumiris::lights::{LightId, LightSamplerKind, PathCount, PrimaryPhoton, SurfacePoint, VisibilityCache};
 use lumiris::render::output::metadata;
 use lumiris::render::{RenderSettings, render};
 use lumiris::scene::{AccelKind, RenderJob};
@@ -39,15 +39,16 @@ pub(crate) enum CacheContents {
 const PHOTONS: u32 = 1000;
 
 /// Photons of every light at their first intersections.
-fn primary_photons(job: &RenderJob) -> Vec<(Vec3, Vec3, LightId)> {
+fn primary_photons(job: &RenderJob) -> Vec<PrimaryPhoton> {
     // Emit photons
     let lights = &job.lights;
     let (mut rays, mut ids) = (RayBatch::default(), Vec::new());
     for (id, light) in (0..).zip(&lights.lights) {
         let mut stream = pcg32([id, 99, 3]);
         for _ in 0..PHOTONS {
-            let scene = (lights.scene_centre, lights.scene_radius);
-            if let Some(s) = light.sample_le(scene, stream.random::<[f32; 2]>(), stream.random::<[f32; 2]>()) {
+            if let Some(s) =
+                light.sample_le(lights.scene_sphere(), stream.random::<[f32; 2]>(), stream.random::<[f32; 2]>())
+            {
                 let o = if s.n == Vec3::ZERO { s.p } else { offset_origin(s.p, s.p_error, s.n, s.d) };
                 rays.push(&Ray { o, d: s.d, t_max: f32::INFINITY, time: 0.0 });
                 ids.push(id);
@@ -64,9 +65,15 @@ fn primary_photons(job: &RenderJob) -> Vec<(Vec3, Vec3, LightId)> {
         let hit = hit.as_ref()?;
         let surface = job.world.scene.geometry.surface_hit(hit.geometry, hit.primitive, hit.instance, hit.uv, 0.0);
         let n = if surface.n.dot(rays.get(i).d) > 0.0 { -surface.n } else { surface.n };
-        Some((surface.p, n, ids[i]))
+        Some(PrimaryPhoton { at: SurfacePoint { p: surface.p, n }, light: ids[i] })
     };
     hits.iter().enumerate().filter_map(photon).collect()
+}
+
+/// A visibility cache for lookups at its photons.
+fn adapted(photons: &[PrimaryPhoton], scene_radius: f32) -> VisibilityCache {
+    let points: Vec<SurfacePoint> = photons.iter().map(|photon| photon.at).collect();
+    VisibilityCache::adapted(&points, photons, scene_radius)
 }
 
 /// A visibility cache with the given contents for a job.
@@ -74,15 +81,15 @@ pub(crate) fn cache_with(job: &RenderJob, kind: CacheContents) -> Option<Visibil
     let radius = job.lights.scene_radius;
     match kind {
         CacheContents::Absent => None,
-        CacheContents::Empty => Some(VisibilityCache::new(std::iter::empty(), 1.0)),
-        CacheContents::Right => Some(VisibilityCache::adapted(&primary_photons(job), radius)),
+        CacheContents::Empty => Some(VisibilityCache::new(&[], 1.0)),
+        CacheContents::Right => Some(adapted(&primary_photons(job), radius)),
         CacheContents::Wrong => {
             let mut photons = primary_photons(job);
             let choices = job.lights.lights.len() as u32 + 2;
             for (i, photon) in photons.iter_mut().enumerate() {
-                photon.2 = pcg4d([i as u32, 1, 2, 3])[0] % choices / 2;
+                photon.light = pcg4d([i as u32, 1, 2, 3])[0] % choices / 2;
             }
-            Some(VisibilityCache::adapted(&photons, radius))
+            Some(adapted(&photons, radius))
         }
     }
 }
@@ -100,8 +107,10 @@ fn job(settings: impl Fn(&mut IntegratorSettings), seen: impl Fn(&RenderJob, Lig
     let mut job = loaded.job(AccelKind::Embree, None).unwrap();
     let ids = (0..job.lights.lights.len() as LightId).filter(|&id| seen(&job, id));
     // With so few expected paths, the photons exceed them: lights with photons are classified as visible
-    let paths = (0..job.lights.lights.len() as LightId).map(|id| (id, 1000.0));
-    let visibility_cache = VisibilityCache::new(ids.flat_map(|id| vec![(Vec3::ZERO, Vec3::Z, id); 20]), 0.1);
+    let paths = (0..job.lights.lights.len() as LightId).map(|light| PathCount { light, paths: 1000.0 });
+    let at = SurfacePoint { p: Vec3::ZERO, n: Vec3::Z };
+    let photons: Vec<_> = ids.flat_map(|light| vec![PrimaryPhoton { at, light }; 20]).collect();
+    let visibility_cache = VisibilityCache::new(&photons, 0.1);
     let visibility_cache = visibility_cache.with_paths(paths);
     job.lights.set_visibility_cache(Some(visibility_cache));
     job

@@ -6,13 +6,12 @@
 //! closures and no `map` over arrays: these would be compiled without vector instructions.
 //!
 //! Reading order: [`lane`], [`wide`], [`columns`], [`curve`], [`sampler`], [`light`], [`area`], [`environment`],
-//! [`kernels`], [`combine`], [`camera`], [`hits`], [`triangles`], [`vertex`], [`connections`], [`light_tree`],
+//! [`kernels`], [`ris_weights`], [`camera`], [`hits`], [`triangles`], [`vertex`], [`connections`], [`light_tree`],
 //! [`sums`].
 
 pub mod area;
 pub mod camera;
 pub mod columns;
-pub mod combine;
 pub mod connections;
 pub mod curve;
 pub mod environment;
@@ -21,6 +20,7 @@ pub mod kernels;
 pub mod lane;
 pub mod light;
 pub mod light_tree;
+pub mod ris_weights;
 pub mod sampler;
 pub mod sums;
 pub mod triangles;

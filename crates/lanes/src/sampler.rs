@@ -1,5 +1,5 @@
 //! Random numbers of many sample streams at once: coordinates of Owen-scrambled Sobol' points [Burley 2020],
-//! bit-identical to [`SampleStream::draw`].
+//! bit-identical to [`SampleStream::draw`](lumiris_numbers::samplers::SampleStream::draw).
 //!
 //! A point's index is shuffled and each coordinate is scrambled with the Laine–Karras hash, which flips each digit
 //! depending on the digits before it. The first coordinate is the index with its digits reversed. The second is the
@@ -9,7 +9,9 @@
 
 use fearless_simd::{Level, dispatch};
 use lumiris_numbers::math::ONE_MINUS_EPSILON;
-use lumiris_numbers::samplers::{NetPoint, SampleStream};
+use lumiris_numbers::math::hash::{pcg4d, unit_f32};
+use lumiris_numbers::samplers::{BlueNoise, INDEPENDENT, StreamColumns, StreamKind};
+use std::ops::Range;
 
 /// Points per chunk.
 const CHUNK: usize = 64;
@@ -26,60 +28,165 @@ const COLUMNS: [[u32; 16]; 2] = [
     ],
 ];
 
-/// Draws N ≤ 4 numbers of each stream: `out[d][i]` is the d-th number of stream `i`. All slices have the same length.
-pub fn draw<const N: usize>(level: Level, streams: &[SampleStream], mut out: [&mut [f32]; N]) {
-    let none = NetPoint { index: 0, seed: 0, scramble: 0 };
-    let mut points = [none; CHUNK];
-    for (chunk, streams) in streams.chunks(CHUNK).enumerate() {
-        let first = chunk * CHUNK;
-        // Streams without a net are drawn one by one
-        let mut are_nets = true;
-        for (point, stream) in points.iter_mut().zip(streams) {
-            match stream.net_point() {
-                Some(of_stream) => *point = of_stream,
-                None => are_nets = false,
-            }
+/// A node below each stream.
+#[derive(Clone, Copy, Debug)]
+pub enum Below {
+    /// [`SampleStream::domain`](lumiris_numbers::samplers::SampleStream::domain) with this key.
+    Domain(u32),
+    /// [`SampleStream::split`](lumiris_numbers::samplers::SampleStream::split).
+    Split {
+        /// Key of the domain.
+        key: u32,
+        /// Number of points.
+        count: u32,
+        /// Index of the point.
+        index: u32,
+    },
+}
+
+/// Words of the streams of a chunk.
+type Words = [[u32; CHUNK]; 3];
+
+/// Replaces all streams by their domains `key`.
+pub fn enter(level: Level, streams: &mut StreamColumns, key: u32) {
+    let (kind, len) = (streams.kind(), streams.len());
+    let mut words = streams.words_mut();
+    for first in (0..len).step_by(CHUNK) {
+        let rows = first..len.min(first + CHUNK);
+        let mut chunk = [[0; CHUNK]; 3];
+        for (to, from) in chunk.iter_mut().zip(&words) {
+            to[..rows.len()].copy_from_slice(&from[rows.clone()]);
         }
-        if are_nets {
-            draw_chunk(level, &points[..streams.len()], first, &mut out);
-        } else {
-            for (lane, stream) in streams.iter().enumerate() {
-                for (out, u) in out.iter_mut().zip(stream.draw::<N>()) {
-                    out[first + lane] = u;
-                }
-            }
+        dispatch!(level, _simd => descend(kind, Below::Domain(key), &mut chunk));
+        for (to, from) in words.iter_mut().zip(&chunk) {
+            to[rows.clone()].copy_from_slice(&from[..rows.len()]);
         }
     }
 }
 
-/// The first N ≤ 4 coordinates of each point: `out[d][i]` is the d-th coordinate of point `i`. All slices have the same
-/// length.
-pub fn draw_points<const N: usize>(level: Level, points: &[NetPoint], mut out: [&mut [f32]; N]) {
-    for (chunk, points) in points.chunks(CHUNK).enumerate() {
-        draw_chunk(level, points, chunk * CHUNK, &mut out);
+/// Draws N ≤ 4 numbers of the node below each of the streams `rows`: `out[d][k]` is the d-th number of stream
+/// `rows.start + k`.
+pub fn draw<const N: usize>(
+    level: Level,
+    streams: &StreamColumns,
+    rows: Range<usize>,
+    below: Below,
+    mut out: [&mut [f32]; N],
+) {
+    let (kind, words) = (streams.kind(), streams.words());
+    for first in rows.clone().step_by(CHUNK) {
+        let of_chunk = first..rows.end.min(first + CHUNK);
+        let mut chunk = [[0; CHUNK]; 3];
+        for (to, from) in chunk.iter_mut().zip(words) {
+            to[..of_chunk.len()].copy_from_slice(&from[of_chunk.clone()]);
+        }
+        let mut u = [[0.0; CHUNK]; N];
+        draw_chunk(level, kind, below, &mut chunk, &mut u);
+        for (out, u) in out.iter_mut().zip(&u) {
+            out[first - rows.start..][..of_chunk.len()].copy_from_slice(&u[..of_chunk.len()]);
+        }
     }
 }
 
-/// Computes at most [`CHUNK`] points, and stores their coordinates from index `first` on.
 #[inline]
-fn draw_chunk<const N: usize>(level: Level, points: &[NetPoint], first: usize, out: &mut [&mut [f32]; N]) {
-    let (mut index, mut seeds) = ([0; CHUNK], [[0; CHUNK]; 2]);
-    for (lane, point) in points.iter().enumerate() {
-        (index[lane], seeds[0][lane], seeds[1][lane]) = (point.index, point.seed, point.scramble);
+fn draw_chunk<const N: usize>(
+    level: Level,
+    kind: StreamKind,
+    below: Below,
+    words: &mut Words,
+    out: &mut [[f32; CHUNK]; N],
+) {
+    match kind {
+        StreamKind::Independent => dispatch!(level, _simd => independent(below, words, out)),
+        StreamKind::Sobol => dispatch!(level, _simd => sobol(below, words, out)),
+        StreamKind::SobolBlueNoise => {
+            dispatch!(level, _simd => descend(kind, below, words));
+            blue_noise(words);
+            dispatch!(level, _simd => coordinates(words, out));
+        }
     }
-    let mut u = [[0.0; CHUNK]; N];
-    dispatch!(level, _simd => coordinates(&index, &seeds, &mut u));
-    for (out, u) in out.iter_mut().zip(&u) {
-        out[first..first + points.len()].copy_from_slice(&u[..points.len()]);
+}
+
+/// Replaces streams of points with blue-noise errors by these points.
+fn blue_noise([a, _, c]: &mut Words) {
+    // The samples of a pixel share their entry of the table
+    let mut last = (a[0], c[0] >> 16, BlueNoise::of(a[0], c[0] >> 16));
+    for (a, c) in a.iter_mut().zip(c) {
+        if (*a, *c >> 16) != (last.0, last.1) {
+            last = (*a, *c >> 16, BlueNoise::of(*a, *c >> 16));
+        }
+        (*a, *c) = (last.2.seed, *c & 0xffff ^ last.2.rank);
+    }
+}
+
+/// Replaces streams by a node below each of them.
+#[inline(always)]
+fn descend(kind: StreamKind, below: Below, words: &mut Words) {
+    let [a, b, c] = words;
+    match (kind, below) {
+        (StreamKind::Independent, Below::Domain(key)) => hash_key(a, b, c, key),
+        (StreamKind::Independent, Below::Split { key, index, .. }) => {
+            hash_key(a, b, c, key);
+            hash_key(a, b, c, index);
+        }
+        (StreamKind::Sobol | StreamKind::SobolBlueNoise, Below::Domain(key)) => {
+            for i in 0..CHUNK {
+                (a[i], b[i]) = net_key(a[i], b[i], key);
+            }
+        }
+        (StreamKind::Sobol | StreamKind::SobolBlueNoise, Below::Split { key, count, index }) => {
+            // The index of a point has 16 bits; the rest selects another net
+            for i in 0..CHUNK {
+                let all = (c[i] & 0xffff).wrapping_mul(count).wrapping_add(index);
+                (a[i], b[i]) = net_key(a[i], b[i], key);
+                (a[i], b[i]) = net_key(a[i], b[i], all >> 16);
+                c[i] = c[i] & 0xffff_0000 | all & 0xffff;
+            }
+        }
+    }
+}
+
+/// The key of a domain of a net.
+#[inline(always)]
+fn net_key(a: u32, b: u32, key: u32) -> (u32, u32) {
+    let [a, b, ..] = pcg4d([a, b, key, 0]);
+    (a, b)
+}
+
+/// The keys of a domain of independent numbers.
+#[inline(always)]
+fn hash_key(a: &mut [u32; CHUNK], b: &mut [u32; CHUNK], c: &mut [u32; CHUNK], key: u32) {
+    for i in 0..CHUNK {
+        let h = pcg4d([a[i], b[i], c[i], key]);
+        (a[i], b[i], c[i]) = (h[0], h[1], h[2]);
+    }
+}
+
+/// Draws from nodes below streams of points of a sequence.
+#[inline(always)]
+fn sobol<const N: usize>(below: Below, words: &mut Words, out: &mut [[f32; CHUNK]; N]) {
+    descend(StreamKind::Sobol, below, words);
+    for i in 0..CHUNK {
+        words[2][i] &= 0xffff;
+    }
+    coordinates(words, out);
+}
+
+/// Draws from nodes below streams of independent numbers.
+#[inline(always)]
+fn independent<const N: usize>(below: Below, words: &mut Words, out: &mut [[f32; CHUNK]; N]) {
+    descend(StreamKind::Independent, below, words);
+    let [a, b, c] = words;
+    for i in 0..CHUNK {
+        let h = pcg4d([a[i], b[i], c[i], INDEPENDENT]);
+        for d in 0..N {
+            out[d][i] = unit_f32(h[d]);
+        }
     }
 }
 
 #[inline(always)]
-fn coordinates<const N: usize>(
-    index: &[u32; CHUNK],
-    [seed, scramble]: &[[u32; CHUNK]; 2],
-    out: &mut [[f32; CHUNK]; N],
-) {
+fn coordinates<const N: usize>([seed, scramble, index]: &Words, out: &mut [[f32; CHUNK]; N]) {
     // Shuffle the indices
     let mut shuffled = [0; CHUNK];
     for i in 0..CHUNK {

@@ -8,7 +8,7 @@ pub use super::lane::{Columns3, ColumnsMut3};
 use super::lane::{F, I, LANES, M, Vec3s, load, narrowed, or_zero, store, widened};
 use super::wide::Wide;
 use fearless_simd::{Level, Simd, dispatch, f64x8, prelude::*};
-use lumiris_numbers::estimators::mis::Heuristic;
+use lumiris_numbers::estimators::heuristics::Heuristic;
 use lumiris_numbers::math::gamma;
 use lumiris_numbers::math::ray::{COINCIDENCE, SEGMENT_END};
 

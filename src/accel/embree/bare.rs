@@ -5,13 +5,13 @@
 //! patches and alpha masks use callbacks as in the renderer.
 #![allow(unsafe_code)]
 
+use super::calls::{self, Mode, QueryKind, RayHitPacket, RayPacket, Valid};
 use super::device::Device;
 use super::embree_accel::{Builder, checked_width, has_only_triangles};
 use super::error::EmbreeError;
-use super::kernels::{self, Mode, QueryKind, RayHitPacket, RayPacket, Valid};
 use super::query::{ANY_SINGLE, can_trace, load, single_ray};
 use super::scene::EmbreeScene;
-use super::world::World;
+use super::scene_ids::SceneIds;
 use crate::accel::RayBatch;
 use crate::geometry::{AlphaSource, GeometrySet, Shape, Visibility};
 use embree4_sys as sys;
@@ -21,7 +21,7 @@ use std::time::{Duration, Instant};
 /// Embree's data structures for a scene.
 pub struct Bare {
     root: EmbreeScene,
-    world: Arc<World>,
+    world: Arc<SceneIds>,
     /// True if callbacks report hits; the context must be prepared for them.
     calls_back: bool,
     has_only_triangles: bool,
@@ -52,7 +52,7 @@ impl Bare {
         let device = Arc::new(Device::new(c"", None)?);
         let has_only_triangles = has_only_triangles(&set);
         let calls_back = set.geometries.iter().any(|g| !matches!(g.shape, Shape::Mesh(_)));
-        let world = Arc::new(World::new(set));
+        let world = Arc::new(SceneIds::new(set));
         let root = Builder { device: &device, world: &world, alpha, query_filter: false }.root()?;
         Ok(Bare { root, world, calls_back, has_only_triangles, build_time: start.elapsed() })
     }
@@ -79,45 +79,45 @@ impl Bare {
 
     fn nearest_singly(&self, rays: &RayBatch, singles: &mut [sys::RTCRayHit]) {
         let mode = Mode { query: QueryKind::Nearest, coherent: false };
-        let mut context = kernels::query_context(&self.world, rays, mode);
+        let mut context = calls::query_context(&self.world, rays, mode);
         for single in singles {
             if self.calls_back {
                 context.begin(single.ray.id as usize);
             }
             // SAFETY: the scene is committed, the ray is finite and its id an index of the batch.
-            unsafe { kernels::intersect1(self.root.raw(), &mut context, mode, single) };
+            unsafe { calls::intersect1(self.root.raw(), &mut context, mode, single) };
         }
         context.finish();
     }
 
     fn nearest<const N: usize>(&self, rays: &RayBatch, packets: &mut [(Valid<N>, RayHitPacket<N>)], coherent: bool) {
         let mode = Mode { query: QueryKind::Nearest, coherent };
-        let mut context = kernels::query_context(&self.world, rays, mode);
+        let mut context = calls::query_context(&self.world, rays, mode);
         for (valid, packet) in packets {
             if self.calls_back {
                 context.begin(packet.rays.id[0] as usize);
             }
             // SAFETY: the scene is committed, the lanes in `valid` are finite, ids are indices of the batch.
-            unsafe { kernels::intersect_packet(self.root.raw(), &mut context, mode, valid, packet) };
+            unsafe { calls::intersect_packet(self.root.raw(), &mut context, mode, valid, packet) };
         }
         context.finish();
     }
 
     fn any_singly(&self, rays: &RayBatch, singles: &mut [sys::RTCRay]) {
-        let mut context = kernels::query_context(&self.world, rays, ANY_SINGLE);
+        let mut context = calls::query_context(&self.world, rays, ANY_SINGLE);
         for single in singles {
             // SAFETY: the scene is committed, the ray is finite and its id an index of the batch.
-            unsafe { kernels::occluded1(self.root.raw(), &mut context, single) };
+            unsafe { calls::occluded1(self.root.raw(), &mut context, single) };
         }
         context.finish();
     }
 
     fn any<const N: usize>(&self, rays: &RayBatch, packets: &mut [(Valid<N>, RayPacket<N>)], coherent: bool) {
         let mode = Mode { query: QueryKind::Any, coherent };
-        let mut context = kernels::query_context(&self.world, rays, mode);
+        let mut context = calls::query_context(&self.world, rays, mode);
         for (valid, packet) in packets {
             // SAFETY: the scene is committed, the lanes in `valid` are finite, ids are indices of the batch.
-            unsafe { kernels::occluded_packet(self.root.raw(), &mut context, mode, valid, packet) };
+            unsafe { calls::occluded_packet(self.root.raw(), &mut context, mode, valid, packet) };
         }
         context.finish();
     }

@@ -5,7 +5,7 @@
 #![allow(unsafe_code)]
 
 use super::context::{QueryContext, Ties};
-use super::world::{Refined, Reported, World};
+use super::scene_ids::{Refined, Reported, SceneIds};
 use crate::accel::{AlphaTest, Hit};
 use crate::geometry::hit::LocalHit;
 use crate::geometry::{GeometryId, Shape};
@@ -20,7 +20,7 @@ const BOX_GROWTH: f32 = 1.0 / (1 << 20) as f32;
 /// User data of a geometry for its callbacks.
 #[derive(Clone)]
 pub(super) struct GeometryContext {
-    pub world: Arc<World>,
+    pub world: Arc<SceneIds>,
     pub id: GeometryId,
     /// The alpha test, if the geometry has an alpha mask.
     pub alpha: Option<AlphaTest>,

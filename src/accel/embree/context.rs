@@ -1,6 +1,6 @@
 //! State shared by the callbacks of a query: the batch, and the nearest hit of each lane so far.
 
-use super::world::{Reported, World};
+use super::scene_ids::{Reported, SceneIds};
 use crate::accel::RayBatch;
 use embree4_sys as sys;
 use lumiris_lanes::hits::BLOCK;
@@ -72,7 +72,7 @@ impl ReportedBlock {
 #[repr(C)]
 pub(super) struct QueryContext<'a> {
     pub rtc: RtcContext,
-    pub world: &'a World,
+    pub world: &'a SceneIds,
     /// The batch. The `id` of a ray is its index in the batch.
     pub rays: &'a RayBatch,
     /// Index of the first ray of the block.
@@ -90,7 +90,7 @@ pub(super) struct QueryContext<'a> {
 }
 
 impl<'a> QueryContext<'a> {
-    pub(super) fn new(rtc: RtcContext, world: &'a World, rays: &'a RayBatch, ties: Ties) -> Self {
+    pub(super) fn new(rtc: RtcContext, world: &'a SceneIds, rays: &'a RayBatch, ties: Ties) -> Self {
         QueryContext {
             rtc,
             world,

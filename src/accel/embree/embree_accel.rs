@@ -44,7 +44,7 @@ use super::callbacks::GeometryContext;
 use super::device::Device;
 use super::error::EmbreeError;
 use super::scene::EmbreeScene;
-use super::world::World;
+use super::scene_ids::SceneIds;
 use crate::accel::{Accel, AccelStats, AlphaTest, Coherence, Hit, RayBatch};
 use crate::geometry::{AlphaSource, GeometryId, GeometrySet, Shape};
 use embree4_sys::RTCDeviceProperty as Property;
@@ -89,7 +89,7 @@ pub(super) fn has_only_triangles(set: &GeometrySet) -> bool {
 /// Embree's data structures for a scene.
 pub struct EmbreeAccel {
     pub(super) root: Arc<EmbreeScene>,
-    pub(super) world: Arc<World>,
+    pub(super) world: Arc<SceneIds>,
     widths: Widths,
     pub(super) has_only_triangles: bool,
     has_motion: bool,
@@ -116,7 +116,7 @@ impl EmbreeAccel {
         let device = Arc::new(Device::new(&options.config, options.memory_limit)?);
         let widths = packet_widths(&device, options.packet_width, has_only_triangles(&geometry))?;
         let set = Arc::clone(&geometry);
-        let world = Arc::new(World::new(geometry));
+        let world = Arc::new(SceneIds::new(geometry));
         let builder = Builder { device: &device, world: &world, alpha, query_filter: true };
         let root = Arc::new(builder.root()?);
 
@@ -161,7 +161,7 @@ impl Accel for EmbreeAccel {
 /// Builds the scenes of a tracer.
 pub(super) struct Builder<'a> {
     pub(super) device: &'a Arc<Device>,
-    pub(super) world: &'a Arc<World>,
+    pub(super) world: &'a Arc<SceneIds>,
     pub(super) alpha: Option<Arc<dyn AlphaSource>>,
     /// True if queries have a filter function.
     pub(super) query_filter: bool,

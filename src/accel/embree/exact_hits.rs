@@ -1,7 +1,7 @@
 //! Exact hits of a block of rays: their triangles are gathered and intersected in SIMD lanes.
 
 use super::context::ReportedBlock;
-use super::world::World;
+use super::scene_ids::SceneIds;
 use crate::accel::{Hit, RayBatch};
 use crate::geometry::{GeometryId, Shape, TriangleMesh};
 use lumiris_lanes::hits::{self, BLOCK, Hits, Pairs};
@@ -33,7 +33,7 @@ impl Default for ExactHits {
 
 impl ExactHits {
     /// Computes the hits of at most [`BLOCK`] rays, one for each hit reported by Embree.
-    pub(super) fn find(&mut self, world: &World, rays: &RayBatch, range: Range<usize>, reported: &ReportedBlock) {
+    pub(super) fn find(&mut self, world: &SceneIds, rays: &RayBatch, range: Range<usize>, reported: &ReportedBlock) {
         let count = range.len().min(BLOCK);
         let Pairs { o, d, t_max, .. } = &mut self.pairs;
         let columns = [&rays.ox, &rays.oy, &rays.oz, &rays.dx, &rays.dy, &rays.dz];
@@ -82,7 +82,7 @@ impl ExactHits {
     #[inline(always)]
     fn triangle<'a>(
         &mut self,
-        world: &'a World,
+        world: &'a SceneIds,
         reported: &ReportedBlock,
         lane: usize,
     ) -> Option<(&'a TriangleMesh, [u32; 3])> {
@@ -110,7 +110,7 @@ impl ExactHits {
     }
 
     /// Transforms the rays with hits in instances to the space of the group.
-    fn enter_instances(&mut self, world: &World, rays: &RayBatch, range: Range<usize>) {
+    fn enter_instances(&mut self, world: &SceneIds, rays: &RayBatch, range: Range<usize>) {
         let Pairs { o, d, .. } = &mut self.pairs;
         for (lane, i) in range.enumerate().filter(|&(lane, _)| self.instances[lane] != Hit::NO_INSTANCE) {
             let ray = world.group_ray(&rays.get(i), self.instances[lane]);
@@ -119,7 +119,7 @@ impl ExactHits {
         }
     }
 
-    /// The hit of a ray of the block on the reported primitive. `None` if nothing was reported or [`World::refine`]
+    /// The hit of a ray of the block on the reported primitive. `None` if nothing was reported or [`SceneIds::refine`]
     /// must decide.
     #[inline]
     pub(super) fn hit(&self, lane: usize, primitive: u32) -> Option<Hit> {

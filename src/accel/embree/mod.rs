@@ -1,21 +1,21 @@
 //! Ray tracing by Embree, 3.13 or 4.x.
 //!
-//! Reading order: `error`, `device` (errors, memory), `scene` (geometries, instances), `world` (ids, exact hits),
-//! `exact` (exact hits of a block of rays), `context` (state of the callbacks of a query), `callbacks` (first hits,
-//! alpha masks, quadrics, patches, curves), `kernels` (functions of both API versions), `embree_accel` (the tracer, and
+//! Reading order: `error`, `device` (errors, memory), `scene` (geometries, instances), `scene_ids` (ids, exact hits),
+//! `exact_hits` (exact hits of a block of rays), `context` (state of the callbacks of a query), `callbacks` (first hits,
+//! alpha masks, quadrics, patches, curves), `calls` (functions of both API versions), `embree_accel` (the tracer, and
 //! why its results do not depend on packets), `query` (batches), [`bare`] (Embree alone, for comparison).
 
 pub mod bare;
 mod callbacks;
+mod calls;
 mod context;
 mod device;
 mod embree_accel;
 mod error;
 mod exact_hits;
-mod kernels;
 mod query;
 mod scene;
-mod world;
+mod scene_ids;
 
 pub use embree_accel::{EmbreeAccel, EmbreeOptions};
 pub use error::{EmbreeError, ErrorCode};

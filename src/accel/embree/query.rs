@@ -1,11 +1,11 @@
 //! Conversion of ray batches to Embree's single rays and packets, and of the results.
 #![allow(unsafe_code)]
 
+use super::calls::{self, Mode, QueryKind, RayHitPacket, RayPacket, Valid};
 use super::context::{QueryContext, Ties};
 use super::embree_accel::EmbreeAccel;
 use super::exact_hits::ExactHits;
-use super::kernels::{self, Mode, QueryKind, RayHitPacket, RayPacket, Valid};
-use super::world::{Refined, Reported};
+use super::scene_ids::{Refined, Reported};
 use crate::accel::{Coherence, Hit, RayBatch};
 use crate::geometry::Visibility;
 use embree4_sys as sys;
@@ -51,7 +51,7 @@ impl EmbreeAccel {
 
     fn intersect_singly(&self, rays: &RayBatch, hits: &mut Vec<Option<Hit>>) {
         self.intersect_blocks(rays, FIRST_SINGLE, hits, |context, block| {
-            block.for_each(|i| self.trace_one(context, i, kernels::T_NEAR));
+            block.for_each(|i| self.trace_one(context, i, calls::T_NEAR));
         });
     }
 
@@ -63,7 +63,7 @@ impl EmbreeAccel {
                 packet.geometry = [sys::RTC_INVALID_GEOMETRY_ID; N];
                 packet.instance = [sys::RTC_INVALID_GEOMETRY_ID; N];
                 // SAFETY: the scene is committed, the lanes in `valid` are finite, ids are indices of the batch.
-                unsafe { kernels::intersect_packet(self.root.raw(), context, mode, &valid, &mut packet) };
+                unsafe { calls::intersect_packet(self.root.raw(), context, mode, &valid, &mut packet) };
                 packet.store(context, base - block.start);
             }
             if context.tied != [0; BLOCK] {
@@ -75,10 +75,10 @@ impl EmbreeAccel {
     /// Traces the rays of a block with ties again.
     #[cold]
     fn settle_ties(&self, context: &mut QueryContext<'_>, block: Range<usize>) {
-        let mut single = kernels::query_context(&self.world, context.rays, FIRST_SINGLE);
+        let mut single = calls::query_context(&self.world, context.rays, FIRST_SINGLE);
         single.begin(block.start);
         for (lane, i) in block.enumerate().filter(|&(lane, _)| context.tied[lane] != 0) {
-            self.trace_one(&mut single, i, kernels::T_NEAR);
+            self.trace_one(&mut single, i, calls::T_NEAR);
             context.first.set(lane, &single.first.get(lane));
         }
         single.finish();
@@ -92,7 +92,7 @@ impl EmbreeAccel {
         hits: &mut Vec<Option<Hit>>,
         mut trace: impl FnMut(&mut QueryContext<'_>, Range<usize>),
     ) {
-        let mut context = kernels::query_context(&self.world, rays, mode);
+        let mut context = calls::query_context(&self.world, rays, mode);
         let mut exact = ExactHits::default();
         for base in (0..rays.len()).step_by(BLOCK) {
             let count = BLOCK.min(rays.len() - base);
@@ -125,7 +125,7 @@ impl EmbreeAccel {
         query.hit.geomID = sys::RTC_INVALID_GEOMETRY_ID;
         query.hit.instID = [sys::RTC_INVALID_GEOMETRY_ID];
         // SAFETY: the scene is committed, the ray is finite and its id is `i`.
-        unsafe { kernels::intersect1(self.root.raw(), context, FIRST_SINGLE, &mut query) };
+        unsafe { calls::intersect1(self.root.raw(), context, FIRST_SINGLE, &mut query) };
     }
 
     /// The exact hit of ray `i`, for which Embree reported `first`. If this is the surface that the ray left, the ray
@@ -134,14 +134,14 @@ impl EmbreeAccel {
     fn refine_one(&self, rays: &RayBatch, i: usize, mut first: Reported) -> Option<Hit> {
         // Continue behind the surface until there is another hit
         let ray = rays.get(i);
-        let mut context = kernels::query_context(&self.world, rays, FIRST_SINGLE);
+        let mut context = calls::query_context(&self.world, rays, FIRST_SINGLE);
         let mut exact = self.world.refine(&ray, &first);
         for _ in 0..MAX_RETRIES {
             if exact != Refined::Behind {
                 break;
             }
             context.begin(i);
-            self.trace_one(&mut context, i, first.t.next_up().max(kernels::T_NEAR));
+            self.trace_one(&mut context, i, first.t.next_up().max(calls::T_NEAR));
             first = context.first.get(0);
             if first.geometry == u32::MAX {
                 break;
@@ -158,7 +158,7 @@ impl EmbreeAccel {
     }
 
     fn occluded_singly(&self, rays: &RayBatch, occluded: &mut Vec<bool>) {
-        let mut context = kernels::query_context(&self.world, rays, ANY_SINGLE);
+        let mut context = calls::query_context(&self.world, rays, ANY_SINGLE);
         occluded.extend((0..rays.len()).map(|i| {
             let o = [rays.ox[i], rays.oy[i], rays.oz[i]];
             if !can_trace(o, [rays.dx[i], rays.dy[i], rays.dz[i]], rays.t_max[i]) {
@@ -166,7 +166,7 @@ impl EmbreeAccel {
             }
             let mut query = single_ray(rays, i, Visibility::SHADOW);
             // SAFETY: the scene is committed, the ray is finite and its id is `i`.
-            unsafe { kernels::occluded1(self.root.raw(), &mut context, &mut query) };
+            unsafe { calls::occluded1(self.root.raw(), &mut context, &mut query) };
             query.tfar < 0.0
         }));
         context.finish();
@@ -174,11 +174,11 @@ impl EmbreeAccel {
 
     fn occluded_packets<const N: usize>(&self, rays: &RayBatch, mode: Mode, occluded: &mut Vec<bool>) {
         let mut packet = RayPacket::<N>::new(Visibility::SHADOW.0);
-        let mut context = kernels::query_context(&self.world, rays, mode);
+        let mut context = calls::query_context(&self.world, rays, mode);
         for base in (0..rays.len()).step_by(N) {
             let valid = load(&mut packet, rays, base);
             // SAFETY: the scene is committed, the lanes in `valid` are finite, ids are indices of the batch.
-            unsafe { kernels::occluded_packet(self.root.raw(), &mut context, mode, &valid, &mut packet) };
+            unsafe { calls::occluded_packet(self.root.raw(), &mut context, mode, &valid, &mut packet) };
             let count = N.min(rays.len() - base);
             occluded.extend((0..count).map(|lane| valid.0[lane] != 0 && packet.tfar[lane] < 0.0));
         }
@@ -193,7 +193,7 @@ pub(super) fn single_ray(rays: &RayBatch, i: usize, visibility: Visibility) -> s
         org_x: rays.ox[i],
         org_y: rays.oy[i],
         org_z: rays.oz[i],
-        tnear: kernels::T_NEAR,
+        tnear: calls::T_NEAR,
         dir_x: rays.dx[i],
         dir_y: rays.dy[i],
         dir_z: rays.dz[i],

@@ -73,7 +73,7 @@ fn analog_walk(l: &Layered, wo: Vec3, s: &mut Pcg32) -> Option<(Vec3, Rgb, bool)
     let mut x = l.top.sample_select(wo, s.random::<f32>(), s.random::<[f32; 2]>(), Transport::Radiance, all)?;
     let mut beta = weight(&x);
     let mut specular = x.lobe.is_specular();
-    if !x.lobe.is_transmission() {
+    if !x.lobe.contains(Lobe::TRANSMISSION) {
         return Some((x.wi, beta, specular));
     }
     let (mut w, mut z) = (x.wi, l.thickness);
@@ -106,7 +106,7 @@ fn analog_walk(l: &Layered, wo: Vec3, s: &mut Pcg32) -> Option<(Vec3, Rgb, bool)
         beta *= weight(&x);
         specular &= x.lobe.is_specular();
         w = x.wi;
-        if x.lobe.is_transmission() {
+        if x.lobe.contains(Lobe::TRANSMISSION) {
             return Some((w, beta, specular));
         }
     }

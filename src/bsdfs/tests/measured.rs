@@ -204,7 +204,7 @@ fn alpha_is_that_of_the_facets() {
     for alpha in [0.15, 0.4] {
         let sample = Sample::new(alpha, alpha);
         let tables = tables(sample, &Resolution { theta: 2, normals: [8, 8], colors: [4, 4], ..isotropic() });
-        let found = Bsdf::Measured(Measured { tables: &tables }).glossy_lobe(Vec3::Z).unwrap().0;
+        let found = Bsdf::Measured(Measured { tables: &tables }).glossy_lobe(Vec3::Z).unwrap().alpha;
         assert!((found / alpha - 1.0).abs() < 0.03, "{alpha} {found}");
     }
 }

@@ -167,7 +167,7 @@ fn nothing_is_ever_nan_negative_or_infinite() {
             if let Some(x) = sample {
                 assert!(x.pdf > 0.0 && x.pdf.is_finite() && x.f.is_finite(), "{name} {wo} {x:?}");
                 assert!((x.wi.length() - 1.0).abs() < 1e-4 && x.wi.z != 0.0, "{name} {wo} {x:?}");
-                assert_eq!(x.lobe.is_transmission(), x.wi.z * wo.z < 0.0, "{name} {wo} {x:?}");
+                assert_eq!(x.lobe.contains(Lobe::TRANSMISSION), x.wi.z * wo.z < 0.0, "{name} {wo} {x:?}");
             }
             let u = s.random::<[f32; 2]>();
             assert!(b.albedo_estimate(wo, || [s.random::<f32>(), u[0], u[1]]).is_finite());
@@ -307,7 +307,7 @@ fn furnaces_have_their_known_albedo() {
     let r = lumiris_lanes::kernels::thin_dielectric::reflectance(1.0, 1.5);
     assert!((r - 2.0 * 0.04 / 1.04).abs() < 1e-6);
     // A perfect mirror under an absent coat is a perfect mirror.
-    let (eta, k) = Conductor::eta_k_of_reflectance(Rgb::splat(0.8));
+    let ComplexIor { eta, k } = Conductor::eta_k_of_reflectance(Rgb::splat(0.8));
     let mirror = Conductor { distribution: ggx(0.0, 0.0), eta, k };
     assert!((mean(&Bsdf::Conductor(mirror), Vec3::Z) - 0.8).abs() < 1e-3);
     assert!((PI * Diffuse { reflectance: RED }.f(Vec3::Z, Vec3::Z).r - RED.r).abs() < 1e-6);

@@ -14,15 +14,15 @@ use crate::direct::stats::DirectStats;
 use crate::direct::transmittance::{Crossing, Departure};
 use crate::direct::vertices::{BsdfSamples, Vertices};
 use crate::lights::LightId;
-use crate::lights::many::{NO_LIGHT, Scratch};
+use crate::lights::sample_columns::{NO_LIGHT, Scratch};
 use crate::media::Sides;
 use crate::scene::RenderJob;
 use lumiris_lanes::columns::{Columns3, padded};
+use lumiris_lanes::level;
+use lumiris_lanes::sampler::{self, Below};
 use lumiris_lanes::vertex as kernels;
-use lumiris_lanes::{level, sampler};
-use lumiris_numbers::estimators::mis::Technique;
+use lumiris_numbers::estimators::heuristics::Technique;
 use lumiris_numbers::math::{Rgb, Vec3};
-use lumiris_numbers::samplers::{SampleStream, Split};
 use std::time::Instant;
 
 /// Estimates direct light at vertices in columns; holds the buffers of one worker.
@@ -31,7 +31,6 @@ pub struct ColumnDirectLighting {
     /// Allocations of the first rows, which may differ from [`Batch::usual`].
     allocations: Vec<SampleAllocation>,
     samples: SampleColumns,
-    drawn: Vec<SampleStream>,
     scratch: Scratch,
     traced: Traced,
     crossing: Crossing,
@@ -104,7 +103,7 @@ impl ColumnDirectLighting {
         let unusual = if techniques.are_drawn() { n } else { vertices.bsdfs.len() };
         self.allocations.clear();
         self.allocations
-            .extend((0..unusual).map(|i| techniques.allocation(&vertices.bsdf(i).bsdf, &vertices.direct[i])));
+            .extend((0..unusual).map(|i| techniques.allocation(&vertices.bsdf(i).bsdf, &vertices.direct.get(i))));
         let rest = if unusual < n { Some(&usual) } else { None };
         let most = |of: fn(&SampleAllocation) -> u32| self.allocations.iter().chain(rest).map(of).max().unwrap_or(0);
         let sum = |of: fn(&SampleAllocation) -> u32| {
@@ -144,15 +143,17 @@ impl ColumnDirectLighting {
     fn draw(&mut self, batch: &Batch<'_, '_>, draw: Draw) {
         let of = |a: &SampleAllocation| if draw.by_light { a.light_draws } else { a.bsdf_draws };
         let key = if draw.by_light { domain::LIGHT } else { domain::BSDF };
-        let (unusual, usual) = batch.vertices.direct.split_at(self.allocations.len());
-        self.drawn.clear();
-        self.drawn.extend(unusual.iter().zip(&self.allocations).map(|(s, a)| s.split(key, of(a).max(1), draw.index)));
-        if self.drawn.len() < draw.rows {
-            let mut split = Split::new(key, of(&batch.usual), draw.index);
-            self.drawn.extend(usual.iter().map(|s| split.of(s)));
+        let count = |row: usize| of(self.allocations.get(row).unwrap_or(&batch.usual)).max(1);
+
+        // Rows with the same number of samples together
+        let mut first = 0;
+        while first < draw.rows {
+            let end = (first + 1..draw.rows).find(|&row| count(row) != count(first)).unwrap_or(draw.rows);
+            let below = Below::Split { key, count: count(first), index: draw.index };
+            let numbers = self.samples.u.each_mut().map(|u| &mut u[first..end]);
+            sampler::draw(level(), &batch.vertices.direct, first..end, below, numbers);
+            first = end;
         }
-        let n = self.drawn.len();
-        sampler::draw(level(), &self.drawn, self.samples.u.each_mut().map(|u| &mut u[..n]));
     }
 
     /// Removes the sample at rows with fewer samples.
@@ -358,7 +359,7 @@ impl ColumnDirectLighting {
                 (self.emitter_rays.lights[i].unwrap_or(NO_LIGHT), lights_before + draw.index)
             };
             let medium = vertices.media(i).towards(vertices.surface.n.vec3(i).dot(d));
-            Departure { light, medium, stream: vertices.direct[i].domain(domain::TRANSMITTANCE + index) }
+            Departure { light, medium, stream: vertices.direct.get(i).domain(domain::TRANSMITTANCE + index) }
         };
 
         // Trace, and multiply the contributions

@@ -11,7 +11,7 @@ use super::emitters::EmitterRays;
 use super::samples::{SampleColumns, Traced};
 use crate::accel::RayBatch;
 use crate::direct::vertices::Vertices;
-use crate::lights::many::Scratch;
+use crate::lights::sample_columns::Scratch;
 use crate::scene::RenderJob;
 use lumiris_numbers::estimators::ocv::MAX_COMPONENTS;
 use lumiris_numbers::math::Vec3;

@@ -6,7 +6,7 @@ use crate::direct::bsdf_samples::{EmitterInDirection, emitter_at};
 use crate::direct::point::LightPoint;
 use crate::direct::vertices::Vertices;
 use crate::lights::LightId;
-use crate::lights::many::LightSamples;
+use crate::lights::sample_columns::LightSamples;
 use crate::scene::{EmitterHit, EmitterScratch, RenderJob};
 use lumiris_lanes::columns::padded;
 use lumiris_numbers::math::Ray;
@@ -43,8 +43,16 @@ impl EmitterRays {
         rows.clear();
         rows.extend((0..n as u32).filter(|&i| samples.bsdf.pdf[i as usize] > 0.0));
         far.clear();
+        let has_infinite = !job.lights.infinite.is_empty();
         let mut add = |samples: &mut SampleColumns, i: usize, hit: Option<EmitterHit>| {
-            let Some(hit) = hit else { return far.push(i as u32) };
+            let hit = match hit {
+                Some(hit) => hit,
+                None if has_infinite => return far.push(i as u32),
+                None => {
+                    samples.bsdf.pdf[i] = 0.0;
+                    return;
+                }
+            };
             lights[i] = hit.light;
             let pmf = |ctx: &_, light| job.lights.sampler.pmf(ctx, light);
             match emitter_at(job, &at.get(i), samples.light.wi.vec3(i), &hit, time[i], pmf) {

@@ -2,7 +2,7 @@
 
 use crate::accel::RayBatch;
 use crate::direct::vertices::{BsdfSamples, Surface};
-use crate::lights::many::LightSamples;
+use crate::lights::sample_columns::LightSamples;
 use lumiris_lanes::columns::{Column, Columns3, reserve};
 use lumiris_lanes::level;
 use lumiris_lanes::vertex::{self as kernels, Ends, Rays};

@@ -7,7 +7,7 @@ use crate::direct::estimators::mc::{self, Mc};
 use crate::direct::estimators::mis::Mis;
 use crate::direct::estimators::ocv::Ocv;
 use crate::settings::OcvForm;
-use lumiris_numbers::estimators::mis::Heuristic;
+use lumiris_numbers::estimators::heuristics::Heuristic;
 use lumiris_numbers::samplers::SampleStream;
 
 /// Light and BSDF samples at the vertices of a batch, for estimators that trace all samples.

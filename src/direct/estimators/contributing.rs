@@ -30,11 +30,11 @@ use crate::direct::domain;
 use crate::direct::light_samples::{self, unshadowed_candidate};
 use crate::direct::point::ShadingPoint;
 use crate::direct::t1::T1;
-use crate::lights::learned_visibility::UnseenLight;
+use crate::lights::learned_visibility::{ExpectedContribution, NoncontributingLight};
 use crate::lights::visibility_cache::ContributingLights;
-use crate::lights::{LearnedVisibility, LightCtx, LightId, LightSampling, SampledLight};
+use crate::lights::{LeAndPdf, LearnedVisibility, LightCtx, LightId, LightSampling, PhotonCount, SampledLight};
 use crate::scene::RenderJob;
-use lumiris_numbers::estimators::mis::Heuristic;
+use lumiris_numbers::estimators::heuristics::Heuristic;
 use lumiris_numbers::math::cumulative;
 use std::ops::Range;
 
@@ -153,7 +153,7 @@ impl Drawn<'_> {
             Others::BySampler { n } => return n as f32 * lights.sampler.pmf(ctx, light),
             Others::Noncontributing { n, .. } => n as f32,
         };
-        if let Some(k) = self.contributing.place(light) {
+        if let Some(k) = self.contributing.index_of(light) {
             let weighted = buffers.rates[self.rates.clone()].get(k).copied();
             return weighted.unwrap_or_else(|| self.rate_by_photons(k));
         }
@@ -161,9 +161,13 @@ impl Drawn<'_> {
             return 0.0;
         };
         let noncontributing =
-            learned.unseen_light(ctx, (&self.contributing, &buffers.singles[self.singles.clone()]), light);
+            learned.noncontributing_light(ctx, &self.contributing, &buffers.singles[self.singles.clone()], light);
         let pmf = noncontributing.choice.pmf;
-        if pmf > 0.0 && noncontributing.importance > 0.0 { n * pmf * survival(&noncontributing, scale) } else { 0.0 }
+        if pmf > 0.0 && noncontributing.expected.importance > 0.0 {
+            n * pmf * survival(&noncontributing, scale)
+        } else {
+            0.0
+        }
     }
 
     /// Expected number of samples of contributing light number `k`, chosen in proportion to photon counts.
@@ -176,8 +180,9 @@ impl Drawn<'_> {
 
 /// Survival probability of a sample of a light without photons; `scale` is the probability per expected contribution.
 #[inline]
-fn survival(noncontributing: &UnseenLight, scale: f32) -> f32 {
-    (noncontributing.importance * noncontributing.visibility.sqrt() / noncontributing.choice.pmf * scale).min(1.0)
+fn survival(noncontributing: &NoncontributingLight, scale: f32) -> f32 {
+    let ExpectedContribution { importance, visibility } = noncontributing.expected;
+    (importance * visibility.sqrt() / noncontributing.choice.pmf * scale).min(1.0)
 }
 
 /// A point with its lights.
@@ -205,7 +210,8 @@ impl At<'_, '_> {
         if self.n_bsdf > 0.0 && self.overlaps(light) {
             // Infinite lights overlap: all of them contribute to a direction
             let rate = |ctx: &LightCtx, light| drawn.rate(self.lights, buffers, ctx, light);
-            (sample.li, sample.pdf) = self.lights.infinite_in_direction_by(&self.ctx, sample.wi, rate);
+            LeAndPdf { le: sample.li, pdf: sample.pdf } =
+                self.lights.infinite_in_direction_by(&self.ctx, sample.wi, rate);
         }
         let allocation = SampleAllocation { n_bsdf: self.n_bsdf, ..SampleAllocation::fixed(1, 0) };
         unshadowed_candidate(self.index, self.point, &allocation, light, sample)
@@ -310,7 +316,7 @@ impl Draws<'_, '_> {
         let expected = if contributing.len() <= MAX_WEIGHTED {
             self.weigh(at, &drawn.contributing)?
         } else {
-            contributing.iter().map(|&(light, count)| at.learned.irradiance_of(light, count)).sum()
+            contributing.iter().map(|&PhotonCount { light, count }| at.learned.irradiance_of(light, count)).sum()
         };
 
         // Survival of samples of non-contributing lights
@@ -330,8 +336,8 @@ impl Draws<'_, '_> {
         let weights = &mut self.buffers.weights;
         weights.clear();
         let (mut sum, mut expected) = (0.0, 0.0);
-        for &(light, count) in contributing.lights {
-            let (importance, visibility) = at.learned.expect(&at.ctx, light, count);
+        for &PhotonCount { light, count } in contributing.lights {
+            let ExpectedContribution { importance, visibility } = at.learned.expect(&at.ctx, light, count);
             let weight = importance * visibility.sqrt();
             sum += weight;
             expected += importance * visibility;
@@ -347,11 +353,12 @@ impl Draws<'_, '_> {
         let scale = drawn.n as f32 / weights.iter().sum::<f32>();
         let lights = drawn.contributing.lights;
         let numbers = || systematic(weights, scale, offset).zip(lights);
-        rates.extend(numbers().map(|(counts, &(light, _))| at.rate(light, counts)));
+        rates.extend(numbers().map(|(counts, &PhotonCount { light, .. })| at.rate(light, counts)));
         drawn.rates.end = rates.len();
 
         let buffers = &*self.buffers;
-        for (k, (counts, &(light, _))) in systematic(&buffers.weights, scale, offset).zip(lights).enumerate() {
+        let counts = systematic(&buffers.weights, scale, offset);
+        for (k, (counts, &PhotonCount { light, .. })) in counts.zip(lights).enumerate() {
             let rate = buffers.rates[drawn.rates.start + k];
             for i in 0..counts.drawn {
                 let u = at.point.stream.split(domain::CONTRIBUTING + k as u32, counts.drawn, i).draw::<2>();
@@ -368,7 +375,7 @@ impl Draws<'_, '_> {
             let [u_choice, u0, u1] = at.point.stream.split(domain::LIGHT, n, i).draw::<3>();
             let k = cumulative::find(sums, u_choice * total as f32).min(lights.len() - 1);
             let rate = drawn.rate_by_photons(k);
-            records.extend(at.sample(lights[k].0, rate, [u0, u1], drawn, self.buffers));
+            records.extend(at.sample(lights[k].light, rate, [u0, u1], drawn, self.buffers));
         }
     }
 }
@@ -385,12 +392,13 @@ impl At<'_, '_> {
         let mut count = 0;
         for i in 0..n {
             let [u_choice, u_survival, u0, u1] = self.point.stream.split(domain::NONCONTRIBUTING, n, i).draw::<4>();
-            let Some(noncontributing) = self.learned.sample_unseen(&self.ctx, (contributing, singles), u_choice) else {
+            let Some(noncontributing) = self.learned.sample_noncontributing(&self.ctx, contributing, singles, u_choice)
+            else {
                 continue;
             };
             let SampledLight { light, pmf, .. } = noncontributing.choice;
             // Contributing lights have their own samples
-            if contributing.place(light).is_some() || !(noncontributing.importance > 0.0) {
+            if contributing.index_of(light).is_some() || !(noncontributing.expected.importance > 0.0) {
                 continue;
             }
             let survival = survival(&noncontributing, scale);

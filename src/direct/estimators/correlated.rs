@@ -28,7 +28,7 @@ use crate::direct::light_samples::{light_candidate, with_infinite};
 use crate::direct::point::ShadingPoint;
 use crate::direct::shadow_segments::Segments;
 use crate::direct::t1::{T1, choice_by_sampler};
-use crate::lights::{LightId, LightSample};
+use crate::lights::{LightId, LightSample, SurfacePoint};
 use crate::scene::{EmitterHit, EmitterScratch, RenderJob};
 use crate::settings::SamplingTechnique;
 use lumiris_numbers::estimators::correlated::{self, SUMS};
@@ -343,7 +343,7 @@ impl Buffers {
                     point.time,
                 );
                 if let Some(light) = hit.light {
-                    let at = (point.p, estimate.n);
+                    let at = SurfacePoint { p: point.p, n: estimate.n };
                     self.crossed[i as usize] += job.irradiances.l(lights, light, at, pending.wi, surface.n);
                 }
                 // If emitters never hide each other, there is nothing behind the first one
@@ -401,6 +401,6 @@ fn sampled_l(job: &RenderJob, estimate: &Estimate, p: Vec3, light: LightId, samp
     } else if lights.infinite.contains(&light) {
         job.irradiances.environment()
     } else {
-        job.irradiances.l(lights, light, (p, estimate.n), sample.wi, sample.n)
+        job.irradiances.l(lights, light, SurfacePoint { p, n: estimate.n }, sample.wi, sample.n)
     }
 }

@@ -6,7 +6,7 @@ use crate::direct::light_samples;
 use crate::direct::point::ShadingPoint;
 use crate::direct::t1::T1;
 use crate::settings::{IntegratorSettings, bsdf_samples};
-use lumiris_numbers::estimators::mis::Heuristic;
+use lumiris_numbers::estimators::heuristics::Heuristic;
 use lumiris_numbers::samplers::SampleStream;
 
 /// Light and BSDF sampling.

@@ -22,12 +22,12 @@ use crate::direct::candidates::{Candidate, Candidates, SampleAllocation};
 use crate::direct::domain;
 use crate::direct::light_samples::unshadowed_candidate;
 use crate::direct::point::ShadingPoint;
-use crate::direct::proposal_columns::{LightProposals, PointProposals, ProposalColumns, Techniques};
+use crate::direct::proposal_columns::{LightProposals, PointProposals, ProposalColumns, ProposalTechniques};
 use crate::direct::shadow_segments::Segments;
 use crate::direct::t1::T1;
 use crate::scene::RenderJob;
 use crate::settings::{IntegratorSettings, ProposalPoints, RisSettings, SampleCounts, Strata, Target};
-use lumiris_numbers::estimators::mis::Heuristic;
+use lumiris_numbers::estimators::heuristics::Heuristic;
 use lumiris_numbers::estimators::ris::{Draw, strata, stratified, systematic, with_replacement};
 use lumiris_numbers::math::Rgb;
 use lumiris_numbers::math::hash::{pcg4d, unit_f32};
@@ -67,9 +67,9 @@ impl Ris {
     }
 
     /// Allocation and weights of the proposals of a point.
-    fn techniques(&self, point: &ShadingPoint<'_>) -> Techniques {
+    fn techniques(&self, point: &ShadingPoint<'_>) -> ProposalTechniques {
         let SampleAllocation { n_light, n_bsdf, .. } = allocation(point);
-        Techniques { n_light, n_bsdf, heuristic: self.heuristic, target: self.target }
+        ProposalTechniques { n_light, n_bsdf, heuristic: self.heuristic, target: self.target }
     }
 
     /// T1 and select, alternately: makes the proposals of a chunk of points and draws samples from them. Only the

@@ -1,6 +1,7 @@
 //! Scattering at all rows: values and densities for one direction per row, and BSDF sampling.
 
 use super::vertex_columns::{Run, Vertices};
+use crate::bsdfs::BsdfValue;
 use lumiris_lanes::columns::{Column, Columns3, reserve};
 use lumiris_lanes::kernels::{self, Directions, Kernel, MAX_PARAMS, Rows, Values};
 use lumiris_lanes::level;
@@ -67,7 +68,8 @@ impl Vertices<'_> {
         for Run { kernel, rows } in self.runs(n) {
             let Some(kernel) = kernel else {
                 for i in rows.clone() {
-                    let (value, density) = self.bsdfs[i].f_cos_and_pdf(self.surface.wo.vec3(i), wi.vec3(i));
+                    let BsdfValue { f_cos: value, pdf: density } =
+                        self.bsdfs[i].f_cos_and_pdf(self.surface.wo.vec3(i), wi.vec3(i));
                     f_cos.set_rgb(i, value);
                     pdf[i] = density;
                 }

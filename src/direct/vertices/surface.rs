@@ -1,7 +1,7 @@
 //! Points of surfaces in columns.
 
 use crate::lights::GlossyLobe;
-use crate::lights::many::LitPoints;
+use crate::lights::sample_columns::LitPoints;
 use lumiris_lanes::columns::Columns3;
 use lumiris_lanes::vertex::Ends;
 

@@ -15,7 +15,7 @@ use lumiris_lanes::lane::LANES;
 use lumiris_lanes::level;
 use lumiris_lanes::vertex::{self as kernels, Points, TriangleHits};
 use lumiris_numbers::math::{Frame, Rgb, Vec3};
-use lumiris_numbers::samplers::SampleStream;
+use lumiris_numbers::samplers::StreamColumns;
 use std::ops::Range;
 
 /// The vertices of a batch, at most one per path.
@@ -26,9 +26,9 @@ pub struct Vertices<'w> {
     /// Time (0 to 1).
     pub time: Vec<f32>,
     /// Random numbers of the vertices, and of their direct light.
-    pub streams: Vec<SampleStream>,
+    pub streams: StreamColumns,
     /// See [`Self::streams`].
-    pub direct: Vec<SampleStream>,
+    pub direct: StreamColumns,
     /// Points, and Lambertian reflection there.
     pub surface: Surface,
     /// BSDFs of the first rows; all later rows are Lambertian.
@@ -282,7 +282,7 @@ impl<'w> Vertices<'w> {
             bsdf: self.bsdf(i),
             lobe: self.surface.lit_points().get(i).lobe,
             time: self.time[i],
-            stream: self.direct[i],
+            stream: self.direct.get(i),
             sample_counts,
             fit,
             sample,
@@ -297,9 +297,9 @@ impl<'w> Vertices<'w> {
         lights: &LightSampling,
         bsdf: impl Fn(usize) -> Option<SurfaceBsdf<'w>>,
     ) {
-        let mut row_of = vec![0; other.path.iter().max().map_or(0, |&path| path as usize + 1)];
+        let mut row_of = vec![0_u32; other.path.iter().max().map_or(0, |&path| path as usize + 1)];
         for i in 0..other.len() {
-            row_of[other.path[i] as usize] = i;
+            row_of[other.path[i] as usize] = i as u32;
             let Some(bsdf) = bsdf(i) else { continue };
             let s = &other.surface;
             let (p, p_error, wo) = (s.p.vec3(i), s.p_error.vec3(i), s.wo.vec3(i));
@@ -309,10 +309,10 @@ impl<'w> Vertices<'w> {
 
         // Times and random numbers
         let Vertices { path, time, streams, direct, .. } = self;
-        let rows = || path.iter().map(|&path| row_of[path as usize]);
-        time.extend(rows().map(|row| other.time[row]));
-        streams.extend(rows().map(|row| other.streams[row]));
-        direct.extend(rows().map(|row| other.direct[row]));
+        let rows: Vec<u32> = path.iter().map(|&path| row_of[path as usize]).collect();
+        time.extend(rows.iter().map(|&row| other.time[row as usize]));
+        streams.gather(&other.streams, &rows);
+        direct.gather(&other.direct, &rows);
     }
 }
 
@@ -334,12 +334,12 @@ mod tests {
     use super::*;
     use crate::lights::{LightChoice, LightSamplerKind, LightSetBuilder};
     use lumiris_numbers::math::Bounds3;
-    use lumiris_numbers::samplers::SamplerKind;
+    use lumiris_numbers::samplers::{SampleStream, SamplerKind};
     use std::sync::Arc;
 
     fn lights() -> LightSampling {
         let set = LightSetBuilder::default().build(&Bounds3::from_points([Vec3::ZERO, Vec3::ONE]));
-        let choice = LightChoice { kind: LightSamplerKind::Uniform, infinite_fraction: None, glows: false };
+        let choice = LightChoice { kind: LightSamplerKind::Uniform, infinite_fraction: None, volumes: false };
         LightSampling::new(Arc::new(set), choice, 1)
     }
 
@@ -361,8 +361,8 @@ mod tests {
         assert_eq!(vertices.path, paths);
         for (row, &path) in paths.iter().enumerate() {
             assert_eq!((vertices.surface.p.vec3(row), vertices.time[row]), (Vec3::splat(path as f32), path as f32));
-            assert_eq!(vertices.streams[row].draw::<2>(), stream(path, 0).draw::<2>());
-            assert_eq!(vertices.direct[row].draw::<2>(), stream(path, 1).draw::<2>());
+            assert_eq!(vertices.streams.get(row).draw::<2>(), stream(path, 0).draw::<2>());
+            assert_eq!(vertices.direct.get(row).draw::<2>(), stream(path, 1).draw::<2>());
         }
     }
 
@@ -378,8 +378,8 @@ mod tests {
         vertices.finish(&lights);
         for &path in &vertices.path {
             vertices.time.push(path as f32);
-            vertices.streams.push(stream(path, 0));
-            vertices.direct.push(stream(path, 1));
+            vertices.streams.extend([stream(path, 0)].iter());
+            vertices.direct.extend([stream(path, 1)].iter());
         }
 
         // Without a kernel, by kernel in a medium, and Lambertian

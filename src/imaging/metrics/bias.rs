@@ -7,7 +7,7 @@
 //! - from the standard deviation of x − r over the pixels, s / √n. This works for any image, but counts errors that
 //!   vary over the image as noise, and is too small if the errors of neighbouring pixels are correlated.
 
-use super::{Pixel, finite_pairs};
+use super::pixels::{Pixel, finite_pairs};
 use lumiris_numbers::estimators::stats::Welford;
 use strum::IntoStaticStr;
 

@@ -6,7 +6,7 @@
 //! - nMSE = MSE / mean r²: no ε, and dark pixels have no extra weight;
 //! - PSNR = 10 log₁₀ (peak² / MSE) decibels.
 
-use super::{Pixel, finite_pairs, is_finite};
+use super::pixels::{Pixel, finite_pairs, is_finite};
 
 /// The usual ε of relMSE.
 pub const DEFAULT_EPSILON: f64 = 0.01;

@@ -6,7 +6,7 @@
 //! (a x² + b x) / (c x² + d x + e) with the constants of the paper. The first exposure maps the maximum luminance of
 //! the reference to 0.85 of the display, the last one the median. The others lie between, at most one stop apart.
 
-use super::{Pixel, is_finite};
+use super::pixels::{Pixel, is_finite};
 use crate::imaging::color::linear_to_srgb;
 use lumiris_numbers::estimators::stats::median;
 use lumiris_numbers::math::Rgb;

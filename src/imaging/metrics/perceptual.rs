@@ -12,7 +12,7 @@
 //! more sensitive system. The thresholds cross near 1 cd/m²; below, rods are more sensitive. Both use the photopic
 //! luminance, since an RGB image does not contain the scotopic one.
 
-use super::{Pixel, finite_pairs, is_finite};
+use super::pixels::{Pixel, finite_pairs, is_finite};
 use lumiris_numbers::math::Rgb;
 
 /// Threshold of the cones (cd/m²) at the luminance 10^`log` cd/m².

@@ -16,7 +16,7 @@
 //!   and the tests miss differences;
 //! - neighbouring pixels that share samples.
 
-use super::{Pixel, finite_pairs};
+use super::pixels::{Pixel, finite_pairs};
 use lumiris_numbers::estimators::stats::{chi_squared_tail, z_test};
 
 /// Result of [`significance`].

@@ -3,7 +3,7 @@
 //! All animations of a file are played. If two animate the same property, as the clips of a character do, the first one
 //! takes precedence.
 
-use super::Messages;
+use super::messages::Messages;
 use glam::Quat;
 use lumiris_formats::gltf::{Document, GltfError, Place};
 use lumiris_numbers::math::Vec3;

@@ -1,24 +1,25 @@
 //! Geometry and lights of the scene.
 
-use super::Messages;
 use super::animation::changes;
 use super::choice::{Names, chosen, name_of, shown};
 use super::extent;
 use super::materials::{Look, Materials};
 use super::meshes::{Primitive, primitive};
+use super::messages::Messages;
 use super::nodes::{Node, instances, middle, nodes};
 use super::pose::{Pose, PoseKey, Skins};
 use super::textures::{EmissionKey, EmissionSource};
-use super::view::{camera, cameras, chosen_camera};
+use super::view::{Framing, View, cameras, chosen_camera, view};
 use crate::geometry::{Geometry, GeometryId, GeometrySet, Group, Instance, Shape, TriangleMesh, Visibility};
 use crate::imaging::Filter;
 use crate::imaging::oiio::ImageError;
 use crate::import::LoadOptions;
 use crate::import::cache::FileCache;
+use crate::import::images::RgbImage;
 use crate::import::resources::report;
 use crate::lights::{
-    Cover, Emission, EmissionImage, EnvironmentFilter, EnvironmentMap, EnvironmentMapping, Light, LightSet,
-    LightSetBuilder,
+    AlphaMask, DistantLight, Emission, EmissionImage, EnvironmentFilter, EnvironmentMap, EnvironmentMapping, Light,
+    LightSet, LightSetBuilder, PointLight, SpotLight,
 };
 use crate::materials::{MaterialId, MaterialSet};
 use crate::media::{Homogeneous, Medium, MediumId, MediumSet, Sides};
@@ -32,6 +33,19 @@ use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+/// An emitting geometry.
+struct Emitter {
+    geometry: GeometryId,
+    emission: Emission,
+}
+
+/// The chosen scene of a file.
+struct ChosenScene<'a> {
+    place: Place<'a>,
+    /// The choices of scenes.
+    choices: Choices,
+}
+
 /// A scene during its assembly.
 pub(super) struct Assembly<'a> {
     document: &'a Document,
@@ -39,7 +53,7 @@ pub(super) struct Assembly<'a> {
     materials: Materials<'a>,
     set: GeometrySet,
     surfaces: Vec<Surface>,
-    emitters: Vec<(GeometryId, Emission)>,
+    emitters: Vec<Emitter>,
     emission_images: HashMap<EmissionKey, Option<Arc<EmissionImage>>>,
     lights: Vec<Light>,
     media: MediumSet,
@@ -74,6 +88,7 @@ impl<'a> Assembly<'a> {
         others: &mut Vec<PathBuf>,
         messages: &mut Messages<'_>,
     ) -> Result<Option<Scene>, GltfError> {
+        // Materials, and the files of the scene
         self.materials.read(messages)?;
         others.extend(self.materials.textures.files());
         others.extend(self.options.environment.clone());
@@ -82,20 +97,25 @@ impl<'a> Assembly<'a> {
             self.check_images(files, messages);
             return Ok(None);
         }
+
+        // Nodes of the scene, at a time of the animation
         let changes = self.options.time.map(|time| changes(self.document, time, messages)).transpose()?;
-        let Some((scene, mut choices)) = self.chosen_scene(messages) else { return Ok(None) };
-        let nodes = nodes(self.document, &scene, &changes.unwrap_or_default())?;
-        let (placed, camera_names) = cameras(self.document, &nodes, messages);
-        choices.cameras = shown(&camera_names);
-        let found = chosen_camera(self.options, (&placed, &camera_names), messages);
-        // All frames of an animation have the same framing
-        let is_framed_as_a_whole = found.is_none() && self.options.time.is_some();
-        let framed = if is_framed_as_a_whole { extent::of_animations(self.document, &scene, messages)? } else { None };
-        self.origin = match (&found, &framed) {
-            (Some((node, _)), _) => near_origin(node.world_from_node.translation),
-            (None, Some((_, origin))) => *origin,
+        let Some(ChosenScene { place, mut choices }) = self.chosen_scene(messages) else { return Ok(None) };
+        let nodes = nodes(self.document, &place, &changes.unwrap_or_default())?;
+
+        // Camera, and the origin of the rendered world near it
+        let cameras = cameras(self.document, &nodes, messages);
+        let found = chosen_camera(self.options, &cameras, messages);
+        choices.cameras = shown(&cameras.names);
+        choices.camera = found.as_ref().and_then(|found| cameras.index_of(found)).filter(|&i| i > 0);
+        let framing = self.framing(&place, found.is_none(), messages)?;
+        self.origin = match (&found, &framing) {
+            (Some(found), _) => near_origin(found.node.world_from_node.translation),
+            (None, Some(framing)) => framing.origin,
             (None, None) => near_origin(middle(self.document, &nodes)?),
         };
+
+        // Meshes and lights
         if let Err(error) = self.add_meshes(&nodes, files, messages) {
             messages.error(&error);
         }
@@ -104,27 +124,52 @@ impl<'a> Assembly<'a> {
         if self.set.geometries.is_empty() {
             messages.warning(&self.document.root().key("meshes"), "the scene has no meshes to render");
         }
-        let index = found.as_ref().and_then(|(node, _)| placed.iter().position(|(other, _)| other.index == node.index));
-        choices.camera = index.filter(|&i| i > 0);
-        let (camera, film) =
-            camera(self.options, found, (framed.as_ref().map_or(&bounds, |(bounds, _)| bounds), self.origin));
+        let view = view(self.options, found, &framing.unwrap_or(Framing { bounds, origin: self.origin }));
+        self.add_environment(files, messages);
+        Ok(self.finished(view, choices, &bounds, files, messages))
+    }
+
+    /// The framing of an automatic camera that is common to all frames of an animation, if there is one.
+    fn framing(
+        &self,
+        scene: &Place<'a>,
+        is_automatic: bool,
+        messages: &mut Messages<'_>,
+    ) -> Result<Option<Framing>, GltfError> {
+        let is_animated = self.options.time.is_some();
+        if is_automatic && is_animated { extent::of_animations(self.document, scene, messages) } else { Ok(None) }
+    }
+
+    /// The environment of the options; without any light, white.
+    fn add_environment(&mut self, files: &FileCache, messages: &mut Messages<'_>) {
         if let Some(path) = &self.options.environment {
             self.lights.extend(environment(path, files, messages));
         } else if self.lights.is_empty() && self.emitters.is_empty() {
             messages.warning(&self.document.root().key("scenes"), "no light: all around is white (--environment FILE)");
             self.lights.push(Light::InfiniteConstant { l: Rgb::WHITE });
         }
+    }
+
+    /// Reads the images, and builds the scene of the assembled parts; `None` after an error.
+    fn finished(
+        mut self,
+        view: View,
+        choices: Choices,
+        bounds: &Bounds3,
+        files: &FileCache,
+        messages: &mut Messages<'_>,
+    ) -> Option<Scene> {
         let textures = &mut self.materials.textures;
         textures.set.images = textures.resources.load(files, messages.diagnostics);
         if messages.diagnostics.has_errors() {
-            return Ok(None);
+            return None;
         }
         let (geometry, textures) = (Arc::new(self.set), Arc::new(self.materials.textures.set));
-        let lights = light_set(self.lights, self.emitters, (&geometry, &textures), &bounds);
+        let lights = light_set(self.lights, self.emitters, &geometry, &textures, bounds);
         let materials = MaterialSet::new(self.materials.entries, &textures).find_caustics(&textures);
-        Ok(Some(Scene {
-            camera,
-            film,
+        Some(Scene {
+            camera: view.camera,
+            film: view.film,
             materials,
             textures,
             lights: Arc::new(lights),
@@ -133,11 +178,11 @@ impl<'a> Assembly<'a> {
             media: self.media,
             choices,
             origin: self.origin,
-        }))
+        })
     }
 
-    /// The requested scene, or the default of the file, with the choices except for cameras.
-    fn chosen_scene(&self, messages: &mut Messages<'_>) -> Option<(Place<'a>, Choices)> {
+    /// The requested scene, or the default of the file.
+    fn chosen_scene(&self, messages: &mut Messages<'_>) -> Option<ChosenScene<'a>> {
         let scenes = self.document.root().key("scenes");
         let names: Names<'a> = scenes.items().map(|scene| [name_of(&scene), None]).collect();
         let usual = self.document.root().key("scene").index().unwrap_or(0);
@@ -148,7 +193,8 @@ impl<'a> Assembly<'a> {
         match index {
             Ok(index) => {
                 let scene = (index != usual).then_some(index);
-                Some((scenes.item(index), Choices { scenes: shown(&names), scene, ..Choices::default() }))
+                let choices = Choices { scenes: shown(&names), scene, ..Choices::default() };
+                Some(ChosenScene { place: scenes.item(index), choices })
             }
             Err(message) => {
                 messages.diagnostics.error_without_place(message);
@@ -194,7 +240,8 @@ impl<'a> Assembly<'a> {
                 poses[index].1.push(i);
             }
             for (pose, users) in &poses {
-                self.add_mesh(&place, pose, (nodes, users), files, messages)?;
+                let users: Vec<&Node> = users.iter().map(|&i| &nodes[i as usize]).collect();
+                self.add_mesh(&place, pose, &users, files, messages)?;
             }
         }
         Ok(())
@@ -206,13 +253,13 @@ impl<'a> Assembly<'a> {
         &mut self,
         place: &Place<'a>,
         pose: &Pose,
-        (nodes, users): (&[Node], &[u32]),
+        users: &[&Node],
         files: &FileCache,
         messages: &mut Messages<'_>,
     ) -> Result<(), GltfError> {
-        let name = place.key("name").text().unwrap_or("mesh").to_owned();
+        let name = Arc::from(place.key("name").text().unwrap_or("mesh"));
         let (document, to) = (self.document, self.origin);
-        let placements = || users.iter().flat_map(move |&i| placements(document, &nodes[i as usize], pose, to));
+        let placements = || users.iter().flat_map(move |node| placements(document, node, pose, to));
 
         // Number of placements, and of those with an inverse
         let (mut count, mut invertible) = (0, 0);
@@ -229,8 +276,7 @@ impl<'a> Assembly<'a> {
         let rendered =
             |m: &DAffine3, origin: Option<DVec3>| rebased(m, to, origin.unwrap_or(DVec3::ZERO)).as_affine3a();
         for place in place.key("primitives").items() {
-            let Some(Primitive { mut mesh, material }) =
-                primitive(self.document, &place, (pose, &mut origin), messages)?
+            let Some(Primitive { mut mesh, material }) = primitive(self.document, &place, pose, &mut origin, messages)?
             else {
                 continue;
             };
@@ -262,10 +308,10 @@ impl<'a> Assembly<'a> {
         Ok(())
     }
 
-    fn add_geometry(&mut self, mesh: TriangleMesh, look: &Look, name: &str) -> GeometryId {
+    fn add_geometry(&mut self, mesh: TriangleMesh, look: &Look, name: &Arc<str>) -> GeometryId {
         self.set.geometries.push(Geometry { shape: Shape::Mesh(mesh), alpha: look.alpha, visibility: Visibility::ALL });
         let sides = look.interior.as_ref().map(|medium| Sides { front: None, back: Some(self.interior(look, medium)) });
-        self.surfaces.push(Surface { material: look.material, name: name.to_owned(), sides });
+        self.surfaces.push(Surface { material: look.material, name: Arc::clone(name), sides });
         (self.set.geometries.len() - 1) as GeometryId
     }
 
@@ -288,7 +334,7 @@ impl<'a> Assembly<'a> {
         });
         let (two_sided, has_vertex_colors) = (look.is_double_sided, look.emits_vertex_colors);
         let emission = Emission { two_sided, image, has_vertex_colors, ..Emission::constant(look.emission) };
-        self.emitters.push((id, emission));
+        self.emitters.push(Emitter { geometry: id, emission });
     }
 
     /// `KHR_lights_punctual`: lights shine along −z.
@@ -313,14 +359,14 @@ impl<'a> Assembly<'a> {
         // Light
         let (p, axis) = (m.transform_point3(Vec3::ZERO), m.transform_vector3(-Vec3::Z).normalize_or(-Vec3::Z));
         match light.key("type").text() {
-            Some("directional") => self.lights.push(Light::Distant { wi_world: -axis, l: intensity }),
+            Some("directional") => self.lights.push(Light::Distant(DistantLight { wi: -axis, l: intensity })),
             Some("spot") => {
                 let angle = |key: &str, default: f32| light.key("spot").key(key).number().unwrap_or(default).cos();
                 let cos_total = angle("outerConeAngle", std::f32::consts::FRAC_PI_4);
                 let cos_falloff_start = angle("innerConeAngle", 0.0).max(cos_total);
-                self.lights.push(Light::Spot { p, axis, cos_total, cos_falloff_start, intensity });
+                self.lights.push(Light::Spot(SpotLight { p, axis, cos_total, cos_falloff_start, intensity }));
             }
-            _ => self.lights.push(Light::Point { p, intensity }),
+            _ => self.lights.push(Light::Point(PointLight { p, intensity })),
         }
     }
 }
@@ -349,17 +395,18 @@ fn has_inverse(m: &DAffine3) -> bool {
 /// All lights; area lights are the last.
 fn light_set(
     lights: Vec<Light>,
-    emitters: Vec<(GeometryId, Emission)>,
-    (geometry, textures): (&Arc<GeometrySet>, &Arc<TextureSet>),
+    emitters: Vec<Emitter>,
+    geometry: &Arc<GeometrySet>,
+    textures: &Arc<TextureSet>,
     bounds: &Bounds3,
 ) -> LightSet {
     let mut set = LightSetBuilder::default();
     for light in lights {
         set.add(light);
     }
-    for (id, emission) in emitters {
-        let cover = Cover::of(geometry, id, Arc::clone(textures) as _);
-        set.add_area(id, &geometry.geometries[id as usize].shape, &Emission { cover, ..emission });
+    for Emitter { geometry: id, emission } in emitters {
+        let alpha = AlphaMask::of(geometry, id, Arc::clone(textures) as _);
+        set.add_area(id, &geometry.geometries[id as usize].shape, &Emission { alpha, ..emission });
     }
     set.build(bounds)
 }
@@ -371,7 +418,7 @@ fn emission_image(
 ) -> Option<Arc<EmissionImage>> {
     let image =
         files.rgb(&source.path).map_err(|error| report(&error, &source.path, source.span, messages.diagnostics));
-    let (texels, [width, height]) = Arc::unwrap_or_clone(image.ok()?);
+    let RgbImage { texels, size: [width, height] } = Arc::unwrap_or_clone(image.ok()?);
     let image = EmissionImage::new(width, height, texels).ok()?.placed(source.wrap, source.mapping);
     Some(Arc::new(if source.filter == Filter::Point { image.nearest() } else { image }))
 }
@@ -387,7 +434,7 @@ fn environment(path: &Path, files: &FileCache, messages: &mut Messages<'_>) -> O
             d.error_without_place(format!("--environment: {other}"));
         }
     };
-    let (texels, size) = Arc::unwrap_or_clone(files.rgb(path).map_err(failed).ok()?);
+    let RgbImage { texels, size } = Arc::unwrap_or_clone(files.rgb(path).map_err(failed).ok()?);
 
     // Map
     let mapping = if size[0] == size[1] { EnvironmentMapping::EqualArea } else { EnvironmentMapping::LatLong };

@@ -3,10 +3,11 @@
 //! Boxes of vertices, one per joint of skinned primitives, are transformed by nodes and joints at several times. A
 //! vertex is a weighted mean of its transforms by its joints, so it lies within the union of these boxes.
 
-use super::Messages;
 use super::animation::changes;
+use super::messages::Messages;
 use super::nodes::{Node, instances, middle, nodes};
 use super::pose::{Pose, Skins};
+use super::view::Framing;
 use lumiris_formats::gltf::{Document, GltfError, Place};
 use lumiris_numbers::math::origin::{near_origin, rebased};
 use lumiris_numbers::math::{Affine3A, Bounds3, DVec3, Vec3};
@@ -31,7 +32,7 @@ pub(super) fn of_animations(
     document: &Document,
     scene: &Place<'_>,
     messages: &mut Messages<'_>,
-) -> Result<Option<(Bounds3, DVec3)>, GltfError> {
+) -> Result<Option<Framing>, GltfError> {
     let Some([first, last]) = keys(document)? else { return Ok(None) };
     let steps = if last > first { TIMES - 1 } else { 0 };
     let mut boxes_of = HashMap::<usize, Vec<Boxes>>::new();
@@ -63,7 +64,7 @@ pub(super) fn of_animations(
             }
         }
     }
-    Ok(origin.filter(|_| !bounds.is_empty()).map(|origin| (bounds, origin)))
+    Ok(origin.filter(|_| !bounds.is_empty()).map(|origin| Framing { bounds, origin }))
 }
 
 /// Times of the first and the last key of all animations; `None` without keys.

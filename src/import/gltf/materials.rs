@@ -1,6 +1,6 @@
 //! Materials: metallic-roughness or specular-glossiness, and extensions.
 
-use super::Messages;
+use super::messages::Messages;
 use super::textures::{EmissionSource, Textures};
 use crate::import::images::{ImageChannels, ImageEncoding};
 use crate::materials::principled::{Anisotropy, AnisotropyDirection};
@@ -63,6 +63,12 @@ fn factor(place: &Place<'_>, default: f32) -> f32 {
     place.number().unwrap_or(default)
 }
 
+/// The base colour of a material, with its opacity.
+struct BaseColor<'a> {
+    factor: [f32; 4],
+    texture: Place<'a>,
+}
+
 impl<'a> Materials<'a> {
     pub(super) fn new(document: &'a Document) -> std::io::Result<Self> {
         Ok(Materials { document, textures: Textures::new(document)?, entries: Vec::new(), looks: Vec::new() })
@@ -78,15 +84,17 @@ impl<'a> Materials<'a> {
         Ok(())
     }
 
-    /// Factor and texture of the base colour.
-    fn base(place: &Place<'a>) -> ([f32; 4], Place<'a>) {
+    /// The base colour of a material.
+    fn base(place: &Place<'a>) -> BaseColor<'a> {
         let pbr = place.key("pbrMetallicRoughness");
         // Unlit surfaces use the metallic-roughness colour
         let is_unlit = place.extension("KHR_materials_unlit").exists() && pbr.exists();
         if let Some(old) = glossiness_of(place).filter(|_| !is_unlit) {
-            return (old.key("diffuseFactor").numbers().unwrap_or([1.0; 4]), old.key("diffuseTexture"));
+            let factor = old.key("diffuseFactor").numbers().unwrap_or([1.0; 4]);
+            return BaseColor { factor, texture: old.key("diffuseTexture") };
         }
-        (pbr.key("baseColorFactor").numbers().unwrap_or([1.0; 4]), pbr.key("baseColorTexture"))
+        let factor = pbr.key("baseColorFactor").numbers().unwrap_or([1.0; 4]);
+        BaseColor { factor, texture: pbr.key("baseColorTexture") }
     }
 
     fn look(&mut self, place: &Place<'a>, messages: &mut Messages<'_>) -> Result<Look, GltfError> {
@@ -95,7 +103,7 @@ impl<'a> Materials<'a> {
         }
 
         // Material; vertex colours multiply the base colour
-        let (factor, base) = Self::base(place);
+        let BaseColor { factor, texture: base } = Self::base(place);
         let color = Rgb::new(factor[0], factor[1], factor[2]);
         let is_unlit = place.extension("KHR_materials_unlit").exists();
         let material = if is_unlit {

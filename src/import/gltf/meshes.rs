@@ -1,6 +1,6 @@
 //! Primitives of meshes as triangles.
 
-use super::Messages;
+use super::messages::Messages;
 use super::pose::{Pose, Vertices};
 use super::vertices::InUse;
 use crate::geometry::TriangleMesh;
@@ -20,7 +20,8 @@ pub(super) struct Primitive {
 pub(super) fn primitive(
     document: &Document,
     place: &Place<'_>,
-    (pose, origin): (&Pose, &mut Option<DVec3>),
+    pose: &Pose,
+    origin: &mut Option<DVec3>,
     messages: &mut Messages<'_>,
 ) -> Result<Option<Primitive>, GltfError> {
     let mode = place.key("mode").index().unwrap_or(4);

@@ -1,7 +1,7 @@
 //! Deformation of meshes before the transform of their node: morph targets by their weights, and skins by the current
 //! transforms of their joints.
 
-use super::Messages;
+use super::messages::Messages;
 use super::nodes::Node;
 use super::vertices::InUse;
 use glam::{DMat4, Mat4};
@@ -138,7 +138,7 @@ impl Pose {
                 ("TANGENT", &mut vertices.tangents),
             ];
             for (name, values) in parts {
-                add_target(document, &target.key(name), (in_use, weight), values)?;
+                add_target(document, &target.key(name), in_use, weight, values)?;
             }
             if target.members().any(|(name, _)| name.starts_with("TEXCOORD") || name.starts_with("COLOR")) {
                 messages.warning(&target, "morph targets move vertices, not their colours and texture coordinates");
@@ -147,7 +147,7 @@ impl Pose {
 
         // Skin
         match &self.skin {
-            Some((_, joints)) => skin(document, &primitive.key("attributes"), (in_use, joints), vertices),
+            Some((_, joints)) => skin(document, &primitive.key("attributes"), in_use, joints, vertices),
             None => Ok(()),
         }
     }
@@ -156,7 +156,8 @@ impl Pose {
 fn add_target(
     document: &Document,
     place: &Place<'_>,
-    (in_use, weight): (&InUse, f32),
+    in_use: &InUse,
+    weight: f32,
     values: &mut [Vec3],
 ) -> Result<(), GltfError> {
     if values.is_empty() {
@@ -172,7 +173,8 @@ fn add_target(
 fn skin(
     document: &Document,
     attributes: &Place<'_>,
-    (in_use, joints): (&InUse, &[Affine3A]),
+    in_use: &InUse,
+    joints: &[Affine3A],
     vertices: &mut Vertices,
 ) -> Result<(), GltfError> {
     // Weighted sums of joint transforms; each set has four joints per vertex

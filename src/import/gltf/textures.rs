@@ -1,6 +1,6 @@
 //! Textures and their images.
 
-use super::Messages;
+use super::messages::Messages;
 use crate::imaging::AxisWrap;
 use crate::import::images::{ImageChannels, ImageEncoding, ImageRequest};
 use crate::import::resources::Resources;
@@ -40,8 +40,20 @@ impl EmissionSource {
     }
 }
 
-/// The file of an image, and the source position of its name.
-type ImageFile = Option<(PathBuf, Span)>;
+/// The file of an image.
+#[derive(Clone)]
+struct ImageFile {
+    path: PathBuf,
+    /// Source position of its name.
+    span: Span,
+}
+
+/// The use of an image by a texture.
+struct Sampler {
+    /// Along rows and columns.
+    wrap: [AxisWrap; 2],
+    filter: Filter,
+}
 
 /// Textures during import.
 pub(super) struct Textures<'a> {
@@ -49,7 +61,7 @@ pub(super) struct Textures<'a> {
     pub set: TextureSet,
     pub resources: Resources,
     /// Files by index of the image, which textures may share.
-    image_files: HashMap<usize, ImageFile>,
+    image_files: HashMap<usize, Option<ImageFile>>,
     /// Temporary folder for images embedded in the document.
     folder: tempfile::TempDir,
     _temporary: Temporary,
@@ -110,7 +122,7 @@ impl<'a> Textures<'a> {
     }
 
     /// The file of a texture.
-    fn file(&mut self, place: &Place<'a>, messages: &mut Messages<'_>) -> Result<ImageFile, GltfError> {
+    fn file(&mut self, place: &Place<'a>, messages: &mut Messages<'_>) -> Result<Option<ImageFile>, GltfError> {
         let Some(index) = place.key("index").index() else { return Ok(None) };
         let texture = self.document.root().key("textures").item(index);
         let Some(source) = texture.key("source").index() else {
@@ -126,32 +138,33 @@ impl<'a> Textures<'a> {
     }
 
     /// The file of an image; an embedded image is written to a temporary file.
-    fn image_file(&self, source: usize, messages: &mut Messages<'_>) -> Result<ImageFile, GltfError> {
+    fn image_file(&self, source: usize, messages: &mut Messages<'_>) -> Result<Option<ImageFile>, GltfError> {
         let image = self.document.root().key("images").item(source);
         let bytes = match self.document.content(&image)? {
-            Content::File(path) => return Ok(Some((path, messages.file_span("images", source)))),
+            Content::File(path) => return Ok(Some(ImageFile { path, span: messages.file_span("images", source) })),
             Content::Bytes(bytes) => bytes,
             Content::Unread => return Ok(None),
         };
         let extension = if bytes.starts_with(&[0xff, 0xd8]) { "jpg" } else { "png" };
         let path = self.folder.path().join(format!("image{source}.{extension}"));
         std::fs::write(&path, bytes).map_err(|e| image.error(e.to_string()))?;
-        Ok(Some((path, messages.file_span("images", source))))
+        Ok(Some(ImageFile { path, span: messages.file_span("images", source) }))
     }
 
-    /// Wrap modes along rows and columns, and the filter.
-    fn sampler(&self, place: &Place<'a>) -> ([AxisWrap; 2], Filter) {
+    /// The sampler of a texture.
+    fn sampler(&self, place: &Place<'a>) -> Sampler {
         let root = self.document.root();
         let sampler = place.key("index").index().and_then(|i| root.key("textures").item(i).key("sampler").index());
         let Some(sampler) = sampler.map(|i| root.key("samplers").item(i)) else {
-            return ([AxisWrap::Repeat; 2], Filter::Bilinear);
+            return Sampler { wrap: [AxisWrap::Repeat; 2], filter: Filter::Bilinear };
         };
         let wrap = ["wrapS", "wrapT"].map(|key| match sampler.key(key).index() {
             Some(33071) => AxisWrap::Clamp,
             Some(33648) => AxisWrap::Mirror,
             _ => AxisWrap::Repeat,
         });
-        (wrap, if sampler.key("magFilter").index() == Some(9728) { Filter::Point } else { Filter::Bilinear })
+        let is_nearest = sampler.key("magFilter").index() == Some(9728);
+        Sampler { wrap, filter: if is_nearest { Filter::Point } else { Filter::Bilinear } }
     }
 
     /// An emission image.
@@ -160,13 +173,14 @@ impl<'a> Textures<'a> {
         place: &Place<'a>,
         messages: &mut Messages<'_>,
     ) -> Result<Option<EmissionSource>, GltfError> {
-        let Some(((path, span), texture)) = self.file(place, messages)?.zip(place.key("index").index()) else {
+        let Some((ImageFile { path, span }, texture)) = self.file(place, messages)?.zip(place.key("index").index())
+        else {
             return Ok(None);
         };
-        let (second, image_from_uv) = mapping(place, messages);
-        let is_plain = !second && image_from_uv == Affine2::IDENTITY;
-        let mapping = (!is_plain).then_some(EmissionMapping { second, image_from_uv });
-        let (wrap, filter) = self.sampler(place);
+        let mapping = mapping(place, messages);
+        let is_plain = !mapping.second && mapping.image_from_uv == Affine2::IDENTITY;
+        let mapping = (!is_plain).then_some(mapping);
+        let Sampler { wrap, filter } = self.sampler(place);
         Ok(Some(EmissionSource { texture, path, span, wrap, filter, mapping }))
     }
 
@@ -177,16 +191,16 @@ impl<'a> Textures<'a> {
         encoding: ImageEncoding,
         messages: &mut Messages<'_>,
     ) -> Result<Option<ImageTexture>, GltfError> {
-        let Some((path, span)) = self.file(place, messages)? else { return Ok(None) };
-        let (wrap, filter) = self.sampler(place);
+        let Some(ImageFile { path, span }) = self.file(place, messages)? else { return Ok(None) };
+        let Sampler { wrap, filter } = self.sampler(place);
         let wrap = match wrap {
             [AxisWrap::Repeat, AxisWrap::Repeat] => Wrap::Repeat,
             [AxisWrap::Clamp, AxisWrap::Clamp] => Wrap::Clamp,
             mixed => Wrap::Axes(mixed),
         };
         let image = self.resources.image(ImageRequest { path, channels, encoding, wrap, filter }, span);
-        let (second, st_from_uv) = mapping(place, messages);
-        let mapping = Mapping2d::Affine { second, matrix: st_from_uv.matrix2, offset: st_from_uv.translation };
+        let EmissionMapping { second, image_from_uv } = mapping(place, messages);
+        let mapping = Mapping2d::Affine { second, matrix: image_from_uv.matrix2, offset: image_from_uv.translation };
         Ok(Some(ImageTexture { image, mapping, udim: None, scale: 1.0, invert: false }))
     }
 
@@ -197,9 +211,9 @@ impl<'a> Textures<'a> {
     }
 }
 
-/// True for the second texture coordinates, and the transform to image coordinates. v points down in the file and up
+/// The texture coordinates of an image, also of images that do not emit. v points down in the file and up
 /// here, so v ↦ 1 − v is applied on both sides of the transform offset + rotation · scale.
-fn mapping(place: &Place<'_>, messages: &mut Messages<'_>) -> (bool, Affine2) {
+fn mapping(place: &Place<'_>, messages: &mut Messages<'_>) -> EmissionMapping {
     let transform = place.extension("KHR_texture_transform");
     let sets = [transform.key("texCoord"), place.key("texCoord")];
     let set = sets.iter().find_map(|key| Some((key, key.index()?)));
@@ -213,5 +227,6 @@ fn mapping(place: &Place<'_>, messages: &mut Messages<'_>) -> (bool, Affine2) {
     let flip = Mat2::from_diagonal(Vec2::new(1.0, -1.0));
     // 1 − (M (u, 1 − v) + o)_v
     let offset = flip * (matrix * Vec2::Y + offset) + Vec2::Y;
-    (set.is_some_and(|(_, set)| set == 1), Affine2::from_mat2_translation(flip * matrix * flip, offset))
+    let image_from_uv = Affine2::from_mat2_translation(flip * matrix * flip, offset);
+    EmissionMapping { second: set.is_some_and(|(_, set)| set == 1), image_from_uv }
 }

@@ -1,7 +1,7 @@
 //! The camera and the film.
 
-use super::Messages;
 use super::choice::{Names, chosen, name_of};
+use super::messages::Messages;
 use super::nodes::Node;
 use crate::cameras::Camera;
 use crate::film::PixelBounds;
@@ -20,33 +20,66 @@ const AUTO_FOV: f32 = 40.0;
 const AUTO_DIRECTION: Vec3 = Vec3::new(0.5, 0.35, 0.8);
 
 /// A camera of the scene with its node.
-pub(super) type Placed<'n, 'd> = (&'n Node, Place<'d>);
+#[derive(Clone)]
+pub(super) struct PlacedCamera<'n, 'd> {
+    pub node: &'n Node,
+    camera: Place<'d>,
+}
 
-/// The cameras of the scene, in the order of its nodes, and their names: names of nodes take precedence over names of
-/// cameras.
+/// The cameras of the scene, in the order of its nodes.
+pub(super) struct Cameras<'n, 'd> {
+    pub placed: Vec<PlacedCamera<'n, 'd>>,
+    /// Names of nodes take precedence over names of cameras.
+    pub names: Names<'d>,
+}
+
+/// The scene in view of the automatic camera.
+pub(super) struct Framing {
+    /// Relative to `origin`.
+    pub bounds: Bounds3,
+    pub origin: DVec3,
+}
+
+/// The camera and the film.
+pub(super) struct View {
+    pub camera: Camera,
+    pub film: FilmSettings,
+}
+
+/// The cameras of the scene.
 pub(super) fn cameras<'n, 'd>(
     document: &'d Document,
     nodes: &'n [Node],
     messages: &mut Messages<'_>,
-) -> (Vec<Placed<'n, 'd>>, Names<'d>) {
+) -> Cameras<'n, 'd> {
     let all = document.root().key("cameras");
     let stands = |n: &Node| n.world_from_node.is_finite() && n.world_from_node.matrix3.determinant() != 0.0;
-    let camera = |n: &'n Node| Some((n, all.item(n.place(document).key("camera").index()?)));
-    let mut placed: Vec<Placed<'n, 'd>> = nodes.iter().filter_map(camera).collect();
-    for (node, _) in placed.iter().filter(|(node, _)| !stands(node)) {
+    let placed = |node: &'n Node| {
+        let camera = all.item(node.place(document).key("camera").index()?);
+        Some(PlacedCamera { node, camera })
+    };
+    let mut placed: Vec<PlacedCamera<'n, 'd>> = nodes.iter().filter_map(placed).collect();
+    for PlacedCamera { node, .. } in placed.iter().filter(|placed| !stands(placed.node)) {
         messages.warning(&node.place(document), "a camera cannot be flattened by its node: it is left out");
     }
-    placed.retain(|(node, _)| stands(node));
-    let names = placed.iter().map(|(node, camera)| [name_of(&node.place(document)), name_of(camera)]).collect();
-    (placed, names)
+    placed.retain(|placed| stands(placed.node));
+    let names = placed.iter().map(|placed| [name_of(&placed.node.place(document)), name_of(&placed.camera)]);
+    Cameras { names: names.collect(), placed }
+}
+
+impl Cameras<'_, '_> {
+    /// The index of a camera.
+    pub(super) fn index_of(&self, camera: &PlacedCamera<'_, '_>) -> Option<usize> {
+        self.placed.iter().position(|other| other.node.index == camera.node.index)
+    }
 }
 
 /// The requested camera, or the first one; `None` for the automatic camera.
 pub(super) fn chosen_camera<'n, 'd>(
     options: &LoadOptions,
-    (placed, names): (&[Placed<'n, 'd>], &Names<'d>),
+    Cameras { placed, names }: &Cameras<'n, 'd>,
     messages: &mut Messages<'_>,
-) -> Option<Placed<'n, 'd>> {
+) -> Option<PlacedCamera<'n, 'd>> {
     if options.camera_auto {
         return None;
     }
@@ -70,25 +103,21 @@ pub(super) fn chosen_camera<'n, 'd>(
     }
 }
 
-/// A camera of the scene or the automatic camera, and the film. Bounds and camera are relative to `origin`.
-pub(super) fn camera(
-    options: &LoadOptions,
-    found: Option<Placed<'_, '_>>,
-    (bounds, origin): (&Bounds3, DVec3),
-) -> (Camera, FilmSettings) {
+/// A camera of the scene or the automatic camera, and the film. The camera is relative to the origin of the framing.
+pub(super) fn view(options: &LoadOptions, found: Option<PlacedCamera<'_, '_>>, framing: &Framing) -> View {
     // Resolution, by the aspect of the camera
-    let aspect = found.as_ref().and_then(|(_, c)| aspect_of(c));
+    let aspect = found.as_ref().and_then(|found| aspect_of(&found.camera));
     let width = (HEIGHT as f32 * aspect.unwrap_or(16.0 / 9.0)).round().clamp(1.0, 65_536.0);
     let resolution = options.resolution.unwrap_or([width as u32, HEIGHT]);
     let aspect = resolution[0] as f32 / resolution[1] as f32;
 
     // Camera
     let camera = match found {
-        Some((node, camera)) => {
-            let world_from_node = rebased(&node.world_from_node, origin, DVec3::ZERO);
+        Some(PlacedCamera { node, camera }) => {
+            let world_from_node = rebased(&node.world_from_node, framing.origin, DVec3::ZERO);
             of_file(&world_from_node, &camera, aspect, resolution)
         }
-        None => frame(bounds, aspect, resolution),
+        None => frame(&framing.bounds, aspect, resolution),
     };
 
     // Film
@@ -97,7 +126,8 @@ pub(super) fn camera(
     let [w, h] = resolution;
     let bounds = PixelBounds { x0: at(x0, w), x1: at(x1, w), y0: at(y0, h), y1: at(y1, h) };
     let filter = PixelFilter::Gaussian { rx: 1.5, ry: 1.5, sigma: 0.5 };
-    (camera, FilmSettings { resolution, bounds, filter, file_name: None, scale: 1.0, balance: None })
+    let film = FilmSettings { resolution, bounds, filter, file_name: None, scale: 1.0, balance: None };
+    View { camera, film }
 }
 
 /// The aspect ratio (width over height) of a camera, if it has one.

@@ -22,15 +22,21 @@ pub(super) fn positive(p: &ParamSet, key: &'static str, default: f32, d: &mut Di
     }
 }
 
+/// A file, and the source position of its name.
+pub(super) struct FilePlace<'a> {
+    pub path: &'a Path,
+    pub span: Span,
+}
+
 /// The files that could be read, in order. Others are reported: as missing if `unreadable` returns a reason of the
 /// operating system.
 pub(super) fn readable<'a, T, E: ToString>(
     loaded: Vec<Result<T, E>>,
-    places: impl Iterator<Item = (&'a Path, Span)>,
+    places: impl Iterator<Item = FilePlace<'a>>,
     d: &mut Diagnostics,
     unreadable: impl Fn(&E) -> Option<String>,
 ) -> Vec<T> {
-    let report = |(loaded, (path, span)): (Result<T, E>, (&Path, Span))| {
+    let report = |(loaded, FilePlace { path, span }): (Result<T, E>, FilePlace<'_>)| {
         let error = match loaded {
             Ok(content) => return Some(content),
             Err(error) => error,

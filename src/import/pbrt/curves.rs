@@ -16,6 +16,12 @@ enum Basis {
     BSpline,
 }
 
+/// Control points of cubic Bézier curves, relative to an origin.
+struct Segments {
+    points: Vec<[Vec3; 4]>,
+    origin: DVec3,
+}
+
 /// The curves of one directive.
 pub(super) fn curve_data(p: &ParamSet, d: &mut Diagnostics) -> Option<CurveData> {
     let kind = match p.string("type", d).unwrap_or("flat") {
@@ -45,7 +51,7 @@ pub(super) fn curve_data(p: &ParamSet, d: &mut Diagnostics) -> Option<CurveData>
     // Pieces are determined by shape and width
     p.ignore("splitdepth");
 
-    let (segments, origin) = segments(p, basis, degree, d)?;
+    let Segments { points: segments, origin } = segments(p, basis, degree, d)?;
     let widths = widths(p, d)?;
     let normals = normals(p, kind, segments.len(), d)?;
     let at = |i: usize| {
@@ -57,8 +63,7 @@ pub(super) fn curve_data(p: &ParamSet, d: &mut Diagnostics) -> Option<CurveData>
     Some(CurveData { kind, origin, curves, normals })
 }
 
-/// Control points of the cubic Bézier curves, and their origin.
-fn segments(p: &ParamSet, basis: Basis, degree: usize, d: &mut Diagnostics) -> Option<(Vec<[Vec3; 4]>, DVec3)> {
+fn segments(p: &ParamSet, basis: Basis, degree: usize, d: &mut Diagnostics) -> Option<Segments> {
     let (points, origin) = match p.points("P", d).map(relative) {
         Some(points) => points,
         None => {
@@ -85,7 +90,7 @@ fn segments(p: &ParamSet, basis: Basis, degree: usize, d: &mut Diagnostics) -> O
 
     // Bézier segments
     let segment = |first: usize| cubic(&points[first..=first + degree], basis);
-    Some(((0..count - degree).step_by(step).map(segment).collect(), origin))
+    Some(Segments { points: (0..count - degree).step_by(step).map(segment).collect(), origin })
 }
 
 /// The cubic Bézier curve of one segment of a Bézier curve or uniform B-spline of degree 2 or 3.

@@ -21,7 +21,7 @@ pub(super) struct Pending {
 }
 
 /// The state that determines the meaning of texture and material parameters.
-#[derive(Clone, Copy)]
+#[derive(Clone)]
 pub(super) struct ParamState {
     pub ctm: Ctm,
     pub color_space: ColorSpace,
@@ -71,8 +71,8 @@ pub(super) struct LateInstance {
 pub enum MaterialUse {
     /// A material with an id.
     Id(MaterialId),
-    /// By name.
-    Named(Name),
+    /// By name, shared by its shapes.
+    Named(Arc<Name>),
 }
 
 /// Media on the two sides of a surface; `None` is vacuum.
@@ -98,15 +98,18 @@ impl MaterialUse {
 impl MediumNames {
     /// True if both name the same media.
     pub(super) fn is_same(&self, other: &MediumNames) -> bool {
-        let text = |names: &MediumNames| [&names.inside, &names.outside].map(|n| n.as_ref().map(|n| n.text.clone()));
-        text(self) == text(other)
+        text(&self.inside) == text(&other.inside) && text(&self.outside) == text(&other.outside)
     }
 
     /// True if the two media differ.
     pub fn differ(&self) -> bool {
-        let text = |name: &Option<Name>| name.as_ref().map(|name| name.text.clone());
         text(&self.inside) != text(&self.outside)
     }
+}
+
+/// The text of a name.
+fn text(name: &Option<Name>) -> Option<&str> {
+    name.as_ref().map(|name| name.text.as_str())
 }
 
 /// A medium by its name.
@@ -120,6 +123,14 @@ pub struct MediumDesc {
     pub(super) volume: Option<VolumeDesc>,
 }
 
+/// The name of a grid.
+#[derive(Clone, Debug)]
+pub(super) struct GridName {
+    pub text: String,
+    /// Source position; `None` for the default name.
+    pub span: Option<Span>,
+}
+
 /// A medium that needs a file.
 #[derive(Clone, Debug)]
 pub(super) struct VolumeDesc {
@@ -127,10 +138,10 @@ pub(super) struct VolumeDesc {
     pub(super) path: PathBuf,
     /// Source position of the file name.
     pub(super) span: Span,
-    /// Name of the density grid, and its source position.
-    pub(super) density: (String, Span),
-    /// Name of the temperature grid; without a source position if it is the default name. `None` without emission.
-    pub(super) temperature: Option<(String, Option<Span>)>,
+    /// The density grid.
+    pub(super) density: GridName,
+    /// The temperature grid; `None` without emission.
+    pub(super) temperature: Option<GridName>,
     /// Subtracted from temperatures, which are then multiplied by the next factor.
     pub(super) offset: f32,
     pub(super) scale: f32,
@@ -217,8 +228,6 @@ pub struct EnvironmentDesc {
 /// An object, defined by `ObjectBegin` … `ObjectEnd`.
 #[derive(Clone, Debug)]
 pub struct ObjectDesc {
-    /// Name.
-    pub name: String,
     /// Source position of the name.
     pub span: Span,
     /// Instances of objects within, in its space.
@@ -313,14 +322,12 @@ pub struct DisplacementDesc {
 pub struct ShapeDesc {
     /// Its numbers.
     pub source: ShapeSource,
-    /// A readable name.
-    pub name: String,
+    /// A readable name, shared by shapes that follow each other.
+    pub name: Arc<str>,
     /// Source position.
     pub span: Span,
     /// Transform from object space to world space, or to the space of its object.
     pub ctm: Ctm,
-    /// The point of world space that is the origin of rendered space.
-    pub origin: DVec3,
     /// `ReverseOrientation`.
     pub reverse_orientation: bool,
     /// Material.

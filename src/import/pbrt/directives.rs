@@ -1,6 +1,7 @@
 //! The state machine of the format: directives change the graphics state, or add objects with that state to the scene.
 
-use super::descriptions::{InstanceDesc, LateInstance, MaterialUse, MediumNames, ObjectDesc};
+use super::descriptions::{InstanceDesc, LateInstance, MaterialUse, MediumNames, ObjectDesc, Pending};
+use super::options::CameraDirective;
 use super::state::Builder;
 use super::transform::{Ctm, matrix_of};
 use lumiris_formats::color_space::ColorSpace;
@@ -15,6 +16,9 @@ impl Visitor for Builder<'_> {
     fn directive(&mut self, directive: Directive, _sources: &SourceMap, diagnostics: &mut Diagnostics) {
         use DirectiveKind as D;
         let Directive { kind, span, mut params } = directive;
+        if let Some(target) = target_of(&kind) {
+            params.inherit(self.state.defaults.of(target));
+        }
         match kind {
             D::Identity
             | D::Translate(_)
@@ -24,78 +28,39 @@ impl Visitor for Builder<'_> {
             | D::Transform(_)
             | D::ConcatTransform(_) => self.transform(&kind, span, diagnostics),
             D::CoordinateSystem(name) => {
-                self.coordinate_systems.insert(name.text, self.state.ctm);
+                self.coordinate_systems.insert(name.text, self.state.ctm.clone());
             }
             D::CoordSysTransform(name) => self.coordinate_system(&name, diagnostics),
             D::ActiveTransform(active) => self.state.active = active,
             D::TransformTimes(times) => self.options.transform_times(times, span, diagnostics),
             D::AttributeBegin => self.stack.push(self.state.clone()),
             D::AttributeEnd => self.pop(),
-            D::Attribute(target) => {
-                let defaults = params.in_color_space(self.state.color_space);
-                self.state.defaults.add(target, defaults);
-            }
+            D::Attribute(target) => self.state.defaults.add(target, params.in_color_space(self.state.color_space)),
             D::Option { name, value } => self.options.option(&name, &value, diagnostics),
             D::ColorSpace(name) => self.color_space(&name, diagnostics),
-            D::Camera(_) if !self.has_inverse("a camera", span, diagnostics) => {}
-            D::Camera(name) => {
-                self.coordinate_systems.insert("camera".to_owned(), self.state.ctm.inverse());
-                let place = (self.state.ctm, self.folder.as_path());
-                self.options.camera(name, params, place, self.state.media.outside.clone());
-            }
-            D::Film(name) => {
-                if self.state.color_space != ColorSpace::Srgb {
-                    let message = "the image is in linear Rec.709, whatever the colour space before `Film`";
-                    diagnostics.warning_once(name.span, message);
-                }
-                self.options.film(name, params);
-            }
+            D::Camera(name) => self.camera(name, params, span, diagnostics),
+            D::Film(name) => self.film(name, params, diagnostics),
             D::Sampler(name) => self.options.sampler(name, params),
             D::Integrator(name) => self.options.integrator(name, params),
             D::PixelFilter(name) => self.options.pixel_filter(name, params),
             // The ray tracer is not configured by the scene.
             D::Accelerator(_) => {}
-            D::MakeNamedMedium(name) => {
-                self.with_defaults(AttributeTarget::Medium, &mut params);
-                self.make_named_medium(name, params, diagnostics);
-            }
-            D::MediumInterface { inside, outside } => {
-                let [inside, outside] = [inside, outside].map(|name| Some(name).filter(|name| !name.text.is_empty()));
-                self.state.media = Arc::new(MediumNames { inside, outside });
-            }
+            D::MakeNamedMedium(name) => self.make_named_medium(name, params, diagnostics),
+            D::MediumInterface { inside, outside } => self.medium_interface(inside, outside),
             D::WorldBegin => self.world_begin(),
             D::WorldEnd => {}
             D::ReverseOrientation => self.state.reverse_orientation = !self.state.reverse_orientation,
-            D::Material(name) => {
-                self.with_defaults(AttributeTarget::Material, &mut params);
-                self.material(name, params);
-            }
-            D::MakeNamedMaterial(name) => {
-                self.with_defaults(AttributeTarget::Material, &mut params);
-                self.make_named_material(name, params, diagnostics);
-            }
-            D::NamedMaterial(name) => self.state.material = MaterialUse::Named(name),
-            D::Texture { name, value, class } => {
-                self.with_defaults(AttributeTarget::Texture, &mut params);
-                self.texture(name, &value, class, params, diagnostics);
-            }
-            D::LightSource(name) => {
-                self.with_defaults(AttributeTarget::Light, &mut params);
-                self.light(&name, &params, diagnostics);
-            }
+            D::Material(name) => self.material(name, params),
+            D::MakeNamedMaterial(name) => self.make_named_material(name, params, diagnostics),
+            D::NamedMaterial(name) => self.state.material = MaterialUse::Named(Arc::new(name)),
+            D::Texture { name, value, class } => self.texture(name, &value, class, params, diagnostics),
+            D::LightSource(name) => self.light(&name, &params, diagnostics),
             D::AreaLightSource(name) => {
-                self.with_defaults(AttributeTarget::Light, &mut params);
                 self.state.area_light = self.area_light(&name, &params, diagnostics).map(Arc::new);
             }
-            D::Shape(name) => {
-                self.with_defaults(AttributeTarget::Shape, &mut params);
-                self.shape(&name, params, diagnostics);
-            }
+            D::Shape(name) => self.shape(&name, params, diagnostics),
             D::ObjectBegin(name) => self.object_begin(name, diagnostics),
-            D::ObjectEnd => {
-                self.current_object = None;
-                self.pop();
-            }
+            D::ObjectEnd => self.object_end(),
             D::ObjectInstance(name) => self.object_instance(name, span, diagnostics),
         }
     }
@@ -112,8 +77,7 @@ impl Builder<'_> {
             None => return,
         };
         let sets = matches!(kind, DirectiveKind::Identity | DirectiveKind::Transform(_));
-        let mut ctm = self.state.ctm;
-        ctm.apply(self.state.active, |m| if sets { matrix } else { m * matrix });
+        let ctm = self.state.ctm.changed(self.state.active, |m| if sets { matrix } else { *m * matrix });
         if ctm.is_finite() {
             self.state.ctm = ctm;
         } else {
@@ -123,12 +87,35 @@ impl Builder<'_> {
 
     fn coordinate_system(&mut self, name: &Name, diagnostics: &mut Diagnostics) {
         match self.coordinate_systems.get(&name.text) {
-            Some(ctm) => self.state.ctm = *ctm,
+            Some(ctm) => self.state.ctm.clone_from(ctm),
             None => {
                 let known = self.coordinate_systems.keys().map(String::as_str);
                 diagnostics.unknown(name.span, "coordinate system", &name.text, known);
             }
         }
+    }
+
+    fn camera(&mut self, name: Name, params: ParamSet, span: Span, diagnostics: &mut Diagnostics) {
+        if !self.has_inverse("a camera", span, diagnostics) {
+            return;
+        }
+        let ctm = self.state.ctm.clone();
+        self.coordinate_systems.insert("camera".to_owned(), ctm.inverse());
+        let (folder, medium) = (self.folder.clone(), self.state.media.outside.clone());
+        self.options.camera(CameraDirective { pending: Pending { name, params }, ctm, folder, medium });
+    }
+
+    fn film(&mut self, name: Name, params: ParamSet, diagnostics: &mut Diagnostics) {
+        if self.state.color_space != ColorSpace::Srgb {
+            let message = "the image is in linear Rec.709, whatever the colour space before `Film`";
+            diagnostics.warning_once(name.span, message);
+        }
+        self.options.film(name, params);
+    }
+
+    fn medium_interface(&mut self, inside: Name, outside: Name) {
+        let [inside, outside] = [inside, outside].map(|name| Some(name).filter(|name| !name.text.is_empty()));
+        self.state.media = Arc::new(MediumNames { inside, outside });
     }
 
     fn world_begin(&mut self) {
@@ -157,17 +144,23 @@ impl Builder<'_> {
             diagnostics.error(name.span, message).label(self.objects[first].span, "first defined here");
         }
         let index = self.objects.len();
-        self.object_names.insert(name.text.clone(), index);
-        self.objects.push(ObjectDesc { name: name.text, span: name.span, instances: Vec::new() });
+        self.object_names.insert(name.text, index);
+        self.objects.push(ObjectDesc { span: name.span, instances: Vec::new() });
         self.current_object = Some(index);
+    }
+
+    fn object_end(&mut self) {
+        self.current_object = None;
+        self.pop();
     }
 
     fn object_instance(&mut self, name: Name, span: Span, diagnostics: &mut Diagnostics) {
         let Some(&object) = self.object_names.get(&name.text) else {
-            self.late_instances.push(LateInstance { name, holder: self.current_object, ctm: self.state.ctm, span });
+            let ctm = self.state.ctm.clone();
+            self.late_instances.push(LateInstance { name, holder: self.current_object, ctm, span });
             return;
         };
-        let instance = InstanceDesc { object, ctm: self.state.ctm, span };
+        let instance = InstanceDesc { object, ctm: self.state.ctm.clone(), span };
         match self.current_object {
             Some(current) if current == object => {
                 diagnostics.error(span, format!("the object `{}` cannot contain itself", name.text));
@@ -183,8 +176,17 @@ impl Builder<'_> {
             self.state = state;
         }
     }
+}
 
-    fn with_defaults(&mut self, target: AttributeTarget, params: &mut ParamSet) {
-        params.inherit(self.state.defaults.of(target));
+/// The target of `Attribute` whose defaults hold for a directive.
+fn target_of(kind: &DirectiveKind) -> Option<AttributeTarget> {
+    use DirectiveKind as D;
+    match kind {
+        D::MakeNamedMedium(_) => Some(AttributeTarget::Medium),
+        D::Material(_) | D::MakeNamedMaterial(_) => Some(AttributeTarget::Material),
+        D::Texture { .. } => Some(AttributeTarget::Texture),
+        D::LightSource(_) | D::AreaLightSource(_) => Some(AttributeTarget::Light),
+        D::Shape(_) => Some(AttributeTarget::Shape),
+        _ => None,
     }
 }

@@ -40,8 +40,24 @@ const CAMERAS: [&str; 17] = [
 pub(super) struct Sensor {
     /// Exposure factor by its ISO and scale.
     pub(super) scale: f32,
+    /// White balance.
+    balance: Option<Mat3>,
     /// Diagonal, for realistic cameras (mm).
     pub(super) diagonal: f32,
+}
+
+/// The imported film.
+pub(super) struct FinishedFilm {
+    pub(super) film: FilmSettings,
+    pub(super) sensor: Sensor,
+}
+
+/// The part of the image that is rendered.
+struct Window {
+    /// In fractions of the image: x0, x1, y0, y1.
+    crop: [f32; 4],
+    /// In pixels, which go before `crop`.
+    pixels: Option<PixelBounds>,
 }
 
 /// Imports `Film` and `PixelFilter`.
@@ -50,69 +66,80 @@ pub(super) fn finish_film(
     filter: Option<&Pending>,
     load: &LoadOptions,
     d: &mut Diagnostics,
-) -> (FilmSettings, Sensor) {
+) -> FinishedFilm {
+    // Filter, and the defaults of a film
     let filter = finish_filter(filter, d);
-    let mut film = FilmSettings {
-        resolution: load.resolution.unwrap_or([1280, 720]),
-        bounds: PixelBounds { x0: 0, x1: 0, y0: 0, y1: 0 },
-        filter,
-        file_name: None,
-        scale: 1.0,
-        balance: None,
-    };
-    let mut crop = [0.0, 1.0, 0.0, 1.0];
-    let mut pixel_bounds = None;
-    let mut sensor = Sensor { scale: 1.0, diagonal: 35.0 };
+    let mut resolution = [1280, 720];
+    let mut file_name = None;
+    let mut window = Window { crop: [0.0, 1.0, 0.0, 1.0], pixels: None };
+    let mut sensor = Sensor { scale: 1.0, balance: None, diagonal: 35.0 };
+
+    // Parameters
     if let Some(Pending { name, params: p }) = pending {
         film_kind(name, d);
-        let mut size = |key: &'static str, default: u32| match p.integer(key, d) {
-            Some(n @ 1..=65_536) => n as u32,
-            Some(n) => {
-                d.error(p.span_of(key), format!("{key} must be from 1 to 65536, not {n}"));
-                default
-            }
-            None => default,
-        };
-        let from_file = [size("xresolution", 1280), size("yresolution", 720)];
-        film.resolution = load.resolution.unwrap_or(from_file);
-        film.file_name = p.string("filename", d).map(str::to_owned);
-        pixel_bounds = read_pixel_bounds(p, d);
-        if let Some(v) = p.floats("cropwindow", d) {
-            match *v {
-                // As in pbrt-v4, windows are clamped, and ends may have any order
-                [x0, x1, y0, y1] if v.iter().all(|x| x.is_finite()) => {
-                    let ends = |a: f32, b: f32| [a.min(b), a.max(b)].map(|x| x.clamp(0.0, 1.0));
-                    let ([x0, x1], [y0, y1]) = (ends(x0, x1), ends(y0, y1));
-                    crop = [x0, x1, y0, y1];
-                    if pixel_bounds.take().is_some() {
-                        d.warning_once(p.span_of("pixelbounds"), "`cropwindow` goes before `pixelbounds`");
-                    }
-                }
-                _ => {
-                    d.error(p.span_of("cropwindow"), "cropwindow takes four numbers, x0 x1 y0 y1");
-                }
-            }
-        }
-        (sensor.scale, film.balance) = exposure(p, d);
-        sensor.diagonal = positive(p, "diagonal", sensor.diagonal, d);
-        // Parameters of half-floats and file splitting have no effect here
-        for key in ["savefp16", "maxcomponentvalue", "coordinatesystem", "nbuckets", "lambdamin", "lambdamax"] {
-            if p.ignore(key) && key == "maxcomponentvalue" {
-                d.warning_once(p.span_of(key), "maxcomponentvalue is ignored: clamping would darken the image");
-            }
-        }
+        resolution = [size(p, "xresolution", 1280, d), size(p, "yresolution", 720, d)];
+        file_name = p.string("filename", d).map(str::to_owned);
+        window = read_window(p, window, d);
+        sensor = read_sensor(p, &sensor, d);
+        ignore_storage(p, d);
         p.report_unused(d);
     }
-    film.bounds = match (load.crop, pixel_bounds) {
-        (Some(crop), _) => crop_bounds(film.resolution, crop),
-        (None, Some(bounds)) if load.resolution.is_none() => clip(bounds, film.resolution),
-        (None, _) => crop_bounds(film.resolution, crop),
+
+    // Options of the command line go before the file
+    let resolution = load.resolution.unwrap_or(resolution);
+    let bounds = match (load.crop, window.pixels) {
+        (Some(crop), _) => crop_bounds(resolution, crop),
+        (None, Some(bounds)) if load.resolution.is_none() => clip(bounds, resolution),
+        (None, _) => crop_bounds(resolution, window.crop),
     };
-    if film.bounds.area() == 0 {
+    if bounds.area() == 0 {
         let span = pending.map_or_else(Span::default, |f| f.name.span);
         d.error(span, "the crop window holds no pixel");
     }
-    (film, sensor)
+    let film = FilmSettings { resolution, bounds, filter, file_name, scale: 1.0, balance: sensor.balance };
+    FinishedFilm { film, sensor }
+}
+
+/// Pixels along an axis.
+fn size(p: &ParamSet, key: &'static str, default: u32, d: &mut Diagnostics) -> u32 {
+    match p.integer(key, d) {
+        Some(n @ 1..=65_536) => n as u32,
+        Some(n) => {
+            d.error(p.span_of(key), format!("{key} must be from 1 to 65536, not {n}"));
+            default
+        }
+        None => default,
+    }
+}
+
+/// `pixelbounds` or `cropwindow`.
+fn read_window(p: &ParamSet, whole: Window, d: &mut Diagnostics) -> Window {
+    let mut window = Window { pixels: read_pixel_bounds(p, d), ..whole };
+    let Some(v) = p.floats("cropwindow", d) else { return window };
+    match *v {
+        // As in pbrt-v4, windows are clamped, and ends may have any order
+        [x0, x1, y0, y1] if v.iter().all(|x| x.is_finite()) => {
+            let ends = |a: f32, b: f32| [a.min(b), a.max(b)].map(|x| x.clamp(0.0, 1.0));
+            let ([x0, x1], [y0, y1]) = (ends(x0, x1), ends(y0, y1));
+            window.crop = [x0, x1, y0, y1];
+            if window.pixels.take().is_some() {
+                d.warning_once(p.span_of("pixelbounds"), "`cropwindow` goes before `pixelbounds`");
+            }
+        }
+        _ => {
+            d.error(p.span_of("cropwindow"), "cropwindow takes four numbers, x0 x1 y0 y1");
+        }
+    }
+    window
+}
+
+/// Parameters of half-floats and file splitting have no effect here.
+fn ignore_storage(p: &ParamSet, d: &mut Diagnostics) {
+    for key in ["savefp16", "maxcomponentvalue", "coordinatesystem", "nbuckets", "lambdamin", "lambdamax"] {
+        if p.ignore(key) && key == "maxcomponentvalue" {
+            d.warning_once(p.span_of(key), "maxcomponentvalue is ignored: clamping would darken the image");
+        }
+    }
 }
 
 fn finish_filter(pending: Option<&Pending>, d: &mut Diagnostics) -> PixelFilter {
@@ -178,10 +205,10 @@ fn film_kind(name: &Name, d: &mut Diagnostics) {
     }
 }
 
-/// The factor of a sensor's ISO, and its white balance; exposure time belongs to the camera. Camera sensors are
-/// balanced for daylight of 6500 K unless another temperature is given. pbrt-v4 scales their response to that white to
-/// its luminance, so the factor is the same for all sensors.
-fn exposure(p: &ParamSet, d: &mut Diagnostics) -> (f32, Option<Mat3>) {
+/// The sensor, with the factor of its ISO and its white balance; exposure time belongs to the camera. Camera sensors
+/// are balanced for daylight of 6500 K unless another temperature is given. pbrt-v4 scales their response to that white
+/// to its luminance, so the factor is the same for all sensors.
+fn read_sensor(p: &ParamSet, usual: &Sensor, d: &mut Diagnostics) -> Sensor {
     let is_camera = sensor_is_of_camera(p, d);
     let kelvin = match p.float("whitebalance", d).unwrap_or(0.0) {
         0.0 if is_camera => 6500.0,
@@ -191,8 +218,8 @@ fn exposure(p: &ParamSet, d: &mut Diagnostics) -> (f32, Option<Mat3>) {
     if kelvin != 0.0 && balance.is_none() {
         d.error(p.span_of("whitebalance"), format!("whitebalance is 0 or from 1000 to 25000 K, not {kelvin}"));
     }
-    let scale = p.float("scale", d).unwrap_or(1.0);
-    (scale * positive(p, "iso", 100.0, d) / 100.0, balance)
+    let scale = p.float("scale", d).unwrap_or(1.0) * positive(p, "iso", 100.0, d) / 100.0;
+    Sensor { scale, balance, diagonal: positive(p, "diagonal", usual.diagonal, d) }
 }
 
 /// True if the film has a camera sensor.

@@ -1,22 +1,23 @@
 //! Lights that need images.
 
 use super::descriptions::{EnvironmentDesc, ImageUse};
+use crate::import::images::RgbImage;
 use crate::lights::environment::orthogonal;
 use crate::lights::{
     EnvironmentFilter, EnvironmentMap, EnvironmentMapping, ImageLight, ImageMapping, Light, Portal, PortalLight,
 };
 use lumiris_formats::diagnostic::Diagnostics;
-use lumiris_numbers::math::{Mat3, Rgb, Vec3, warp};
+use lumiris_numbers::math::{Mat3, Rgb, warp};
 use std::f32::consts::PI;
 use std::sync::Arc;
 
 impl EnvironmentDesc {
-    /// Builds the light from its image (rows from the top).
-    pub fn light(&self, texels: Vec<Rgb>, size: [usize; 2], d: &mut Diagnostics) -> Option<Light> {
+    /// Builds the light from its image.
+    pub fn light(&self, image: RgbImage, d: &mut Diagnostics) -> Option<Light> {
         let made = match self.image_use {
-            ImageUse::Environment { illuminance, portal } => self.environment((texels, size), illuminance, portal, d),
-            ImageUse::Goniometric { intensity, power } => self.goniometric(texels, size, (intensity, power)),
-            ImageUse::Projection { fov, power } => self.projection(texels, size, (fov, power)),
+            ImageUse::Environment { illuminance, portal } => self.environment(image, illuminance, portal, d),
+            ImageUse::Goniometric { intensity, power } => self.goniometric(&image, intensity, power),
+            ImageUse::Projection { fov, power } => self.projection(image, fov, power),
         };
         made.map_err(|reason| {
             d.error(self.span, reason);
@@ -26,7 +27,7 @@ impl EnvironmentDesc {
 
     fn environment(
         &self,
-        (texels, size): (Vec<Rgb>, [usize; 2]),
+        RgbImage { texels, size }: RgbImage,
         illuminance: f32,
         portal: Option<Portal>,
         d: &mut Diagnostics,
@@ -46,24 +47,25 @@ impl EnvironmentDesc {
         let factor = if illuminance > 0.0 { illuminance / map_illuminance(&map) } else { 1.0 };
         let scale = self.scale * factor;
         Ok(match portal {
-            Some(portal) => Light::Portal(Arc::new(PortalLight::new(Arc::new(map), self.place().1, scale, portal))),
+            Some(portal) => Light::Portal(Arc::new(PortalLight::new(Arc::new(map), self.frame(), scale, portal))),
             None => Light::infinite_image(Arc::new(map), &self.world_from_light, scale),
         })
     }
 
-    /// Position and orthogonal map of directions.
-    fn place(&self) -> (Vec3, Mat3) {
-        (self.world_from_light.translation.into(), orthogonal(&self.world_from_light))
+    /// Orthogonal map of directions.
+    fn frame(&self) -> Mat3 {
+        orthogonal(&self.world_from_light)
     }
 
     /// As in pbrt-v4, the image is grey: the mean of its channels. `power` is the power of a white intensity.
-    fn goniometric(&self, texels: Vec<Rgb>, size: [usize; 2], (intensity, power): (Rgb, f32)) -> Result<Light, String> {
+    fn goniometric(&self, image: &RgbImage, intensity: Rgb, power: f32) -> Result<Light, String> {
+        let RgbImage { texels, size } = image;
         if size[0] != size[1] {
             return Err(format!("a goniometric diagram is square (an equal-area map), not {}×{}", size[0], size[1]));
         }
         let grey: Vec<Rgb> = texels.iter().map(|c| Rgb::splat((c.r + c.g + c.b) / 3.0)).collect();
-        let (p, frame) = self.place();
-        let light = ImageLight::new(p, frame, ImageMapping::Sphere, (grey, size))?;
+        let p = self.world_from_light.translation.into();
+        let light = ImageLight::new(p, self.frame(), ImageMapping::Sphere, grey, *size)?;
         Ok(Light::Image(Arc::new(self.scaled(light, intensity, power))))
     }
 
@@ -73,12 +75,12 @@ impl EnvironmentDesc {
         light.scaled(factor * (self.scale * brightness))
     }
 
-    fn projection(&self, texels: Vec<Rgb>, size: [usize; 2], (fov, power): (f32, f32)) -> Result<Light, String> {
+    fn projection(&self, RgbImage { texels, size }: RgbImage, fov: f32, power: f32) -> Result<Light, String> {
         let tan = (0.5 * fov.to_radians()).tan();
         let aspect = size[0] as f32 / size[1].max(1) as f32;
         let half = [tan * aspect.max(1.0), tan * aspect.recip().max(1.0)];
-        let (p, frame) = self.place();
-        let light = ImageLight::new(p, frame, ImageMapping::Plane { half }, (texels, size))?;
+        let p = self.world_from_light.translation.into();
+        let light = ImageLight::new(p, self.frame(), ImageMapping::Plane { half }, texels, size)?;
         Ok(Light::Image(Arc::new(self.scaled(light, Rgb::WHITE, power))))
     }
 }

@@ -1,7 +1,7 @@
 //! Instances of objects, and of moving or nested parts within them.
 
 use super::descriptions::{InstanceDesc, ObjectDesc};
-use super::shapes::placed_quadric;
+use super::make_shapes::placed_quadric;
 use crate::geometry::{GroupId, Instance, Quadric, Shape};
 use lumiris_formats::source::Span;
 use lumiris_numbers::math::origin::rebased;
@@ -11,12 +11,19 @@ use lumiris_numbers::math::{Affine3A, DAffine3, DVec3};
 /// Maximum number of instances of groups in a scene.
 pub(super) const MAX_INSTANCES: u64 = 100_000_000;
 
+/// A group that moves within an object, or is far from its origin.
+pub(super) struct MovingGroup {
+    pub group: GroupId,
+    /// Its transforms.
+    pub placements: Vec<DAffine3>,
+}
+
 /// The objects of a scene. The static part of an object is a group with the object's index.
 pub(super) struct Objects<'a> {
     /// Objects; each contains only earlier ones.
     pub objects: &'a [ObjectDesc],
-    /// By object, groups that move within it or are far from its origin, with their transforms.
-    pub moving: &'a [Vec<(GroupId, Vec<DAffine3>)>],
+    /// By object, groups that move within it or are far from its origin.
+    pub moving: &'a [Vec<MovingGroup>],
     /// Opening and closing of the shutter, as fractions of the motion.
     pub shutter: [f32; 2],
     /// The point of world space that is the origin of rendered space.
@@ -32,9 +39,15 @@ pub(super) fn rendered(placements: &[DAffine3], origin: DVec3, of_group: DVec3) 
 #[derive(Default)]
 pub(super) struct Placed {
     pub instances: Vec<Instance>,
-    /// Singular instances, which ray tracers do not support: they flatten their group. With the source position of
-    /// each.
-    pub flat: Vec<(Instance, Span)>,
+    /// Singular instances.
+    pub flat: Vec<FlatInstance>,
+}
+
+/// A singular instance, which ray tracers do not support: it flattens its group.
+pub(super) struct FlatInstance {
+    pub instance: Instance,
+    /// Source position.
+    pub span: Span,
 }
 
 impl Placed {
@@ -43,7 +56,7 @@ impl Placed {
         if instance.world_from_group.iter().all(has_inverse) {
             self.instances.push(instance);
         } else {
-            self.flat.push((instance, span));
+            self.flat.push(FlatInstance { instance, span });
         }
     }
 }
@@ -66,7 +79,8 @@ impl Objects<'_> {
     /// The instances of groups that these instances of objects expand to.
     ///
     /// Returns `Err` with a message if they are too many.
-    pub(super) fn place(&self, instances: &[InstanceDesc]) -> Result<Placed, String> {
+    pub(super) fn place(&self, instances: Vec<InstanceDesc>) -> Result<Placed, String> {
+        // Number of instances
         let mut sizes: Vec<u64> = Vec::new();
         for (object, moving) in self.objects.iter().zip(self.moving) {
             let nested = object.instances.iter().map(|i| sizes[i.object]).fold(0, u64::saturating_add);
@@ -76,6 +90,8 @@ impl Objects<'_> {
         if all > MAX_INSTANCES {
             return Err(format!("objects within objects make {all} instances; at most {MAX_INSTANCES} are"));
         }
+
+        // Expand
         let mut placed = Placed { instances: Vec::with_capacity(all as usize), flat: Vec::new() };
         for asked in instances {
             // Iterative, since the nesting depth of objects is unlimited
@@ -85,8 +101,8 @@ impl Objects<'_> {
                     group,
                     world_from_group: rendered(placement, self.origin, DVec3::ZERO),
                 };
-                for (group, within) in &self.moving[object] {
-                    placed.push(instance(*group, &compose_placements(&placement, within)), asked.span);
+                for MovingGroup { group, placements } in &self.moving[object] {
+                    placed.push(instance(*group, &compose_placements(&placement, placements)), asked.span);
                 }
                 let within = |i: &InstanceDesc| compose_placements(&placement, &i.ctm.samples(self.shutter));
                 open.extend(self.objects[object].instances.iter().map(|i| (i.object, within(i))));

@@ -1,30 +1,35 @@
 //! `LightSource`, `AreaLightSource`
 
-use super::checks::{file_name, unknown};
+use super::checks::{FilePlace, file_name, unknown};
 use super::descriptions::{AreaLightDesc, EnvironmentDesc, ImageUse};
 use super::spectrum::SpectrumUse;
 use super::state::Builder;
 use crate::lights::layers::fault_of_name;
-use crate::lights::spot::spot_solid_angle;
-use crate::lights::{EnvironmentFilter, EnvironmentMap, EnvironmentMapping, Light, Portal, PortalLight};
+use crate::lights::{DistantLight, EnvironmentFilter, EnvironmentMap, EnvironmentMapping, Light, PointLight};
+use crate::lights::{Portal, PortalLight, SpotLight};
 use lumiris_formats::color_space::Colored;
 use lumiris_formats::diagnostic::Diagnostics;
 use lumiris_formats::names::{file_in, nfc};
 use lumiris_formats::pbrt::directive::Name;
 use lumiris_formats::pbrt::params::{ParamSet, ParamType};
-use lumiris_formats::source::Span;
 use lumiris_numbers::math::{DAffine3, DMat3, DVec3, Mat3, Rgb, Vec3};
 use std::f32::consts::PI;
+use std::path::PathBuf;
 use std::sync::Arc;
 
-/// From the space of a light to the world, and the factor of its light.
-type Placed<'a> = (&'a DAffine3, f32);
+/// The placement of a light.
+#[derive(Clone, Copy)]
+struct Placed {
+    world_from_light: DAffine3,
+    /// Factor of its light.
+    scale: f32,
+}
 
 impl Builder<'_> {
     /// `LightSource "kind"`
     pub fn light(&mut self, kind: &Name, p: &ParamSet, d: &mut Diagnostics) {
         let world_from_light = self.still_transform("lights", p.span, d);
-        let placed = (&world_from_light, light_scale(p, d));
+        let placed = Placed { world_from_light, scale: light_scale(p, d) };
         let images = self.environments.len();
         let light = match kind.text.as_str() {
             "point" => self.point(p, placed, d),
@@ -63,15 +68,18 @@ impl Builder<'_> {
         self.color_param(p, name, SpectrumUse::Illuminant, d).unwrap_or_else(|| self.white())
     }
 
-    fn point(&self, p: &ParamSet, (world_from_light, scale): Placed<'_>, d: &mut Diagnostics) -> Option<Light> {
+    fn point(&self, p: &ParamSet, Placed { world_from_light, scale }: Placed, d: &mut Diagnostics) -> Option<Light> {
         let intensity = self.emitted(p, "I", d) * scale;
         let from = p.point("from", d).unwrap_or(DVec3::ZERO);
         let power = p.float("power", d).unwrap_or(0.0);
         let factor = if power > 0.0 { power / (4.0 * PI) } else { 1.0 };
-        Some(Light::Point { p: world_from_light.transform_point3(from).as_vec3(), intensity: intensity * factor })
+        Some(Light::Point(PointLight {
+            p: world_from_light.transform_point3(from).as_vec3(),
+            intensity: intensity * factor,
+        }))
     }
 
-    fn spot(&self, p: &ParamSet, (world_from_light, scale): Placed<'_>, d: &mut Diagnostics) -> Option<Light> {
+    fn spot(&self, p: &ParamSet, Placed { world_from_light, scale }: Placed, d: &mut Diagnostics) -> Option<Light> {
         let intensity = self.emitted(p, "I", d) * scale;
         let from = p.point("from", d).unwrap_or(DVec3::ZERO);
         let to = p.point("to", d).unwrap_or(DVec3::Z);
@@ -93,11 +101,12 @@ impl Builder<'_> {
         // Cone and power
         let cos_total = cone.to_radians().cos();
         let cos_falloff_start = (cone - delta).clamp(0.0, cone).to_radians().cos();
-        let factor = if power > 0.0 { power / spot_solid_angle(cos_total, cos_falloff_start) } else { 1.0 };
-        Some(Light::Spot { p: p0.as_vec3(), axis, cos_total, cos_falloff_start, intensity: intensity * factor })
+        let light = SpotLight { p: p0.as_vec3(), axis, cos_total, cos_falloff_start, intensity };
+        let factor = if power > 0.0 { power / light.solid_angle() } else { 1.0 };
+        Some(Light::Spot(SpotLight { intensity: intensity * factor, ..light }))
     }
 
-    fn distant(&self, p: &ParamSet, (world_from_light, scale): Placed<'_>, d: &mut Diagnostics) -> Option<Light> {
+    fn distant(&self, p: &ParamSet, Placed { world_from_light, scale }: Placed, d: &mut Diagnostics) -> Option<Light> {
         let l = self.emitted(p, "L", d) * scale;
         let from = p.point("from", d).unwrap_or(DVec3::ZERO);
         let to = p.point("to", d).unwrap_or(DVec3::Z);
@@ -109,10 +118,10 @@ impl Builder<'_> {
         // pbrt-v4 replaces the scale, including the normalisation of the white point, so the colour's luminance remains
         // a factor.
         let l = if illuminance > 0.0 { l * illuminance } else { l };
-        Some(Light::Distant { wi_world, l })
+        Some(Light::Distant(DistantLight { wi: wi_world, l }))
     }
 
-    fn infinite(&mut self, p: &ParamSet, (world_from_light, scale): Placed<'_>, d: &mut Diagnostics) -> Option<Light> {
+    fn infinite(&mut self, p: &ParamSet, placed: Placed, d: &mut Diagnostics) -> Option<Light> {
         let portal = self.portal(p, d);
         self.portals.extend(portal.map(|portal| (portal, p.span_of("portal"))));
         let illuminance = p.float("illuminance", d).unwrap_or(0.0);
@@ -127,18 +136,15 @@ impl Builder<'_> {
 
         // Without an image, a constant light
         let Some((name, span)) = file else {
-            let l = color.unwrap_or_else(|| self.white()) * scale;
+            let l = color.unwrap_or_else(|| self.white()) * placed.scale;
             let l = l * if illuminance > 0.0 { illuminance / PI } else { 1.0 };
             return Some(portal.map_or(Light::InfiniteConstant { l }, |portal| constant_portal(l, portal)));
         };
         if color.is_some() {
             d.error(p.span_of("L"), "an infinite light has `L` or `filename`, not both");
         }
-        Some(self.wait_for_image(
-            (&name, span),
-            ImageUse::Environment { illuminance, portal },
-            (world_from_light, scale),
-        ))
+        let image = FilePlace { path: &file_in(&self.folder, &name), span };
+        Some(self.wait_for_image(&image, ImageUse::Environment { illuminance, portal }, placed))
     }
 
     /// `portal`: corners in world space, independent of the current transform.
@@ -152,50 +158,53 @@ impl Builder<'_> {
     }
 
     /// Reserves the index of a light until its image is read.
-    fn wait_for_image(
-        &mut self,
-        (name, span): (&str, Span),
-        image_use: ImageUse,
-        (world_from_light, scale): Placed<'_>,
-    ) -> Light {
-        let (path, index) = (file_in(&self.folder, name), self.lights.len());
-        let world_from_light = world_from_light.as_affine3a();
-        self.environments.push(EnvironmentDesc { path, span, image_use, world_from_light, scale, index });
+    fn wait_for_image(&mut self, image: &FilePlace<'_>, image_use: ImageUse, placed: Placed) -> Light {
+        self.environments.push(EnvironmentDesc {
+            path: image.path.to_owned(),
+            span: image.span,
+            image_use,
+            world_from_light: placed.world_from_light.as_affine3a(),
+            scale: placed.scale,
+            index: self.lights.len(),
+        });
         Light::InfiniteConstant { l: Rgb::BLACK }
     }
 
     /// `LightSource "goniometric"`: in the frame of the light, z of the image's sphere is y.
-    fn goniometric(
-        &mut self,
-        p: &ParamSet,
-        (world_from_light, scale): Placed<'_>,
-        d: &mut Diagnostics,
-    ) -> Option<Light> {
+    fn goniometric(&mut self, p: &ParamSet, placed: Placed, d: &mut Diagnostics) -> Option<Light> {
         let intensity = self.emitted(p, "I", d);
         let power = p.float("power", d).unwrap_or(0.0);
-        let name = image_of(p, "goniometric", d)?;
+        let path = self.image_of(p, "goniometric", d)?;
         let swap = DAffine3::from_mat3(DMat3::from_cols(DVec3::X, DVec3::Z, DVec3::Y));
         let image_use = ImageUse::Goniometric { intensity, power };
-        Some(self.wait_for_image((&name, p.span_of("filename")), image_use, (&(*world_from_light * swap), scale)))
+        let image = FilePlace { path: &path, span: p.span_of("filename") };
+        let world_from_light = placed.world_from_light * swap;
+        Some(self.wait_for_image(&image, image_use, Placed { world_from_light, ..placed }))
     }
 
     /// `LightSource "projection"`: along z, with the first row of the image at the maximum y.
-    fn projection(
-        &mut self,
-        p: &ParamSet,
-        (world_from_light, scale): Placed<'_>,
-        d: &mut Diagnostics,
-    ) -> Option<Light> {
+    fn projection(&mut self, p: &ParamSet, placed: Placed, d: &mut Diagnostics) -> Option<Light> {
         let fov = p.float("fov", d).unwrap_or(90.0);
         let power = p.float("power", d).unwrap_or(0.0);
-        let name = image_of(p, "projection", d)?;
+        let path = self.image_of(p, "projection", d)?;
         if !(fov > 0.0 && fov < 180.0) {
             d.error(p.span_of("fov"), format!("fov must be above 0 and below 180 degrees, not {fov}"));
             return None;
         }
         let flip = DAffine3::from_scale(DVec3::new(1.0, -1.0, 1.0));
         let image_use = ImageUse::Projection { fov, power };
-        Some(self.wait_for_image((&name, p.span_of("filename")), image_use, (&(*world_from_light * flip), scale)))
+        let image = FilePlace { path: &path, span: p.span_of("filename") };
+        let world_from_light = placed.world_from_light * flip;
+        Some(self.wait_for_image(&image, image_use, Placed { world_from_light, ..placed }))
+    }
+
+    /// `filename`, which the light requires.
+    fn image_of(&self, p: &ParamSet, kind: &str, d: &mut Diagnostics) -> Option<PathBuf> {
+        let name = file_name(p, "filename", d);
+        if name.is_none() {
+            d.error(p.span, format!("a {kind} light needs `filename`"));
+        }
+        name.map(|name| file_in(&self.folder, name))
     }
 
     /// `AreaLightSource "diffuse"`
@@ -233,15 +242,6 @@ fn constant_portal(l: Rgb, portal: Portal) -> Light {
     let map = EnvironmentMap::new(vec![l], [1, 1], EnvironmentMapping::EqualArea, EnvironmentFilter::Nearest)
         .expect("one texel is square");
     Light::Portal(Arc::new(PortalLight::new(Arc::new(map), Mat3::IDENTITY, 1.0, portal)))
-}
-
-/// `filename`, which the light requires.
-fn image_of(p: &ParamSet, kind: &str, d: &mut Diagnostics) -> Option<String> {
-    let name = file_name(p, "filename", d).map(str::to_owned);
-    if name.is_none() {
-        d.error(p.span, format!("a {kind} light needs `filename`"));
-    }
-    name
 }
 
 /// `lightgroup`: the image layer of the light.

@@ -126,12 +126,12 @@ impl Builder<'_> {
             },
             "coateddiffuse" => Material::CoatedDiffuse {
                 reflectance: self.albedo(p, "reflectance", grey, d),
-                coat: self.coat(p, (ROUGHNESS, 0.0), "eta", d),
+                coat: self.coat(p, ROUGHNESS, 0.0, "eta", d),
             },
             "coatedconductor" => Material::CoatedConductor {
                 conductor: self.conductor(p, ["conductor.eta", "conductor.k", "reflectance"], d),
                 roughness: self.roughness(p, OF_CONDUCTOR, 0.0, d),
-                coat: self.coat(p, (OF_INTERFACE, 0.0), "interface.eta", d),
+                coat: self.coat(p, OF_INTERFACE, 0.0, "interface.eta", d),
             },
             "subsurface" => self.subsurface(desc, d),
             "principled" => self.principled(p, d),
@@ -224,7 +224,7 @@ impl Builder<'_> {
             "matte" => self.matte(p, d),
             "plastic" | "substrate" | "uber" => Material::CoatedDiffuse {
                 reflectance: self.albedo(p, "Kd", Rgb::splat(if kind == "substrate" { 0.5 } else { 0.25 }), d),
-                coat: self.coat(p, (ROUGHNESS, 0.1), "eta", d),
+                coat: self.coat(p, ROUGHNESS, 0.1, "eta", d),
             },
             "metal" => Material::Conductor {
                 spectrum: self.conductor(p, ["eta", "k", "reflectance"], d),
@@ -259,7 +259,8 @@ impl Builder<'_> {
     fn coat(
         &mut self,
         p: &ParamSet,
-        (names, rough): ([&'static str; 3], f32),
+        names: [&'static str; 3],
+        rough: f32,
         eta: &'static str,
         d: &mut Diagnostics,
     ) -> Coat {

@@ -1,17 +1,17 @@
 //! `Material "measured"`.
 
-use super::checks::{file_name, readable};
+use super::checks::{FilePlace, file_name, readable};
 use super::state::Builder;
 use crate::bsdfs::MeasuredTables;
 use crate::import::cache::FileCache;
 use crate::import::measured::MeasuredError;
+use crate::import::resources::Request;
 use crate::materials::Material;
 use lumiris_formats::bsdf_file::BsdfFileError;
 use lumiris_formats::diagnostic::Diagnostics;
 use lumiris_formats::names::file_in;
 use lumiris_formats::pbrt::directive::Name;
 use lumiris_formats::pbrt::params::ParamSet;
-use lumiris_formats::source::Span;
 use rayon::prelude::*;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -33,13 +33,13 @@ impl Builder<'_> {
 pub(super) type Loaded = Result<Arc<MeasuredTables>, MeasuredError>;
 
 /// Reads all files.
-pub(super) fn load(wanted: &[(PathBuf, Span)], files: &FileCache) -> Vec<Loaded> {
-    wanted.par_iter().map(|(path, _)| files.measured(path)).collect()
+pub(super) fn load(wanted: &[Request<PathBuf>], files: &FileCache) -> Vec<Loaded> {
+    wanted.par_iter().map(|request| files.measured(&request.file)).collect()
 }
 
 /// The tables in the order of their files; reports unreadable ones.
-pub(super) fn check(loaded: Vec<Loaded>, wanted: &[(PathBuf, Span)], d: &mut Diagnostics) -> Vec<Arc<MeasuredTables>> {
-    let places = wanted.iter().map(|(path, span)| (path.as_path(), *span));
+pub(super) fn check(loaded: Vec<Loaded>, wanted: &[Request<PathBuf>], d: &mut Diagnostics) -> Vec<Arc<MeasuredTables>> {
+    let places = wanted.iter().map(|request| FilePlace { path: &request.file, span: request.span });
     readable(loaded, places, d, |error| match error {
         MeasuredError::File(BsdfFileError::Unreadable { reason, .. }) => Some(reason.to_string()),
         MeasuredError::File(BsdfFileError::Wrong { .. }) | MeasuredError::Tables(_) => None,

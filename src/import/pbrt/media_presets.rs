@@ -2,13 +2,20 @@
 
 use lumiris_numbers::math::Rgb;
 
-const fn of(name: &'static str, sigma_s: [f32; 3], sigma_a: [f32; 3]) -> (&'static str, [Rgb; 2]) {
-    (name, [Rgb::from_array(sigma_a), Rgb::from_array(sigma_s)])
+/// A material.
+struct Preset {
+    name: &'static str,
+    /// σ_a and σ_s.
+    coefficients: [Rgb; 2],
+}
+
+const fn of(name: &'static str, sigma_s: [f32; 3], sigma_a: [f32; 3]) -> Preset {
+    Preset { name, coefficients: [Rgb::from_array(sigma_a), Rgb::from_array(sigma_s)] }
 }
 
 /// σ_a and σ_s by name: solids and milk from [Jensen et al. 2001, Fig. 5], other liquids from [Narasimhan et al. 2006,
 /// Tables 3 and 4].
-const PRESETS: &[(&str, [Rgb; 2])] = &[
+const PRESETS: &[Preset] = &[
     of("Apple", [2.29, 2.39, 1.97], [0.0030, 0.0034, 0.046]),
     of("Chicken1", [0.15, 0.21, 0.38], [0.015, 0.077, 0.19]),
     of("Chicken2", [0.19, 0.25, 0.32], [0.018, 0.088, 0.20]),
@@ -60,10 +67,10 @@ const PRESETS: &[(&str, [Rgb; 2])] = &[
 
 /// σ_a and σ_s of a material (1/mm).
 pub(super) fn preset(name: &str) -> Option<[Rgb; 2]> {
-    PRESETS.iter().find(|(known, _)| *known == name).map(|(_, coefficients)| *coefficients)
+    PRESETS.iter().find(|preset| preset.name == name).map(|preset| preset.coefficients)
 }
 
 /// All names.
 pub(super) fn names() -> Vec<&'static str> {
-    PRESETS.iter().map(|(name, _)| *name).collect()
+    PRESETS.iter().map(|preset| preset.name).collect()
 }

@@ -4,12 +4,15 @@
 //! each kind of directive: [`transform`], [`options`], [`settings`], [`film`], [`spectrum`], `texture_names`,
 //! [`textures`], `ptex`, [`materials`], `hair`, `measured`, [`lights`], `image_lights`, [`media`] with `media_presets`
 //! and `volumes`, `curves`, [`shapes`]; [`directives`] (the state machine over `lumiris_formats::pbrt`'s directives);
-//! `resolve` (names that may be used before their definition); and [`finish`] (reads files and assembles the scene).
+//! `resolve` (names that may be used before their definition); `files`, `make_shapes`, `instances` and `assembly`
+//! (geometry from descriptions and files); and [`finish`] (the steps from the read text to the scene).
 
+mod assembly;
 pub mod checks;
 mod curves;
 pub mod descriptions;
 pub mod directives;
+mod files;
 pub mod film;
 pub mod finish;
 mod hair;
@@ -17,6 +20,7 @@ mod image_lights;
 mod instances;
 mod lenses;
 pub mod lights;
+mod make_shapes;
 pub mod materials;
 mod measured;
 pub mod media;

@@ -3,9 +3,9 @@
 
 use super::checks::{positive, unknown};
 use super::descriptions::Pending;
-use super::film::finish_film;
+use super::film::{FinishedFilm, finish_film};
 use super::lenses::{self, realistic};
-use super::settings::{Placed, finish_integrator, finish_sampler};
+use super::settings::{GivenSetting, finish_integrator, finish_sampler};
 use super::transform::{Ctm, affine};
 use crate::cameras::{Camera, SphericalMapping, default_screen_window};
 use crate::import::LoadOptions;
@@ -17,15 +17,12 @@ use lumiris_formats::pbrt::params::ParamSet;
 use lumiris_formats::source::Span;
 use lumiris_numbers::math::origin::{near_origin, rebased};
 use lumiris_numbers::math::{Affine3A, DAffine3, DVec3};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// The options read so far.
 #[derive(Default)]
 pub struct Options {
-    camera: Option<(Pending, Ctm)>,
-    camera_medium: Option<Name>,
-    /// Folder of the camera's files.
-    folder: PathBuf,
+    camera: Option<CameraDirective>,
     film: Option<Pending>,
     filter: Option<Pending>,
     sampler: Option<Pending>,
@@ -44,15 +41,36 @@ pub struct ParsedOptions {
     /// Integrator and sampler.
     pub settings: Settings,
     /// The settings given in the file.
-    pub given: Placed,
+    pub given: Vec<GivenSetting>,
     /// Opening and closing of the shutter, as fractions of the motion.
     pub shutter: [f32; 2],
 }
 
-/// The camera, the film and other options of the image's size.
+/// Position of a camera, and size of its image.
 struct CameraFrame {
+    world_from_camera: Affine3A,
     resolution: [u32; 2],
+    /// Diagonal of the film (m).
+    diagonal: f32,
+}
+
+/// A camera with its exposure.
+struct FinishedCamera {
+    camera: Camera,
+    /// Opening and closing of the shutter, as fractions of the motion.
     shutter: [f32; 2],
+    /// Exposure time (s).
+    seconds: f32,
+}
+
+/// `Camera` with the state that it was given in.
+pub(super) struct CameraDirective {
+    pub pending: Pending,
+    pub ctm: Ctm,
+    /// Folder of its files.
+    pub folder: PathBuf,
+    /// The medium around it.
+    pub medium: Option<Name>,
 }
 
 impl Options {
@@ -66,21 +84,20 @@ impl Options {
     }
 
     /// `Camera`; a second one replaces the first. The same holds for the other directives.
-    pub fn camera(&mut self, name: Name, params: ParamSet, (ctm, folder): (Ctm, &Path), medium: Option<Name>) {
-        self.camera = Some((Pending { name, params }, ctm));
-        self.folder = folder.to_owned();
-        self.camera_medium = medium;
+    pub(super) fn camera(&mut self, directive: CameraDirective) {
+        self.camera = Some(directive);
     }
 
     /// The origin of rendered space: near the camera, at the start of its motion.
     pub fn origin(&self) -> DVec3 {
-        self.camera.as_ref().map_or(DVec3::ZERO, |(_, ctm)| near_origin(affine(&ctm.start.inverse()).translation))
+        let position = |camera: &CameraDirective| affine(&camera.ctm.start.inverse()).translation;
+        self.camera.as_ref().map_or(DVec3::ZERO, |camera| near_origin(position(camera)))
     }
 
     /// The files that the camera names.
     pub fn camera_files(&self) -> Vec<PathBuf> {
-        let camera = self.camera.as_ref().filter(|(pending, _)| pending.name.text == "realistic");
-        camera.map_or_else(Vec::new, |(pending, _)| lenses::files(&pending.params, &self.folder))
+        let camera = self.camera.as_ref().filter(|camera| camera.pending.name.text == "realistic");
+        camera.map_or_else(Vec::new, |camera| lenses::files(&camera.pending.params, &camera.folder))
     }
 
     /// Factor of the edge lengths of displaced meshes.
@@ -90,7 +107,7 @@ impl Options {
 
     /// The medium around the camera.
     pub fn camera_medium(&self) -> Option<&Name> {
-        self.camera_medium.as_ref()
+        self.camera.as_ref()?.medium.as_ref()
     }
 
     /// Source position of the integrator `path`, which ignores media in pbrt-v4.
@@ -158,32 +175,22 @@ impl Options {
 
     /// Parses all options.
     pub fn finish(&self, load: &LoadOptions, d: &mut Diagnostics) -> Option<ParsedOptions> {
-        let (film, sensor) = finish_film(self.film.as_ref(), self.filter.as_ref(), load, d);
+        let FinishedFilm { film, sensor } = finish_film(self.film.as_ref(), self.filter.as_ref(), load, d);
         let mut settings = Settings::default();
         settings.sampling.seed = self.seed.unwrap_or(settings.sampling.seed);
         let mut given = finish_sampler(self.sampler.as_ref(), &mut settings, d);
         given.extend(finish_integrator(self.integrator.as_ref(), &mut settings, d));
-        let (camera, shutter, seconds) = self.finish_camera(film.resolution, sensor.diagonal, d)?;
+        let FinishedCamera { camera, shutter, seconds } = self.finish_camera(film.resolution, sensor.diagonal, d)?;
         let film = FilmSettings { scale: sensor.scale * seconds, ..film };
         Some(ParsedOptions { camera, film, settings, given, shutter })
     }
 
-    fn finish_camera(
-        &self,
-        resolution: [u32; 2],
-        diagonal: f32,
-        d: &mut Diagnostics,
-    ) -> Option<(Camera, [f32; 2], f32)> {
-        let Some((Pending { name, params }, ctm)) = &self.camera else {
-            let aspect = resolution[0] as f32 / resolution[1] as f32;
-            let window = default_screen_window(aspect);
-            let camera = Camera::perspective(Affine3A::IDENTITY, 90.0, window, resolution, 0.0, 1e6);
-            return Some((camera, [0.0, 1.0], 1.0));
-        };
+    /// The camera, at the start of its motion and then moving.
+    fn finish_camera(&self, resolution: [u32; 2], diagonal: f32, d: &mut Diagnostics) -> Option<FinishedCamera> {
+        let Some(directive) = &self.camera else { return Some(FinishedCamera::usual(resolution)) };
+        let CameraDirective { pending: Pending { params, .. }, ctm, .. } = directive;
 
-        // Position and shutter
-        let to_render_space = |m: &DAffine3| rebased(m, self.origin(), DVec3::ZERO).as_affine3a();
-        let world_from_camera = to_render_space(&affine(&ctm.start.inverse()));
+        // Shutter
         let open = params.float("shutteropen", d).unwrap_or(0.0);
         let close = params.float("shutterclose", d).unwrap_or(1.0);
         if !(open < close) {
@@ -191,49 +198,51 @@ impl Options {
             return None;
         }
         let [start, end] = self.times.unwrap_or([0.0, 1.0]);
-        let frame =
-            CameraFrame { resolution, shutter: [(open - start) / (end - start), (close - start) / (end - start)] };
+        let shutter = [open, close].map(|time| (time - start) / (end - start));
 
         // Camera
+        let to_render_space = |m: &DAffine3| rebased(m, self.origin(), DVec3::ZERO).as_affine3a();
+        let world_from_camera = to_render_space(&affine(&ctm.start.inverse()));
+        let frame = CameraFrame { world_from_camera, resolution, diagonal: diagonal / 1000.0 };
+        let places: Vec<Affine3A> = ctm.inverse().samples(shutter).iter().map(to_render_space).collect();
+        let camera = directive.camera(&frame, d)?.moving(&places);
+        Some(FinishedCamera { camera, shutter, seconds: close - open })
+    }
+}
+
+impl FinishedCamera {
+    /// The camera of a file without one.
+    fn usual(resolution: [u32; 2]) -> Self {
+        let window = default_screen_window(resolution[0] as f32 / resolution[1] as f32);
+        let camera = Camera::perspective(Affine3A::IDENTITY, 90.0, window, resolution, 0.0, 1e6);
+        FinishedCamera { camera, shutter: [0.0, 1.0], seconds: 1.0 }
+    }
+}
+
+impl CameraDirective {
+    /// The camera, not moving.
+    fn camera(&self, frame: &CameraFrame, d: &mut Diagnostics) -> Option<Camera> {
+        let Pending { name, params } = &self.pending;
+        let CameraFrame { world_from_camera, resolution, diagonal } = *frame;
         let camera = match name.text.as_str() {
-            "perspective" => perspective(params, &world_from_camera, &frame, d),
+            "perspective" => perspective(params, frame, d),
             "orthographic" => {
                 let window = screen_window(params, resolution, d)?;
-                let (lens, focus) = lens(params, d)?;
-                Some(Camera::orthographic(world_from_camera, window, resolution, lens, focus))
+                let ThinLens { radius, focus } = lens(params, d)?;
+                Some(Camera::orthographic(world_from_camera, window, resolution, radius, focus))
             }
             "spherical" | "environment" => {
-                if name.text == "environment" {
-                    d.warning_once(name.span, "camera `environment` is pbrt-v3; pbrt-v4 writes `spherical`");
-                }
-                let mapping = match params.string("mapping", d).unwrap_or(if name.text == "environment" {
-                    "equirectangular"
-                } else {
-                    "equalarea"
-                }) {
-                    "equalarea" => SphericalMapping::EqualArea,
-                    "equirectangular" => SphericalMapping::EquiRectangular,
-                    other => {
-                        let message = format!("unknown mapping `{other}`");
-                        d.error(params.span_of("mapping"), message).help("one of equalarea, equirectangular");
-                        return None;
-                    }
-                };
-                Some(Camera::spherical(world_from_camera, resolution, mapping))
+                Some(Camera::spherical(world_from_camera, resolution, mapping(name, params, d)?))
             }
-            "realistic" => realistic(params, &self.folder, diagonal / 1000.0, d)
-                .map(|lens| Camera::realistic(world_from_camera, resolution, diagonal / 1000.0, lens)),
+            "realistic" => realistic(params, &self.folder, diagonal, d)
+                .map(|lens| Camera::realistic(world_from_camera, resolution, diagonal, lens)),
             other => {
                 unknown(other, name.span, "camera", &["perspective", "orthographic", "realistic", "spherical"], d);
                 return None;
             }
         };
-
-        // Motion
         params.report_unused(d);
-        let places: Vec<Affine3A> = ctm.inverse().samples(frame.shutter).iter().map(to_render_space).collect();
-        let camera = camera?.moving(&places);
-        Some((camera, frame.shutter, close - open))
+        camera
     }
 }
 
@@ -256,7 +265,24 @@ fn warn_without_effect(name: &Name, d: &mut Diagnostics) {
     d.warning_once(name.span, format!("option `{}` has no effect here", name.text));
 }
 
-fn perspective(p: &ParamSet, world_from_camera: &Affine3A, frame: &CameraFrame, d: &mut Diagnostics) -> Option<Camera> {
+/// The mapping of a spherical camera.
+fn mapping(name: &Name, p: &ParamSet, d: &mut Diagnostics) -> Option<SphericalMapping> {
+    let is_old = name.text == "environment";
+    if is_old {
+        d.warning_once(name.span, "camera `environment` is pbrt-v3; pbrt-v4 writes `spherical`");
+    }
+    match p.string("mapping", d).unwrap_or(if is_old { "equirectangular" } else { "equalarea" }) {
+        "equalarea" => Some(SphericalMapping::EqualArea),
+        "equirectangular" => Some(SphericalMapping::EquiRectangular),
+        other => {
+            let message = format!("unknown mapping `{other}`");
+            d.error(p.span_of("mapping"), message).help("one of equalarea, equirectangular");
+            None
+        }
+    }
+}
+
+fn perspective(p: &ParamSet, frame: &CameraFrame, d: &mut Diagnostics) -> Option<Camera> {
     let mut fov = p.float("fov", d).unwrap_or(90.0);
     if let Some(half) = p.float("halffov", d) {
         d.warning_once(p.span_of("halffov"), "halffov is pbrt-v3; pbrt-v4 writes fov");
@@ -267,17 +293,23 @@ fn perspective(p: &ParamSet, world_from_camera: &Affine3A, frame: &CameraFrame, 
         return None;
     }
     let window = screen_window(p, frame.resolution, d)?;
-    let (radius, focus) = lens(p, d)?;
-    Some(Camera::perspective(*world_from_camera, fov, window, frame.resolution, radius, focus))
+    let ThinLens { radius, focus } = lens(p, d)?;
+    Some(Camera::perspective(frame.world_from_camera, fov, window, frame.resolution, radius, focus))
 }
 
-fn lens(p: &ParamSet, d: &mut Diagnostics) -> Option<(f32, f32)> {
+/// Radius of a thin lens, and distance of the plane in focus.
+struct ThinLens {
+    radius: f32,
+    focus: f32,
+}
+
+fn lens(p: &ParamSet, d: &mut Diagnostics) -> Option<ThinLens> {
     let radius = p.float("lensradius", d).unwrap_or(0.0);
     if !(radius >= 0.0 && radius.is_finite()) {
         d.error(p.span_of("lensradius"), "lensradius must not be negative");
         return None;
     }
-    Some((radius, positive(p, "focaldistance", 1e6, d)))
+    Some(ThinLens { radius, focus: positive(p, "focaldistance", 1e6, d) })
 }
 
 /// The part of the image plane covered by the film, x0 x1 y0 y1; the shorter axis spans −1..1 by default.

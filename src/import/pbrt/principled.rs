@@ -55,19 +55,19 @@ impl Builder<'_> {
             ["specular_color", "transmission_weight", "coat_weight", "geometry_thin_walled"].map(&mut name);
         let fuzz = ["fuzz_weight", "fuzz_color", "fuzz_roughness"].map(&mut name);
         Material::Principled(PrincipledMaterial {
-            base_color: self.color_up_to(1.0, p, (color, Rgb::splat(0.8)), d),
+            base_color: self.color_up_to(1.0, p, color, Rgb::splat(0.8), d),
             metalness: self.unit(p, metalness, 0.0, d),
             roughness: self.unit(p, roughness, 0.3, d),
             anisotropy: anisotropy(p, d),
             direction: number_of(p, ["anisotropic_rotation"], d)
-                .map(|(_, turns)| AnisotropyDirection { rotation: turns * TAU, map: None }),
+                .map(|turns| AnisotropyDirection { rotation: turns.x * TAU, map: None }),
             ior: self.ior(p, ior, d),
             specular: self.unit(p, "specular_weight", 1.0, d),
             specular_color: self.specular_color(p, specular_color, d),
             transmission: self.unit(p, transmission, 0.0, d),
             is_thin: p.boolean(thin, d).unwrap_or(false),
             sheen: self.unit(p, fuzz[0], 0.0, d),
-            sheen_color: self.color_up_to(1.0, p, (fuzz[1], Rgb::WHITE), d),
+            sheen_color: self.color_up_to(1.0, p, fuzz[1], Rgb::WHITE, d),
             sheen_roughness: self.unit(p, fuzz[2], 0.5, d),
             coat: self.unit(p, coat, 0.0, d),
             coat_roughness: self.coat_roughness(p, d),
@@ -76,8 +76,8 @@ impl Builder<'_> {
 
     /// The specular colour, multiplied by twice the level of Blender and Disney.
     fn specular_color(&mut self, p: &ParamSet, name: &'static str, d: &mut Diagnostics) -> RgbTextureId {
-        let color = self.color_up_to(f32::INFINITY, p, (name, Rgb::WHITE), d);
-        let Some((name, level)) = number_of(p, ["specular_ior_level", "specular"], d) else { return color };
+        let color = self.color_up_to(f32::INFINITY, p, name, Rgb::WHITE, d);
+        let Some(Number { name, x: level }) = number_of(p, ["specular_ior_level", "specular"], d) else { return color };
         check_unit(level, p, name, d);
         let level = self.textures.add_rgb(RgbTexture::Constant(Rgb::splat(2.0 * level)));
         self.textures.add_rgb(RgbTexture::Product { tex1: color, tex2: level })
@@ -85,7 +85,7 @@ impl Builder<'_> {
 
     /// The roughness of the coat, or the equivalent of Disney's gloss.
     fn coat_roughness(&mut self, p: &ParamSet, d: &mut Diagnostics) -> FloatTextureId {
-        let Some((name, gloss)) = number_of(p, ["clearcoatgloss"], d) else {
+        let Some(Number { name, x: gloss }) = number_of(p, ["clearcoatgloss"], d) else {
             return self.unit(p, "coat_roughness", 0.0, d);
         };
         check_unit(gloss, p, name, d);
@@ -107,7 +107,8 @@ impl Builder<'_> {
         &mut self,
         most: f32,
         p: &ParamSet,
-        (name, default): (&'static str, Rgb),
+        name: &'static str,
+        default: Rgb,
         d: &mut Diagnostics,
     ) -> RgbTextureId {
         let id = self.albedo(p, name, default, d);
@@ -134,18 +135,21 @@ fn spelled(p: &ParamSet, name: &'static str, d: &mut Diagnostics) -> &'static st
     first
 }
 
+/// A number with its name; no name if it is not given.
+#[derive(Clone, Copy, Default)]
+struct Number {
+    name: &'static str,
+    x: f32,
+}
+
 /// The number of the first of these names that is given.
-fn number_of<const N: usize>(
-    p: &ParamSet,
-    names: [&'static str; N],
-    d: &mut Diagnostics,
-) -> Option<(&'static str, f32)> {
-    names.into_iter().find_map(|name| p.float(name, d).map(|x| (name, x)))
+fn number_of<const N: usize>(p: &ParamSet, names: [&'static str; N], d: &mut Diagnostics) -> Option<Number> {
+    names.into_iter().find_map(|name| p.float(name, d).map(|x| Number { name, x }))
 }
 
 fn anisotropy(p: &ParamSet, d: &mut Diagnostics) -> Anisotropy {
     let of_disney = number_of(p, ["anisotropic"], d);
-    let (name, x) = of_disney.or(number_of(p, ["specular_roughness_anisotropy"], d)).unwrap_or_default();
+    let Number { name, x } = of_disney.or(number_of(p, ["specular_roughness_anisotropy"], d)).unwrap_or_default();
     if !name.is_empty() {
         check_unit(x, p, name, d);
     }

@@ -1,17 +1,17 @@
 //! `Texture "ptex"`.
 
-use super::checks::{file_name, readable};
+use super::checks::{FilePlace, file_name, readable};
 use super::state::Builder;
 use crate::imaging::{ColorEncoding, FaceMap};
 use crate::import::cache::FileCache;
 use crate::import::face_maps::FaceMapRequest;
 use crate::import::images::ImageEncoding;
+use crate::import::resources::Request;
 use crate::textures::FaceTexture;
 use lumiris_formats::diagnostic::Diagnostics;
 use lumiris_formats::names::file_in;
 use lumiris_formats::pbrt::params::ParamSet;
 use lumiris_formats::ptex::PtexError;
-use lumiris_formats::source::Span;
 use rayon::prelude::*;
 use std::sync::Arc;
 
@@ -42,13 +42,13 @@ impl Builder<'_> {
 pub(super) type Loaded = Result<Arc<FaceMap>, PtexError>;
 
 /// Reads all files.
-pub(super) fn load(wanted: &[(FaceMapRequest, Span)], files: &FileCache) -> Vec<Loaded> {
-    wanted.par_iter().map(|(request, _)| files.face_map(request)).collect()
+pub(super) fn load(wanted: &[Request<FaceMapRequest>], files: &FileCache) -> Vec<Loaded> {
+    wanted.par_iter().map(|request| files.face_map(&request.file)).collect()
 }
 
 /// The textures in the order of their files; reports unreadable ones.
-pub(super) fn check(loaded: Vec<Loaded>, wanted: &[(FaceMapRequest, Span)], d: &mut Diagnostics) -> Vec<Arc<FaceMap>> {
-    let places = wanted.iter().map(|(request, span)| (request.path.as_path(), *span));
+pub(super) fn check(loaded: Vec<Loaded>, wanted: &[Request<FaceMapRequest>], d: &mut Diagnostics) -> Vec<Arc<FaceMap>> {
+    let places = wanted.iter().map(|request| FilePlace { path: &request.file.path, span: request.span });
     readable(loaded, places, d, |error| match error {
         PtexError::Unreadable { reason, .. } => Some(reason.to_string()),
         PtexError::Wrong { .. } => None,

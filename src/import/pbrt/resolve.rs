@@ -4,7 +4,7 @@
 //! pbrt-v4 makes image textures first, then the other float textures and the other spectrum textures, each in text
 //! order. A texture refers to textures made before it, so none can contain itself.
 
-use super::descriptions::{InstanceDesc, LateInstance, ParamState, PendingMedium};
+use super::descriptions::{InstanceDesc, LateInstance, MaterialDesc, ParamState, PendingMedium};
 use super::state::Builder;
 use crate::materials::{Material, MaterialId};
 use crate::textures::FloatTextureId;
@@ -12,10 +12,18 @@ use lumiris_formats::diagnostic::Diagnostics;
 use lumiris_formats::source::Span;
 use std::collections::HashMap;
 
+/// A mixture of two materials.
+struct Mixture {
+    id: MaterialId,
+    parts: [MaterialId; 2],
+    /// Source position of its parts.
+    span: Span,
+}
+
 impl Builder<'_> {
     /// The current state that determines the meaning of texture, material and medium parameters.
     pub(super) fn param_state(&self) -> ParamState {
-        ParamState { ctm: self.state.ctm, color_space: self.state.color_space }
+        ParamState { ctm: self.state.ctm.clone(), color_space: self.state.color_space }
     }
 
     fn set_param_state(&mut self, state: ParamState) {
@@ -47,7 +55,7 @@ impl Builder<'_> {
             _ => 2,
         });
         for texture in &textures {
-            self.set_param_state(texture.state);
+            self.set_param_state(texture.state.clone());
             self.make_texture(texture, d);
         }
     }
@@ -55,19 +63,20 @@ impl Builder<'_> {
     fn make_materials(&mut self, d: &mut Diagnostics) {
         let materials = std::mem::take(&mut self.pending_materials);
         for desc in &materials {
-            self.set_param_state(desc.state);
+            self.set_param_state(desc.state.clone());
             self.materials[desc.id as usize] = self.material_entry(desc, d);
             desc.params.report_unused(d);
         }
 
         // Mixtures, after all materials are known
-        let mut mixtures: Vec<(MaterialId, [MaterialId; 2], Span)> = Vec::new();
-        for desc in &materials {
-            if let Material::Mix { materials, .. } = self.materials[desc.id as usize].material {
-                mixtures.push((desc.id, materials, desc.params.span_of("materials")));
+        let mixture = |desc: &MaterialDesc| match self.materials[desc.id as usize].material {
+            Material::Mix { materials: parts, .. } => {
+                Some(Mixture { id: desc.id, parts, span: desc.params.span_of("materials") })
             }
-        }
-        for (_, parts, span) in &mixtures {
+            _ => None,
+        };
+        let mixtures: Vec<Mixture> = materials.iter().filter_map(mixture).collect();
+        for Mixture { parts, span, .. } in &mixtures {
             for id in parts.iter().filter(|id| self.interiors.contains_key(id)) {
                 let name = &self.materials[*id as usize].name;
                 d.warning_once(*span, format!("a mix has no interior: `{name}` is clear glass in it"));
@@ -77,13 +86,13 @@ impl Builder<'_> {
     }
 
     /// Mixtures that contain themselves are errors.
-    fn check_mixtures(&self, mixtures: Vec<(MaterialId, [MaterialId; 2], Span)>, d: &mut Diagnostics) {
+    fn check_mixtures(&self, mixtures: Vec<Mixture>, d: &mut Diagnostics) {
         // Mixtures by a mixture that they contain, and for each the number of contained mixtures not yet known to be
         // valid
         let mut holders: HashMap<MaterialId, Vec<MaterialId>> =
-            mixtures.iter().map(|(id, ..)| (*id, Vec::new())).collect();
+            mixtures.iter().map(|mixture| (mixture.id, Vec::new())).collect();
         let mut open: HashMap<MaterialId, usize> = HashMap::new();
-        for (id, parts, _) in &mixtures {
+        for Mixture { id, parts, .. } in &mixtures {
             let parts = parts.iter().filter_map(|part| holders.get_mut(part).map(|of| of.push(*id)));
             open.insert(*id, parts.count());
         }
@@ -96,7 +105,7 @@ impl Builder<'_> {
             }
         }
         // The remaining mixtures are in a cycle, or contain one that is
-        for (id, _, span) in mixtures.into_iter().filter(|(id, ..)| open[id] > 0) {
+        for Mixture { id, span, .. } in mixtures.into_iter().filter(|mixture| open[&mixture.id] > 0) {
             let name = &self.materials[id as usize].name;
             d.error(span, format!("the mixture `{name}` holds itself, or one that does"));
         }

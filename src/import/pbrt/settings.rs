@@ -30,12 +30,19 @@ const IGNORED: [&str; 16] = [
     "seed",
 ];
 
-/// Settings of a file, with their values and source positions.
-pub type Placed = Vec<(&'static Setting, Value, Span)>;
+/// A setting that a file gives.
+pub struct GivenSetting {
+    /// The setting.
+    pub setting: &'static Setting,
+    /// Its value.
+    pub value: Value,
+    /// Source position.
+    pub span: Span,
+}
 
 /// Reads `Integrator`, and returns its settings.
-pub(super) fn finish_integrator(pending: Option<&Pending>, s: &mut Settings, d: &mut Diagnostics) -> Placed {
-    let Some(Pending { name, params: p }) = pending else { return Placed::new() };
+pub(super) fn finish_integrator(pending: Option<&Pending>, s: &mut Settings, d: &mut Diagnostics) -> Vec<GivenSetting> {
+    let Some(Pending { name, params: p }) = pending else { return Vec::new() };
     let mut kind = IntegratorKind::Path;
     match name.text.as_str() {
         "path" | "volpath" => {}
@@ -58,7 +65,7 @@ pub(super) fn finish_integrator(pending: Option<&Pending>, s: &mut Settings, d: 
         }
     }
     set_name("integrator", kind.into(), s);
-    let placed = parameters(Directive::Integrator, s, p, d);
+    let given = parameters(Directive::Integrator, s, p, d);
     // pbrt counts photon paths, the setting counts stored photons; −1 leaves the choice to the renderer
     if let Some(n @ 1..) = p.integer("photonsperiteration", d) {
         s.integrator.photons.photons = n as u32;
@@ -70,12 +77,12 @@ pub(super) fn finish_integrator(pending: Option<&Pending>, s: &mut Settings, d: 
         p.ignore(key);
     });
     p.report_unused(d);
-    placed
+    given
 }
 
 /// Reads `Sampler`, and returns its settings.
-pub(super) fn finish_sampler(pending: Option<&Pending>, s: &mut Settings, d: &mut Diagnostics) -> Placed {
-    let Some(Pending { name, params: p }) = pending else { return Placed::new() };
+pub(super) fn finish_sampler(pending: Option<&Pending>, s: &mut Settings, d: &mut Diagnostics) -> Vec<GivenSetting> {
+    let Some(Pending { name, params: p }) = pending else { return Vec::new() };
     match name.text.as_str() {
         "independent" | "random" => {
             // The only sampler with this default
@@ -97,11 +104,11 @@ pub(super) fn finish_sampler(pending: Option<&Pending>, s: &mut Settings, d: &mu
         p.ignore("jitter");
         p.ignore("dimensions");
     }
-    let placed = parameters(Directive::Sampler, s, p, d);
+    let given = parameters(Directive::Sampler, s, p, d);
     // Randomisation is part of the sampler here.
     p.ignore("randomization");
     p.report_unused(d);
-    placed
+    given
 }
 
 /// Sets a setting of the table to one of its names.
@@ -112,21 +119,21 @@ fn set_name(flag: &str, name: &'static str, s: &mut Settings) {
 }
 
 /// Reads all settings among the parameters of a directive.
-fn parameters(directive: Directive, s: &mut Settings, p: &ParamSet, d: &mut Diagnostics) -> Placed {
-    let mut placed = Placed::new();
+fn parameters(directive: Directive, s: &mut Settings, p: &ParamSet, d: &mut Diagnostics) -> Vec<GivenSetting> {
+    let mut given = Vec::new();
     for row in rows().filter(|row| row.directive == directive) {
         if let Some(value) = read(row, s, p, d) {
             (row.set)(s, value);
             let names = row.parameters.iter().chain(row.old_parameters.iter().map(|(_, old)| old));
             let written = names.copied().find(|name| p.type_of(name).is_some());
-            placed.extend(written.map(|name| (row, value, p.span_of(name))));
+            given.extend(written.map(|name| GivenSetting { setting: row, value, span: p.span_of(name) }));
         }
     }
     for removed in Removed::of(directive).filter(|removed| p.type_of(removed.parameter).is_some()) {
         p.ignore(removed.parameter);
         d.warning(p.span_of(removed.parameter), removed.note(removed.parameter));
     }
-    placed
+    given
 }
 
 /// The name of parameter `i` of a setting in the file: a former name if the present one is absent.
@@ -231,7 +238,7 @@ mod tests {
         Cached, EstimatorKind, IntegratorSettings, IrradianceCacheSettings, PhotonMapSettings, PhotonStorage,
         ProposalPoints, Proposals, SampleCounts, SamplingTechnique, Strata, Target,
     };
-    use lumiris_numbers::estimators::mis::Heuristic;
+    use lumiris_numbers::estimators::heuristics::Heuristic;
 
     fn settings(integrator: &str) -> Result<IntegratorSettings, String> {
         let folder = tempfile::tempdir().unwrap();

@@ -2,7 +2,7 @@
 
 use super::descriptions::{
     AreaLightDesc, EnvironmentDesc, InstanceDesc, Interior, LateInstance, MaterialDesc, MaterialUse, MediumDesc,
-    MediumNames, ObjectDesc, PendingMedium, ShapeDesc, ShapeSource, TextureDesc,
+    MediumNames, ObjectDesc, PendingMedium, ShapeDesc, TextureDesc,
 };
 use super::options::Options;
 use super::texture_names::TextureNames;
@@ -205,14 +205,10 @@ impl<'a> Builder<'a> {
 
     /// The files named in the text: spectra, measured materials, textures of faces, meshes, volumes and images.
     pub fn files(&self) -> Vec<PathBuf> {
-        let mesh = |shape: &ShapeDesc| match &shape.source {
-            ShapeSource::Ply(path) => Some(path.clone()),
-            _ => None,
-        };
         let mut files = self.spectrum_files.borrow().clone();
-        files.extend(self.measured_files.list().iter().map(|(path, _)| path.clone()));
-        files.extend(self.face_maps.list().iter().map(|(request, _)| request.path.clone()));
-        files.extend(self.shapes.iter().filter_map(mesh));
+        files.extend(self.measured_files.list().iter().map(|request| request.file.clone()));
+        files.extend(self.face_maps.list().iter().map(|request| request.file.path.clone()));
+        files.extend(self.shapes.iter().filter_map(|shape| Some(shape.source.file()?.to_owned())));
         files.extend(self.media.iter().filter_map(|m| Some(m.volume.as_ref()?.path.clone())));
         files.extend(self.environments.iter().map(|e| e.path.clone()));
         files.extend(self.emission_images.iter().cloned());

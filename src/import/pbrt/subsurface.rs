@@ -68,7 +68,7 @@ impl Builder<'_> {
                 };
                 sigma.map(|sigma| sigma * scale)
             }
-            None if given("reflectance") => self.sigma_of_reflectance(p, (eta, g, scale), d)?,
+            None if given("reflectance") => self.sigma_of_reflectance(p, eta, g, scale, d)?,
             None => self.sigma(p, d)?.map(|sigma| sigma * scale),
         };
         Some(Homogeneous { sigma_a, sigma_s, le: Rgb::BLACK, g })
@@ -99,7 +99,9 @@ impl Builder<'_> {
     fn sigma_of_reflectance(
         &self,
         p: &ParamSet,
-        (eta, g, scale): (f32, f32, f32),
+        eta: f32,
+        g: f32,
+        scale: f32,
         d: &mut Diagnostics,
     ) -> Option<[Rgb; 2]> {
         if let Some(key) = ["sigma_a", "sigma_s"].into_iter().find(|key| p.ignore(key)) {

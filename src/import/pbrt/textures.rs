@@ -5,7 +5,7 @@ use super::descriptions::TextureDesc;
 use super::spectrum::SpectrumUse;
 use super::state::Builder;
 use super::transform::affine;
-use crate::import::images::{ImageChannels, ImageEncoding, ImageRequest, UDIM, tiles};
+use crate::import::images::{ImageChannels, ImageEncoding, ImageRequest, Tile, UDIM, tiles};
 use crate::textures::{
     Bilerp, CheckerboardMapping, Dots, Filter, FloatTexture, FloatTextureId, ImageId, ImageTexture, Mapping2d, Marble,
     NoiseKind, NoiseTexture, Octaves, RgbTexture, RgbTextureId, Udim, UdimId, Wrap,
@@ -20,6 +20,12 @@ use lumiris_numbers::math::{DAffine3, DVec3, Rgb, Vec2, Vec3};
 
 /// Maximum depth of references between textures.
 const MAX_DEPTH: u32 = 500;
+
+/// The tiles of an image, and the first one.
+struct TiledImage {
+    first: ImageId,
+    udim: UdimId,
+}
 
 impl Builder<'_> {
     /// `Texture "name" "float|spectrum" "class"`; textures are made at the end of the text.
@@ -263,7 +269,7 @@ impl Builder<'_> {
         let (path, span) = (file_in(&self.folder, name), p.span_of("filename"));
         let request = ImageRequest { path, channels, encoding, wrap, filter };
         let (image, udim) = if name.contains(UDIM) {
-            let (first, udim) = self.udim(&request, span, d)?;
+            let TiledImage { first, udim } = self.udim(&request, span, d)?;
             (first, Some(udim))
         } else {
             (self.resources.image(request, span), None)
@@ -273,10 +279,10 @@ impl Builder<'_> {
 
     /// The tiles of a name with [`UDIM`] in its folder, and the first one. Beyond its edges a tile repeats its edge
     /// values.
-    fn udim(&mut self, request: &ImageRequest, span: Span, d: &mut Diagnostics) -> Option<(ImageId, UdimId)> {
+    fn udim(&mut self, request: &ImageRequest, span: Span, d: &mut Diagnostics) -> Option<TiledImage> {
         let mut udim = Udim::default();
         let mut first = None;
-        for (number, path) in tiles(&request.path) {
+        for Tile { number, path } in tiles(&request.path) {
             let image = self.resources.image(ImageRequest { path, wrap: Wrap::Clamp, ..request.clone() }, span);
             udim.set(number, image);
             first.get_or_insert(image);
@@ -286,7 +292,7 @@ impl Builder<'_> {
             return None;
         };
         self.textures.udims.push(udim);
-        Some((first, (self.textures.udims.len() - 1) as UdimId))
+        Some(TiledImage { first, udim: (self.textures.udims.len() - 1) as UdimId })
     }
 
     /// `encoding`; an unknown one is an error and ignored.

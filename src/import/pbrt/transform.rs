@@ -9,67 +9,78 @@ use lumiris_numbers::math::{DAffine3, DMat3, DMat4, DQuat, DVec3};
 const MAX_ANGLE: f64 = std::f64::consts::PI / 32.0;
 
 /// The current transformation matrix at both ends of the motion.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Ctm {
     /// At the start time.
     pub start: DMat4,
-    /// At the end time.
-    pub end: DMat4,
+    /// At the end time, if it differs: a scene may have millions of transforms, most of which do not move.
+    end: Option<Box<DMat4>>,
 }
 
 impl Ctm {
     /// No transformation.
-    pub const IDENTITY: Ctm = Ctm { start: DMat4::IDENTITY, end: DMat4::IDENTITY };
+    pub const IDENTITY: Ctm = Ctm { start: DMat4::IDENTITY, end: None };
+
+    /// The transformation from its values at both ends.
+    pub fn new(start: DMat4, end: DMat4) -> Ctm {
+        Ctm { start, end: (start != end).then(|| Box::new(end)) }
+    }
+
+    /// At the end time.
+    fn end(&self) -> &DMat4 {
+        self.end.as_deref().unwrap_or(&self.start)
+    }
 
     /// True if it moves.
     pub fn is_moving(&self) -> bool {
-        self.start != self.end
+        self.end.is_some()
     }
 
     /// True if it only shifts while it moves, or does not move.
     pub fn only_shifts(&self) -> bool {
-        DMat3::from_mat4(self.start) == DMat3::from_mat4(self.end)
+        DMat3::from_mat4(self.start) == DMat3::from_mat4(*self.end())
     }
 
     /// The motion of a shape that is placed at the start if this only shifts, and in the space of the shape otherwise.
     pub fn motion(&self) -> Ctm {
         if !self.only_shifts() {
-            return *self;
+            return self.clone();
         }
         // Rounded to f32, so that shapes in different places that shift alike do so in all bits
-        let shift = (self.end.w_axis - self.start.w_axis).truncate().as_vec3().as_dvec3();
-        Ctm { start: DMat4::IDENTITY, end: DMat4::from_translation(shift) }
+        let shift = (self.end().w_axis - self.start.w_axis).truncate().as_vec3().as_dvec3();
+        Ctm::new(DMat4::IDENTITY, DMat4::from_translation(shift))
     }
 
-    /// Applies `change` to the active times.
-    pub fn apply(&mut self, active: ActiveTimes, change: impl Fn(DMat4) -> DMat4) {
-        if active != ActiveTimes::End {
-            self.start = change(self.start);
-        }
-        if active != ActiveTimes::Start {
-            self.end = change(self.end);
-        }
-    }
-
-    /// This transformation in the space that `outer` places.
+    /// This transformation with `change` applied to the active times.
     #[must_use]
-    pub fn within(&self, outer: &Ctm) -> Ctm {
-        Ctm { start: outer.start * self.start, end: outer.end * self.end }
+    pub fn changed(&self, active: ActiveTimes, change: impl Fn(&DMat4) -> DMat4) -> Ctm {
+        match active {
+            ActiveTimes::Start => Ctm::new(change(&self.start), *self.end()),
+            ActiveTimes::End => Ctm::new(self.start, change(self.end())),
+            ActiveTimes::All if self.is_moving() => Ctm::new(change(&self.start), change(self.end())),
+            ActiveTimes::All => Ctm { start: change(&self.start), end: None },
+        }
+    }
+
+    /// This transformation in the space that `outer`, which does not move, places.
+    #[must_use]
+    pub fn within(&self, outer: &DMat4) -> Ctm {
+        self.changed(ActiveTimes::All, |m| *outer * *m)
     }
 
     /// The inverse at both ends.
     pub fn inverse(&self) -> Ctm {
-        Ctm { start: self.start.inverse(), end: self.end.inverse() }
+        self.changed(ActiveTimes::All, DMat4::inverse)
     }
 
     /// True if all its elements are in the range of f32.
     pub fn is_finite(&self) -> bool {
-        [self.start, self.end].iter().all(|m| m.as_mat4().is_finite())
+        [&self.start, self.end()].iter().all(|m| m.as_mat4().is_finite())
     }
 
     /// True if it is invertible and finite. Singular transforms flatten; meshes are rendered flat.
     pub fn is_invertible(&self) -> bool {
-        [self.start, self.end].iter().all(|m| {
+        [&self.start, self.end()].iter().all(|m| {
             let scale = m.x_axis.length() * m.y_axis.length() * m.z_axis.length();
             self.is_finite()
                 && m.determinant().abs() > f64::from(f32::MIN_POSITIVE)
@@ -83,7 +94,7 @@ impl Ctm {
         if !self.is_moving() {
             return vec![affine(&self.start)];
         }
-        let (a, b) = (Parts::new(&self.start), Parts::new(&self.end));
+        let (a, b) = (Parts::new(&self.start), Parts::new(self.end()));
         // The shorter way round; a power of two, so that the samples of motions within motions coincide
         let angle = 2.0 * a.rotation.dot(b.rotation).abs().min(1.0).acos() * f64::from(shutter[1] - shutter[0]).abs();
         let segments = ((angle / MAX_ANGLE - 1e-6).ceil() as usize).next_power_of_two();
@@ -189,12 +200,12 @@ mod tests {
     #[test]
     fn motion_is_sampled_as_rotation_and_translation() {
         let turn = |degrees: f64| DMat4::from_rotation_z(degrees.to_radians()) * DMat4::from_scale(DVec3::splat(2.0));
-        let ctm = Ctm { start: turn(0.0), end: turn(90.0) };
+        let ctm = Ctm::new(turn(0.0), turn(90.0));
         let samples = ctm.samples([0.0, 1.0]);
         assert_eq!(samples.len(), 17);
         let middle = samples[8].transform_point3(DVec3::X);
         assert!((middle - DVec3::new(2.0_f64.sqrt(), 2.0_f64.sqrt(), 0.0)).length() < 1e-4, "{middle}");
-        let slide = Ctm { start: DMat4::IDENTITY, end: DMat4::from_translation(DVec3::X) };
+        let slide = Ctm::new(DMat4::IDENTITY, DMat4::from_translation(DVec3::X));
         assert_eq!(slide.samples([0.0, 0.5])[1].translation.x, 0.5);
         assert_eq!(Ctm::IDENTITY.samples([0.0, 1.0]).len(), 1);
     }
@@ -202,14 +213,14 @@ mod tests {
     #[test]
     fn mirrored_motion_stays_mirrored() {
         let m = DMat4::from_scale(DVec3::new(-1.0, 1.0, 1.0));
-        let ctm = Ctm { start: m, end: DMat4::from_rotation_y(1.0) * m };
+        let ctm = Ctm::new(m, DMat4::from_rotation_y(1.0) * m);
         assert!(ctm.samples([0.0, 1.0]).iter().all(|s| s.matrix3.determinant() < -0.9));
     }
 
     #[test]
     fn degenerate_matrices_are_found() {
-        assert!(!Ctm { start: DMat4::from_scale(DVec3::new(1.0, 0.0, 1.0)), end: DMat4::IDENTITY }.is_invertible());
-        assert!(!Ctm { start: DMat4::from_cols_array(&[f64::NAN; 16]), end: DMat4::IDENTITY }.is_invertible());
-        assert!(Ctm { start: DMat4::from_scale(DVec3::splat(1e-5)), end: DMat4::IDENTITY }.is_invertible());
+        assert!(!Ctm::new(DMat4::from_scale(DVec3::new(1.0, 0.0, 1.0)), DMat4::IDENTITY).is_invertible());
+        assert!(!Ctm::new(DMat4::from_cols_array(&[f64::NAN; 16]), DMat4::IDENTITY).is_invertible());
+        assert!(Ctm::new(DMat4::from_scale(DVec3::splat(1e-5)), DMat4::IDENTITY).is_invertible());
     }
 }

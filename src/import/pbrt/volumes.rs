@@ -1,7 +1,7 @@
 //! `MakeNamedMedium` of type `nanovdb`: its parameters, and the medium after its file has been read.
 
 use super::checks::file_name;
-use super::descriptions::VolumeDesc;
+use super::descriptions::{GridName, VolumeDesc};
 use super::media::{asymmetry, glowing, not_negative};
 use super::state::Builder;
 use crate::import::cache::FileCache;
@@ -11,7 +11,6 @@ use lumiris_formats::diagnostic::Diagnostics;
 use lumiris_formats::names::file_in;
 use lumiris_formats::nanovdb::{GridClass, NanoError};
 use lumiris_formats::pbrt::params::ParamSet;
-use lumiris_formats::source::Span;
 use lumiris_numbers::math::{DAffine3, DVec3, Rgb};
 use rayon::prelude::*;
 use std::collections::{HashMap, HashSet};
@@ -21,8 +20,8 @@ use std::sync::Arc;
 /// Requests of all media, and their results.
 type Volumes = HashMap<VolumeRequest, Result<Arc<Volume>, NanoError>>;
 
-fn request(path: &Path, grid: &str, usage: VolumeUse) -> VolumeRequest {
-    VolumeRequest { path: path.to_owned(), grid: grid.to_owned(), usage }
+fn request(path: &Path, grid: &GridName, usage: VolumeUse) -> VolumeRequest {
+    VolumeRequest { path: path.to_owned(), grid: grid.text.clone(), usage }
 }
 
 impl Builder<'_> {
@@ -42,9 +41,10 @@ impl Builder<'_> {
 
         // Names of the grids
         let density = p.string("gridname", d).unwrap_or("density").to_owned();
+        let density = GridName { text: density, span: Some(p.span_of("gridname")) };
         let named = p.string("temperaturename", d).map(str::to_owned);
         let span = named.is_some().then(|| p.span_of("temperaturename"));
-        let temperature = (named.unwrap_or_else(|| "temperature".to_owned()), span);
+        let temperature = GridName { text: named.unwrap_or_else(|| "temperature".to_owned()), span };
         let coefficients = self.coefficients(p, scale, d);
 
         // Description
@@ -56,7 +56,7 @@ impl Builder<'_> {
         Some(VolumeDesc {
             path: file_in(&self.folder, name),
             span: p.span_of("filename"),
-            density: (density, p.span_of("gridname")),
+            density,
             temperature: (le_scale > 0.0).then_some(temperature),
             offset,
             scale: temperature_scale,
@@ -72,11 +72,9 @@ impl Builder<'_> {
     pub(super) fn load_volumes(&mut self, files: &FileCache, d: &mut Diagnostics) {
         let mut requests = HashSet::new();
         for desc in self.media.iter().filter_map(|m| m.volume.as_ref()) {
-            let density = Some((&desc.density.0, VolumeUse::Density));
-            let temperature = desc.temperature.as_ref().map(|(name, _)| (name, VolumeUse::Temperature));
-            for (grid, usage) in density.into_iter().chain(temperature) {
-                requests.insert(request(&desc.path, grid, usage));
-            }
+            requests.insert(request(&desc.path, &desc.density, VolumeUse::Density));
+            let temperature = desc.temperature.as_ref();
+            requests.extend(temperature.map(|grid| request(&desc.path, grid, VolumeUse::Temperature)));
         }
         let read = |request: VolumeRequest| (files.volume(&request), request);
         let volumes: Volumes = requests.into_par_iter().map(read).map(|(volume, request)| (request, volume)).collect();
@@ -91,22 +89,23 @@ impl Builder<'_> {
 /// The grid, if it was read and is a volume; errors go to `d`.
 fn checked(
     desc: &VolumeDesc,
-    (name, span): (&str, Span),
+    name: &GridName,
     read: Option<&Result<Arc<Volume>, NanoError>>,
     d: &mut Diagnostics,
 ) -> Option<Arc<Volume>> {
+    let (text, span) = (&name.text, name.span.unwrap_or(desc.span));
     match read? {
         Ok(volume) if [GridClass::UNKNOWN, GridClass::FOG_VOLUME].contains(&volume.class) => {
             // Negative values and NaN were replaced by 0
             if volume.replaced > 0 {
                 let what = "values that are negative or no numbers are taken for 0";
-                let message = format!("{}: grid `{name}`: {} {what}", desc.path.display(), volume.replaced);
+                let message = format!("{}: grid `{text}`: {} {what}", desc.path.display(), volume.replaced);
                 d.warning_once(span, message);
             }
             Some(Arc::clone(volume))
         }
         Ok(volume) => {
-            let message = format!("{}: grid `{name}` is {}, and no fog volume", desc.path.display(), volume.class);
+            let message = format!("{}: grid `{text}` is {}, and no fog volume", desc.path.display(), volume.class);
             d.error(span, message);
             None
         }
@@ -127,19 +126,18 @@ fn checked(
 
 /// The medium of a description; `None` after an error.
 fn medium_of(desc: &VolumeDesc, volumes: &Volumes, d: &mut Diagnostics) -> Option<Medium> {
-    let (name, span) = &desc.density;
-    let density =
-        checked(desc, (name.as_str(), *span), volumes.get(&request(&desc.path, name, VolumeUse::Density)), d)?;
+    let density = volumes.get(&request(&desc.path, &desc.density, VolumeUse::Density));
+    let density = checked(desc, &desc.density, density, d)?;
     let mut hot = None;
-    if let Some((name, span)) = &desc.temperature {
+    if let Some(name) = &desc.temperature {
         let read = volumes.get(&request(&desc.path, name, VolumeUse::Temperature));
-        match (read, span) {
+        match (read, name.span) {
             // As in pbrt-v4, there is no emission then
             (Some(Err(NanoError::NoGrid { .. })), None) => {}
             (Some(Err(error @ NanoError::NoGrid { .. })), Some(span)) => {
-                d.warning_once(*span, format!("{} {error}: nothing glows", desc.path.display()));
+                d.warning_once(span, format!("{} {error}: nothing glows", desc.path.display()));
             }
-            _ => hot = Some(checked(desc, (name.as_str(), span.unwrap_or(desc.span)), read, d)?),
+            _ => hot = Some(checked(desc, name, read, d)?),
         }
     }
 

@@ -5,6 +5,7 @@
 //! the image. Lights of one geometry share a table over the directions of world space. Directions missed by the pilot
 //! have the density 0, and remain with camera paths. So the estimate is unbiased for any pilot.
 
+use crate::lights::sample_columns::ChosenLight;
 use crate::lights::{EmittingPoint, Light, LightId, LightSet};
 use crate::photons::LightDistribution;
 use lumiris_numbers::math::sphere_map::{
@@ -127,7 +128,7 @@ impl Guide {
     /// Samples a light path by two random numbers each for the light, the point and the direction; `None` if it carries
     /// no power.
     pub(super) fn emit(&self, set: &LightSet, u_light: [f32; 2], [u_point, u_d]: [[f32; 2]; 2]) -> Option<Emitted> {
-        let (light, pmf) = self.lights.sample(u_light);
+        let ChosenLight { light, pmf } = self.lights.sample(u_light);
         let place = self.tables[usize::from(self.group_of[light as usize])].sample(u_d)?;
         let d = equal_area_square_to_sphere(place.p);
         let Light::Area(area) = &set.lights[light as usize] else { return None };
@@ -192,7 +193,7 @@ impl Contributions {
 mod tests {
     use super::*;
     use crate::geometry::{BilinearMesh, Shape, TriangleMesh};
-    use crate::lights::{Emission, LightSetBuilder};
+    use crate::lights::{Emission, LightSetBuilder, PointLight};
     use lumiris_numbers::math::Bounds3;
     use lumiris_test_support::random::{RngExt, pcg32};
     use lumiris_test_support::{Moments, assert_chi_squared};
@@ -200,7 +201,7 @@ mod tests {
     /// A point light, which has no area, a bent patch, and a mesh of two triangles that emit on both sides.
     fn lights() -> LightSet {
         let mut builder = LightSetBuilder::default();
-        builder.add(Light::Point { p: Vec3::ZERO, intensity: Rgb::WHITE });
+        builder.add(Light::Point(PointLight { p: Vec3::ZERO, intensity: Rgb::WHITE }));
         let positions = vec![v(-0.5, -0.5, 2.0), v(-0.4, 0.7, 2.1), v(0.5, -0.6, 1.8), v(0.6, 0.5, 2.2)];
         let patch = BilinearMesh { positions, indices: vec![[0, 1, 2, 3]], ..BilinearMesh::default() };
         builder.add_area(3, &Shape::Bilinear(patch), &Emission::constant(Rgb::new(3.0, 1.0, 0.5)));

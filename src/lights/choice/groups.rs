@@ -7,7 +7,7 @@
 
 use super::light_sampler::LightSampler;
 use crate::lights::tree::tree_choice::one_of;
-use crate::lights::{CutNode, Light, LightCtx, LightId, LightTree, SampledLight, Turns};
+use crate::lights::{Branches, CutNode, Light, LightCtx, LightId, LightTree, SampledLight};
 use lumiris_numbers::math::AliasTable;
 
 /// Maximum number of groups.
@@ -54,7 +54,7 @@ impl LightGroups {
         let tree = match sampler.tree() {
             Some(choice) => &choice.tree,
             None => {
-                let is_chosen = |light: &&Light| !matches!(light, Light::Glow(_));
+                let is_chosen = |light: &&Light| !matches!(light, Light::Volume(_));
                 let bounds: Vec<_> = lights.iter().map(|light| Some(light).filter(is_chosen)?.bounds()).collect();
                 own_tree = LightTree::new(&bounds);
                 &own_tree
@@ -69,9 +69,9 @@ impl LightGroups {
         // Lights of each group; a single group holds everything
         let mut groups: Vec<Vec<LightId>> = Vec::new();
         groups.extend(has_infinite.then_some(infinite));
-        for &place in &cut {
+        for &root in &cut {
             let mut lights = Vec::new();
-            tree.visit_lights(place, &mut |light| lights.push(light));
+            tree.visit_lights(root, &mut |light| lights.push(light));
             groups.push(lights);
         }
         let mut group_of = vec![NO_GROUP; lights.len()];
@@ -113,22 +113,22 @@ impl LightGroups {
 
     /// Probabilities of the groups at a point. They sum to one unless no light can be chosen.
     pub fn pmfs(&self, sampler: &LightSampler, ctx: &LightCtx) -> [f32; MAX_GROUPS] {
-        self.pmfs_again(sampler, ctx, Turns::NONE)
+        self.pmfs_with(sampler, ctx, Branches::NONE)
     }
 
-    /// [`Self::pmfs`] with precomputed probabilities `turns` of the point.
+    /// [`Self::pmfs`] with precomputed branch probabilities at the point.
     #[inline]
-    pub fn pmfs_again(&self, sampler: &LightSampler, ctx: &LightCtx, turns: Turns<'_>) -> [f32; MAX_GROUPS] {
+    pub fn pmfs_with(&self, sampler: &LightSampler, ctx: &LightCtx, branches: Branches<'_>) -> [f32; MAX_GROUPS] {
         let mut pmfs = [0.0; MAX_GROUPS];
         match &self.choice {
             Choice::Tree { cut, above } => {
                 let Some(choice) = sampler.tree() else { return pmfs };
 
                 // Group 0 has the infinite lights
-                let p_infinite = turns.probability(Turns::BESIDE, || choice.infinite_probability(ctx));
+                let p_infinite = branches.infinite_probability(|| choice.infinite_probability(ctx));
                 let of_tree = &mut pmfs[usize::from(self.has_infinite)..];
                 if !cut.is_empty() {
-                    choice.tree.cut_pmfs(ctx, above, turns, of_tree);
+                    choice.tree.cut_pmfs(ctx, above, branches, of_tree);
                 }
                 of_tree.iter_mut().for_each(|p| *p *= 1.0 - p_infinite);
                 if self.has_infinite {
@@ -151,10 +151,11 @@ impl LightGroups {
         &self,
         sampler: &LightSampler,
         ctx: &LightCtx,
-        (group, group_pmf): (usize, f32),
+        group: usize,
+        group_pmf: f32,
         u: f32,
     ) -> Option<SampledLight> {
-        let of_base = |u| self.sample_base(sampler, ctx, (group, group_pmf), u);
+        let of_base = |u| self.sample_base(sampler, ctx, group, group_pmf, u);
         match sampler {
             LightSampler::Photons(choice) => {
                 choice.sample_group(ctx, |light| self.group_of(light) == Some(group), group_pmf, u, of_base)
@@ -168,7 +169,8 @@ impl LightGroups {
         &self,
         sampler: &LightSampler,
         ctx: &LightCtx,
-        (group, group_pmf): (usize, f32),
+        group: usize,
+        group_pmf: f32,
         u: f32,
     ) -> Option<SampledLight> {
         match &self.choice {
@@ -177,9 +179,9 @@ impl LightGroups {
             }
             Choice::Tree { cut, .. } => {
                 // A group of the tree is a subtree of the cut
-                let place = *cut.get(group - usize::from(self.has_infinite))?;
-                let (light, pmf, u) = sampler.tree()?.tree.sample_below(ctx, place, u)?;
-                Some(SampledLight { light, pmf: pmf * group_pmf, u })
+                let root = *cut.get(group - usize::from(self.has_infinite))?;
+                let choice = sampler.tree()?.tree.sample_below(ctx, root, u)?;
+                Some(SampledLight { pmf: choice.pmf * group_pmf, ..choice })
             }
             Choice::Fixed(groups) => {
                 let group = groups.get(group)?;
@@ -193,7 +195,9 @@ impl LightGroups {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::lights::{LightSamplerKind, LightSampling, LightSetBuilder, VisibilityCache};
+    use crate::lights::{
+        LightSamplerKind, LightSampling, LightSetBuilder, PointLight, PrimaryPhoton, SurfacePoint, VisibilityCache,
+    };
     use lumiris_numbers::math::{Bounds3, Rgb, Vec3};
     use lumiris_test_support::assert_chi_squared;
     use lumiris_test_support::random::{RngExt, pcg32};
@@ -209,15 +213,16 @@ mod tests {
         }
         for i in 0..points {
             let p = Vec3::new(i as f32 * 0.7 - 2.0, (i % 3) as f32, 2.0 + (i % 4) as f32);
-            b.add(Light::Point { p, intensity: Rgb::splat(if i == 2 { 0.0 } else { 0.5 + i as f32 }) });
+            b.add(Light::Point(PointLight { p, intensity: Rgb::splat(if i == 2 { 0.0 } else { 0.5 + i as f32 }) }));
         }
         let set = b.build(&Bounds3 { min: Vec3::ZERO, max: Vec3::splat(3.0) });
         let mut set = LightSampling::new(Arc::new(set), kind, 1);
         // A third of the lights is visible, or all of them if there are many
         let step = if points > 90 { 1 } else { 3 };
-        let at = Vec3::new(0.4, 0.3, 0.0);
-        let photons = (0..points + infinite).step_by(step).flat_map(|l| (0..=l % 5).map(move |_| (at, Vec3::Z, l)));
-        set.set_visibility_cache(Some(VisibilityCache::new(photons, 0.5)));
+        let at = SurfacePoint { p: Vec3::new(0.4, 0.3, 0.0), n: Vec3::Z };
+        let photons = |light| vec![PrimaryPhoton { at, light }; light as usize % 5 + 1];
+        let photons: Vec<_> = (0..points + infinite).step_by(step).flat_map(photons).collect();
+        set.set_visibility_cache(Some(VisibilityCache::new(&photons, 0.5)));
         set
     }
 
@@ -244,8 +249,7 @@ mod tests {
                             u < 0.0
                         };
                         let group = pmfs.iter().position(pick).unwrap_or(0);
-                        let choice =
-                            groups.sample(&set.sampler, &ctx, (group, pmfs[group]), s.random::<f32>()).unwrap();
+                        let choice = groups.sample(&set.sampler, &ctx, group, pmfs[group], s.random::<f32>()).unwrap();
                         assert_eq!(groups.group_of(choice.light), Some(group));
                         let pmf = set.sampler.pmf(&ctx, choice.light);
                         assert!((choice.pmf / pmf - 1.0).abs() < 1e-4, "{kind:?} {} {pmf}", choice.pmf);

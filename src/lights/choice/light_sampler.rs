@@ -11,7 +11,8 @@
 
 use crate::lights::tree::sampled_light::UNIT;
 use crate::lights::{
-    Light, LightCtx, LightId, LightRun, SampledLight, TreeChoice, Turns, VisibilityCache, VisibilityCacheSampler,
+    Branches, Light, LightCtx, LightId, LightRun, RunPositions, SampledLight, TreeChoice, VisibilityCache,
+    VisibilityCacheSampler,
 };
 use lumiris_numbers::math::{AliasTable, cumulative};
 use std::ops::Deref;
@@ -44,12 +45,12 @@ pub struct LightChoice {
     /// has the same probability as the whole tree.
     pub infinite_fraction: Option<f32>,
     /// True if the tree includes emitting parts of media.
-    pub glows: bool,
+    pub volumes: bool,
 }
 
 impl From<LightSamplerKind> for LightChoice {
     fn from(kind: LightSamplerKind) -> Self {
-        LightChoice { kind, infinite_fraction: None, glows: false }
+        LightChoice { kind, infinite_fraction: None, volumes: false }
     }
 }
 
@@ -91,8 +92,8 @@ impl FixedChoice {
             let Some(&end) = self.cumulative.get(light) else { return };
             let start = cumulative::sum_before(&self.cumulative, light);
             let count = positions[first..].partition_point(|&p| f64::from(p) * UNIT < end);
-            let (pmf, places) = (self.table.pmf(light), [first as u32, (first + count) as u32]);
-            out.push(LightRun { light: light as LightId, pmf, places, interval: [start, end] });
+            let (pmf, range) = (self.table.pmf(light), [first as u32, (first + count) as u32]);
+            out.push(LightRun { light: light as LightId, pmf, range, interval: [start, end] });
             first += count;
         }
     }
@@ -115,7 +116,7 @@ impl LightSampler {
     /// A sampler of `lights`, with their indices as ids. `scene_radius` determines the power of infinite lights. The
     /// photon sampler has no visibility cache yet.
     pub fn new(choice: LightChoice, lights: &[Light], scene_radius: f32) -> Self {
-        let tree = |powers: &[f32]| TreeChoice::new((lights, powers), choice.infinite_fraction, choice.glows);
+        let tree = |powers: &[f32]| TreeChoice::new(lights, powers, choice.infinite_fraction, choice.volumes);
         let powers: Vec<f32> = lights.iter().map(|light| light.phi(scene_radius)).collect();
         match choice.kind {
             LightSamplerKind::Uniform => {
@@ -166,11 +167,16 @@ impl LightSampler {
         }
     }
 
-    /// [`Self::sample`] with precomputed probabilities `turns` of the point.
+    /// [`Self::sample`] with precomputed branch probabilities at the point.
     #[inline]
-    pub fn sample_again(&self, ctx: &impl Deref<Target = LightCtx>, u: f32, turns: Turns<'_>) -> Option<SampledLight> {
+    pub fn sample_with(
+        &self,
+        ctx: &impl Deref<Target = LightCtx>,
+        u: f32,
+        branches: Branches<'_>,
+    ) -> Option<SampledLight> {
         match self {
-            LightSampler::Tree(choice) => choice.sample_again(ctx, u, turns),
+            LightSampler::Tree(choice) => choice.sample_with(ctx, u, branches),
             _ => self.sample(ctx, u),
         }
     }
@@ -182,7 +188,7 @@ impl LightSampler {
         out.clear();
         match self {
             LightSampler::Uniform(choice) | LightSampler::Power(choice) => choice.runs(positions, out),
-            LightSampler::Tree(choice) => choice.runs(ctx, positions, 0, (0.0, 1.0), out),
+            LightSampler::Tree(choice) => choice.runs(ctx, RunPositions::all(positions), out),
             LightSampler::Photons(choice) => choice.runs(ctx, positions, out),
         }
     }

@@ -4,8 +4,10 @@ use super::groups::LightGroups;
 use super::light_sampler::{LightChoice, LightSampler};
 use super::set::LightSet;
 use crate::lights::visibility::visibility_cache::ContributingLights;
-use crate::lights::{LearnedVisibility, LightCtx, LightHit, LightId, LightSample, TreeChoice, VisibilityCache};
-use crate::media::{Glimpse, MediumId};
+use crate::lights::{
+    LeAndPdf, LearnedVisibility, LightCtx, LightHit, LightId, LightSample, TreeChoice, VisibilityCache,
+};
+use crate::media::{EmissionLookup, MediumId};
 use lumiris_numbers::math::{Rgb, Vec3};
 use std::ops::Deref;
 use std::sync::Arc;
@@ -72,7 +74,7 @@ impl LightSampling {
         let LightSet { lights, scene_radius, .. } = &*self.set;
         let cache = self.visibility_cache.as_ref().filter(|cache| !cache.is_empty());
         self.learned = cache.map(|cache| {
-            let choice = if self.choice.glows {
+            let choice = if self.choice.volumes {
                 TreeChoice::of_lights(lights, *scene_radius, self.choice.infinite_fraction)
             } else {
                 self.tree_choice()
@@ -112,9 +114,9 @@ impl LightSampling {
     /// The contributing lights at a point; empty without a visibility cache.
     #[inline]
     pub fn contributing_lights(&self, ctx: &LightCtx) -> ContributingLights<'_> {
-        self.visibility_cache.as_ref().map_or_else(ContributingLights::default, |visibility_cache| {
-            visibility_cache.lookup_with_sums(ctx.p, ctx.n)
-        })
+        self.visibility_cache
+            .as_ref()
+            .map_or_else(ContributingLights::default, |visibility_cache| visibility_cache.lookup(ctx.p, ctx.n))
     }
 
     /// Chooses a light by `u_choice` and samples a direction to it by `u`. `pdf` of the sample includes the probability
@@ -125,16 +127,16 @@ impl LightSampling {
     }
 
     /// True if light sampling includes emitting media.
-    pub fn find_glows(&self) -> bool {
-        self.choice.glows && self.set.has_glows()
+    pub fn samples_volumes(&self) -> bool {
+        self.choice.volumes && self.set.has_volume_lights()
     }
 
     /// Density per steradian, at `ctx`, of sampling a point of emission in a medium by light sampling; `p` is the point
     /// in world space.
-    pub fn pdf_glow(&self, ctx: &LightCtx, medium: MediumId, (glimpse, p): (&Glimpse, Vec3)) -> f32 {
-        let Some((light, glow)) = self.set.glow_at(medium, glimpse.unit) else { return 0.0 };
+    pub fn pdf_volume(&self, ctx: &LightCtx, medium: MediumId, lookup: &EmissionLookup, p: Vec3) -> f32 {
+        let Some((light, volume)) = self.set.volume_light_at(medium, lookup.unit) else { return 0.0 };
         let pmf = self.sampler.pmf(ctx, light);
-        if pmf > 0.0 { pmf * glow.pdf(ctx, (glimpse.unit, p), glimpse.rate) } else { 0.0 }
+        if pmf > 0.0 { pmf * volume.pdf(ctx, lookup.unit, p, lookup.rate) } else { 0.0 }
     }
 
     /// Samples a direction to a light of one group, whose probability is `group_pmf`; otherwise as
@@ -143,11 +145,12 @@ impl LightSampling {
     pub fn sample_group(
         &self,
         ctx: &LightCtx,
-        group: (usize, f32),
+        group: usize,
+        group_pmf: f32,
         u_choice: f32,
         u: [f32; 2],
     ) -> Option<(LightId, LightSample)> {
-        self.set.sample_choice(ctx, self.groups.sample(&self.sampler, ctx, group, u_choice)?, u)
+        self.set.sample_choice(ctx, self.groups.sample(&self.sampler, ctx, group, group_pmf, u_choice)?, u)
     }
 
     /// Density per steradian with which [`sample`](Self::sample) chooses `light` and the direction `wi`, which hits it
@@ -161,7 +164,7 @@ impl LightSampling {
     /// Radiance that all infinite lights send from the direction `wi`, and the density per steradian of
     /// [`sample`](Self::sample) to choose any of them and that direction.
     #[inline]
-    pub fn infinite_in_direction(&self, ctx: &LightCtx, wi: Vec3) -> (Rgb, f32) {
+    pub fn infinite_in_direction(&self, ctx: &LightCtx, wi: Vec3) -> LeAndPdf {
         self.infinite_in_direction_by(ctx, wi, |ctx, light| self.sampler.pmf(ctx, light))
     }
 
@@ -172,11 +175,11 @@ impl LightSampling {
         ctx: &LightCtx,
         wi: Vec3,
         pmf: impl Fn(&LightCtx, LightId) -> f32,
-    ) -> (Rgb, f32) {
-        self.set.infinite.iter().fold((Rgb::BLACK, 0.0), |(sum, density), &i| {
-            let (le, pdf) = self.set.lights[i as usize].le_and_pdf(ctx.p, wi);
+    ) -> LeAndPdf {
+        self.set.infinite.iter().fold(LeAndPdf::ZERO, |sum, &i| {
+            let LeAndPdf { le, pdf } = self.set.lights[i as usize].le_and_pdf(ctx.p, wi);
             let pdf = if pdf > 0.0 { pdf * pmf(ctx, i) } else { 0.0 };
-            (sum + le, density + pdf)
+            LeAndPdf { le: sum.le + le, pdf: sum.pdf + pdf }
         })
     }
 
@@ -207,7 +210,7 @@ impl LightSampling {
                 n,
                 |i| ctx(i).p,
                 &wi,
-                |i, le, pdf| {
+                |i, LeAndPdf { le, pdf }| {
                     let pdf = if pdf > 0.0 { pdf * pmf(i, &ctx(i), light) } else { 0.0 };
                     out(i, le, pdf);
                 },
@@ -216,7 +219,8 @@ impl LightSampling {
             (0..n).for_each(|i| out(i, Rgb::BLACK, 0.0));
         } else {
             for i in 0..n {
-                let (le, pdf) = self.infinite_in_direction_by(&ctx(i), wi(i), |ctx, light| pmf(i, ctx, light));
+                let LeAndPdf { le, pdf } =
+                    self.infinite_in_direction_by(&ctx(i), wi(i), |ctx, light| pmf(i, ctx, light));
                 out(i, le, pdf);
             }
         }
@@ -227,8 +231,8 @@ impl LightSampling {
 mod tests {
     use super::*;
     use crate::geometry::{Shape, TriangleMesh};
+    use crate::lights::{DistantLight, LightSamplerKind, LightSetBuilder, PointLight, PrimaryPhoton, SurfacePoint};
     use crate::lights::{Emission, EnvironmentFilter, EnvironmentMap, EnvironmentMapping, Light};
-    use crate::lights::{LightSamplerKind, LightSetBuilder};
     use crate::media::{Field, Heterogeneous, Medium, MediumSet, RgbGrid, Samples};
     use lumiris_numbers::math::{Affine3A, Bounds3, DAffine3};
     use lumiris_test_support::random::{RngExt, pcg32};
@@ -236,20 +240,22 @@ mod tests {
     use std::sync::Arc;
 
     const CHOICES: [LightChoice; 6] = [
-        LightChoice { kind: LightSamplerKind::Uniform, infinite_fraction: None, glows: false },
-        LightChoice { kind: LightSamplerKind::Power, infinite_fraction: None, glows: false },
-        LightChoice { kind: LightSamplerKind::Tree, infinite_fraction: None, glows: false },
-        LightChoice { kind: LightSamplerKind::Tree, infinite_fraction: Some(0.125), glows: false },
-        LightChoice { kind: LightSamplerKind::Photons, infinite_fraction: None, glows: false },
-        LightChoice { kind: LightSamplerKind::Photons, infinite_fraction: Some(0.9), glows: false },
+        LightChoice { kind: LightSamplerKind::Uniform, infinite_fraction: None, volumes: false },
+        LightChoice { kind: LightSamplerKind::Power, infinite_fraction: None, volumes: false },
+        LightChoice { kind: LightSamplerKind::Tree, infinite_fraction: None, volumes: false },
+        LightChoice { kind: LightSamplerKind::Tree, infinite_fraction: Some(0.125), volumes: false },
+        LightChoice { kind: LightSamplerKind::Photons, infinite_fraction: None, volumes: false },
+        LightChoice { kind: LightSamplerKind::Photons, infinite_fraction: Some(0.9), volumes: false },
     ];
 
     /// A set with photons of some lights around (0.4, 0.3, 0); lights with greater ids have more photons.
     fn with_cache(builder: LightSetBuilder, kind: LightChoice, seen: &[LightId]) -> LightSampling {
         let mut set = sampling(builder, kind, &bounds());
         let at = Vec3::new(0.4, 0.3, 0.0);
-        let photons = seen.iter().flat_map(|&id| (0..=id % 7).map(move |_| (at, Vec3::Z, id)));
-        set.set_visibility_cache(Some(VisibilityCache::new(photons, 0.5)));
+        let at = SurfacePoint { p: at, n: Vec3::Z };
+        let photon = |light| PrimaryPhoton { at, light };
+        let photons: Vec<_> = seen.iter().flat_map(|&light| vec![photon(light); light as usize % 7 + 1]).collect();
+        set.set_visibility_cache(Some(VisibilityCache::new(&photons, 0.5)));
         set
     }
 
@@ -264,11 +270,11 @@ mod tests {
 
     fn builder() -> LightSetBuilder {
         let mut b = LightSetBuilder::default();
-        b.add(Light::Point { p: Vec3::new(2.0, 2.0, 2.0), intensity: Rgb::splat(3.0) });
+        b.add(Light::Point(PointLight { p: Vec3::new(2.0, 2.0, 2.0), intensity: Rgb::splat(3.0) }));
         b.add_area(7, &quad(3.0), &Emission::constant(Rgb::splat(5.0)));
         b.add_area(3, &quad(2.0), &Emission::constant(Rgb::BLACK));
         b.add(Light::InfiniteConstant { l: Rgb::splat(0.1) });
-        b.add(Light::Distant { wi_world: Vec3::Z, l: Rgb::WHITE });
+        b.add(Light::Distant(DistantLight { wi: Vec3::Z, l: Rgb::WHITE }));
         let texels = (0..16).map(|i| Rgb::splat(i as f32 * 0.01)).collect();
         let map = EnvironmentMap::new(texels, [4, 4], EnvironmentMapping::EqualArea, EnvironmentFilter::Bilinear);
         b.add(Light::infinite_image(Arc::new(map.unwrap()), &Affine3A::IDENTITY, 2.0));
@@ -312,7 +318,7 @@ mod tests {
         let mut builder = LightSetBuilder::default();
         builder.add_area(7, &quad(3.0), &Emission::constant(Rgb::splat(5.0)));
         builder.add(Light::InfiniteConstant { l: Rgb::splat(0.1) });
-        builder.add(Light::Distant { wi_world: Vec3::Z, l: Rgb::WHITE });
+        builder.add(Light::Distant(DistantLight { wi: Vec3::Z, l: Rgb::WHITE }));
         for (infinite_fraction, expected) in [(None, 2.0 / 3.0), (Some(0.25), 0.25), (Some(0.9375), 0.9375)] {
             let choice = LightChoice { infinite_fraction, ..LightSamplerKind::Tree.into() };
             let set = sampling(builder.clone(), choice, &bounds());
@@ -331,7 +337,7 @@ mod tests {
         let mut builder = builder();
         for i in 0..80 {
             let p = Vec3::new(i as f32 * 0.15 - 6.0, 1.5, 2.0 + (i % 3) as f32);
-            builder.add(Light::Point { p, intensity: Rgb::splat(0.1 + i as f32) });
+            builder.add(Light::Point(PointLight { p, intensity: Rgb::splat(0.1 + i as f32) }));
         }
         // Few lights are compared at the point, many by their photon counts
         let (few, many): (Vec<LightId>, Vec<LightId>) = ((0..80).step_by(7).collect(), (2..80).collect());
@@ -346,9 +352,9 @@ mod tests {
                 set.sampler.runs(&ctx, &positions, &mut runs);
                 let (mut place, mut parts) = (0, std::collections::BTreeMap::new());
                 for run in &runs {
-                    assert_eq!(run.places[0], place, "{kind:?}: runs follow each other");
-                    place = run.places[1];
-                    let number = run.places[1] - run.places[0];
+                    assert_eq!(run.range[0], place, "{kind:?}: runs follow each other");
+                    place = run.range[1];
+                    let number = run.range[1] - run.range[0];
                     let pmf = set.sampler.pmf(&ctx, run.light);
                     assert!((run.pmf - pmf).abs() <= 1e-5 * pmf, "{kind:?} {run:?} {pmf}");
                     let part = run.interval[1] - run.interval[0];
@@ -359,8 +365,8 @@ mod tests {
                     // The remapped positions cover [0, 1) uniformly
                     let of = |place: u32| f64::from(run.within(positions[place as usize])) / 4_294_967_296.0;
                     let step = 1.0 / expected;
-                    for place in run.places[0]..run.places[1] {
-                        let expected = (f64::from(place - run.places[0]) + 0.5) * step;
+                    for place in run.range[0]..run.range[1] {
+                        let expected = (f64::from(place - run.range[0]) + 0.5) * step;
                         assert!((of(place) - expected).abs() <= 1.01 * step, "{kind:?} {run:?} {place}");
                     }
                 }
@@ -421,7 +427,7 @@ mod tests {
         assert_eq!(set.le(p, w), set.lights[3].le(p, w) + set.lights[5].le(p, w));
         let each: f32 = [3, 5].iter().map(|&i| set.pdf(&ctx, i, w, &LightHit::INFINITE)).sum();
         assert!(each > 0.0);
-        assert_eq!(set.infinite_in_direction(&ctx, w), (set.le(p, w), each));
+        assert_eq!(set.infinite_in_direction(&ctx, w), LeAndPdf { le: set.le(p, w), pdf: each });
     }
 
     #[test]
@@ -440,17 +446,17 @@ mod tests {
         builder.add_media(&media);
 
         // A set with a visibility cache
-        let choice = |glows| LightChoice { glows, ..LightSamplerKind::Tree.into() };
+        let choice = |volumes| LightChoice { volumes, ..LightSamplerKind::Tree.into() };
         let mut set = with_cache(builder, choice(true), &[0, 2]);
-        let is_glow = |light: &LightId| set.medium_of(*light).is_some();
-        let glow = (0..set.lights.len() as LightId).find(is_glow).unwrap();
+        let is_volume = |light: &LightId| set.medium_of(*light).is_some();
+        let volume = (0..set.lights.len() as LightId).find(is_volume).unwrap();
         let ctx = LightCtx::at(Vec3::new(0.4, 0.3, 0.0));
 
         // The cache has no say about the medium, whether or not it is sampled
-        for glows in [true, false, true] {
-            set.choose_by(choice(glows), 1);
-            assert_eq!((set.find_glows(), set.sampler.pmf(&ctx, glow) > 0.0), (glows, glows));
-            assert_eq!(set.learned_visibility().unwrap().importance(&ctx, glow), 0.0);
+        for volumes in [true, false, true] {
+            set.choose_by(choice(volumes), 1);
+            assert_eq!((set.samples_volumes(), set.sampler.pmf(&ctx, volume) > 0.0), (volumes, volumes));
+            assert_eq!(set.learned_visibility().unwrap().importance(&ctx, volume), 0.0);
         }
     }
 

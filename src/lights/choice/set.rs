@@ -2,9 +2,10 @@
 
 use super::light_sampler::{LightChoice, LightSampler};
 use crate::geometry::{GeometryId, Shape};
-use crate::lights::kinds::glow::Parts;
+use crate::lights::kinds::volume_light::Parts;
 use crate::lights::{
-    AreaShape, Emission, Glow, Light, LightCtx, LightId, LightLayers, LightSample, SampledLight, area_lights_of,
+    AreaShape, Emission, Light, LightCtx, LightId, LightLayers, LightSample, PointLight, SampledLight, Sphere,
+    VolumeLight, area_lights_of,
 };
 use crate::media::{Medium, MediumId, MediumSet};
 use lumiris_numbers::math::{Bounds3, Rgb, Vec3};
@@ -27,15 +28,15 @@ pub struct LightSetBuilder {
     group: Option<Arc<str>>,
     groups: Vec<Option<Arc<str>>>,
     /// Emitting media, by medium.
-    glowing: Vec<Option<GlowingMedium>>,
+    emitting_media: Vec<Option<EmittingMedium>>,
 }
 
 /// Minimum expected number of emission lookups along a camera ray through a medium of average width.
-const GLIMPSES: f32 = 8.0;
+const MIN_LOOKUPS: f32 = 8.0;
 
 /// The emitting parts of a medium.
 #[derive(Clone, Debug)]
-struct GlowingMedium {
+struct EmittingMedium {
     parts: Parts,
     /// The light of each part; `None` if it is dark.
     lights: Vec<Option<LightId>>,
@@ -69,20 +70,20 @@ impl LightSetBuilder {
     /// Adds the emitting parts of the media.
     pub fn add_media(&mut self, media: &MediumSet) {
         for (id, medium) in (0..).zip(&media.media) {
-            self.glowing.push(None);
+            self.emitting_media.push(None);
             let Medium::Heterogeneous(medium) = medium else { continue };
             if !medium.is_emissive() {
                 continue;
             }
             let parts = Parts::of(medium);
-            let glows = parts.glows(medium, id);
-            let bounds = glows.iter().flatten().fold(Bounds3::EMPTY, |b, glow| b.union(glow.bounds().bounds));
+            let lights = parts.lights(medium, id);
+            let bounds = lights.iter().flatten().fold(Bounds3::EMPTY, |b, light| b.union(light.bounds().bounds));
             let size = bounds.diagonal();
-            let rate = GLIMPSES / size.element_product().cbrt();
-            let glows = glows.into_iter();
-            let lights = glows.map(|glow| glow.map(|glow| self.add(Light::Glow(Box::new(glow))))).collect();
+            let rate = MIN_LOOKUPS / size.element_product().cbrt();
+            let added = |light: Option<VolumeLight>| light.map(|light| self.add(Light::Volume(Box::new(light))));
+            let lights = lights.into_iter().map(added).collect();
             let rate = if rate.is_finite() { rate } else { 0.0 };
-            *self.glowing.last_mut().expect("was added above") = Some(GlowingMedium { parts, lights, rate });
+            *self.emitting_media.last_mut().expect("was added above") = Some(EmittingMedium { parts, lights, rate });
         }
     }
 
@@ -104,7 +105,7 @@ impl LightSetBuilder {
             lit,
             layers: LightLayers::new(&self.groups),
             emitting: self.emitting,
-            glowing: self.glowing,
+            emitting_media: self.emitting_media,
             scene_centre: if center.is_finite() { center } else { Vec3::ZERO },
             scene_radius,
         }
@@ -125,7 +126,7 @@ pub struct LightSet {
     /// Sorted by geometry.
     emitting: Vec<EmittingGeometry>,
     /// Emitting media, by medium.
-    glowing: Vec<Option<GlowingMedium>>,
+    emitting_media: Vec<Option<EmittingMedium>>,
     /// Centre of the scene's bounding sphere; the origin for an empty scene.
     pub scene_centre: Vec3,
     /// Radius of the scene's bounding sphere; 1 for a scene without extent.
@@ -133,6 +134,11 @@ pub struct LightSet {
 }
 
 impl LightSet {
+    /// The bounding sphere of the scene.
+    pub fn scene_sphere(&self) -> Sphere {
+        Sphere { center: self.scene_centre, radius: self.scene_radius }
+    }
+
     /// False only if no emitter can occlude another light or itself from any point, as for lamps in one ceiling.
     pub fn may_hide_each_other(&self) -> bool {
         if self.emitting.is_empty() {
@@ -160,7 +166,7 @@ impl LightSet {
     pub fn delta_sampler(&self, choice: LightChoice) -> Option<LightSampler> {
         let is_lit = |light: &&Light| light.is_delta() && light.phi(self.scene_radius) > 0.0;
         self.lights.iter().find(is_lit)?;
-        let black = Light::Point { p: Vec3::ZERO, intensity: Rgb::BLACK };
+        let black = Light::Point(PointLight { p: Vec3::ZERO, intensity: Rgb::BLACK });
         let delta: Vec<Light> =
             self.lights.iter().map(|l| if l.is_delta() { l.clone() } else { black.clone() }).collect();
         Some(LightSampler::new(choice, &delta, self.scene_radius))
@@ -198,30 +204,30 @@ impl LightSet {
     }
 
     /// True if any emitting medium is a light.
-    pub fn has_glows(&self) -> bool {
-        self.glowing.iter().flatten().any(|glowing| glowing.lights.iter().any(Option::is_some))
+    pub fn has_volume_lights(&self) -> bool {
+        self.emitting_media.iter().flatten().any(|medium| medium.lights.iter().any(Option::is_some))
     }
 
     /// The light of the part of a medium that contains a point of its unit cube; `None` if the part is dark.
     #[inline]
-    pub fn glow_at(&self, medium: MediumId, unit: Vec3) -> Option<(LightId, &Glow)> {
-        let glowing = self.glowing.get(medium as usize)?.as_ref()?;
-        let light = glowing.lights[glowing.parts.at(unit)]?;
-        let Light::Glow(glow) = &self.lights[light as usize] else { return None };
-        Some((light, glow))
+    pub fn volume_light_at(&self, medium: MediumId, unit: Vec3) -> Option<(LightId, &VolumeLight)> {
+        let medium = self.emitting_media.get(medium as usize)?.as_ref()?;
+        let light = medium.lights[medium.parts.at(unit)]?;
+        let Light::Volume(volume_light) = &self.lights[light as usize] else { return None };
+        Some((light, volume_light))
     }
 
     /// Rate of emission lookups along camera rays (1/m), by the size of the emitting region; 0 if the medium does not
     /// emit.
     #[inline]
-    pub fn glimpse_rate(&self, medium: MediumId) -> f32 {
-        self.glowing.get(medium as usize).and_then(Option::as_ref).map_or(0.0, |glowing| glowing.rate)
+    pub fn emission_lookup_rate(&self, medium: MediumId) -> f32 {
+        self.emitting_media.get(medium as usize).and_then(Option::as_ref).map_or(0.0, |medium| medium.rate)
     }
 
     /// The medium of a light; `None` for other lights.
     #[inline]
     pub fn medium_of(&self, light: LightId) -> Option<MediumId> {
-        if let Some(Light::Glow(glow)) = self.lights.get(light as usize) { Some(glow.id) } else { None }
+        if let Some(Light::Volume(volume)) = self.lights.get(light as usize) { Some(volume.id) } else { None }
     }
 
     /// Samples a direction to the light of `choice`. `pdf` of the sample includes the probability of the choice: it is

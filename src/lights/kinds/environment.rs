@@ -8,7 +8,7 @@
 //! lookup is. The density per steradian is pdf(u, v)/4π for equal-area images, and pdf(u, v)/(2π² sin θ) for
 //! latitude-longitude images.
 
-use crate::lights::LightSample;
+use crate::lights::{LeAndPdf, LightSample};
 use lumiris_lanes::environment::{Environment, equal_area_squares};
 use lumiris_lanes::level;
 use lumiris_numbers::math::sphere_map::{
@@ -51,6 +51,13 @@ pub struct EnvironmentSample {
     pub le: Rgb,
     /// Density per steradian.
     pub pdf: f32,
+}
+
+/// The direction of a point of the unit square.
+struct MappedDirection {
+    w: Vec3,
+    /// Density per steradian if the point is uniform.
+    pdf: f32,
 }
 
 /// An image of the radiance that arrives from all directions.
@@ -167,8 +174,8 @@ impl EnvironmentMap {
     pub fn sample(&self, u: [f32; 2]) -> Option<EnvironmentSample> {
         let ([x, y], p) = self.distribution.sample(u)?;
         let texel = &self.texels[self.texel_index(x as isize, y as isize)];
-        let (w, density) = self.to_sphere(p);
-        let pdf = texel[3] * density;
+        let MappedDirection { w, pdf } = self.to_sphere(p);
+        let pdf = texel[3] * pdf;
         (pdf > 0.0 && pdf.is_finite()).then(|| EnvironmentSample { w: w.normalize(), le: self.lookup(p), pdf })
     }
 
@@ -192,16 +199,16 @@ impl EnvironmentMap {
 
     /// [`le`](Self::le) and [`pdf`](Self::pdf).
     #[inline]
-    pub fn le_and_pdf(&self, w: Vec3) -> (Rgb, f32) {
+    pub fn le_and_pdf(&self, w: Vec3) -> LeAndPdf {
         let p = self.to_square(w);
-        (self.lookup(p), self.pdf_at(w, p))
+        LeAndPdf { le: self.lookup(p), pdf: self.pdf_at(w, p) }
     }
 
     /// [`le_and_pdf`](Self::le_and_pdf) of `n` directions. The lookups are in a loop of their own, so that the cache
     /// misses of distant texels overlap.
-    pub fn le_and_pdf_many(&self, n: usize, w: impl Fn(usize) -> Vec3, mut out: impl FnMut(usize, Rgb, f32)) {
-        let (mut directions, mut places) = ([[0.0; CHUNK]; 3], [[0.0; CHUNK]; 2]);
-        let mut found = [(Rgb::BLACK, 0.0); CHUNK];
+    pub fn le_and_pdf_many(&self, n: usize, w: impl Fn(usize) -> Vec3, mut out: impl FnMut(usize, LeAndPdf)) {
+        let (mut directions, mut points) = ([[0.0; CHUNK]; 3], [[0.0; CHUNK]; 2]);
+        let mut values = [LeAndPdf::ZERO; CHUNK];
         for start in (0..n).step_by(CHUNK) {
             let count = CHUNK.min(n - start);
             for i in 0..count {
@@ -213,20 +220,20 @@ impl EnvironmentMap {
             match self.mapping {
                 EnvironmentMapping::EqualArea => {
                     let w = directions.each_ref().map(|axis| &axis[..]);
-                    equal_area_squares(level(), w, places.each_mut().map(|axis| &mut axis[..]));
+                    equal_area_squares(level(), w, points.each_mut().map(|axis| &mut axis[..]));
                 }
                 EnvironmentMapping::LatLong => {
-                    (0..count).for_each(|i| (places[0][i], places[1][i]) = self.to_square(w(i)).into());
+                    (0..count).for_each(|i| (points[0][i], points[1][i]) = self.to_square(w(i)).into());
                 }
             }
 
             // Lookups
-            for (i, found) in found[..count].iter_mut().enumerate() {
-                let p = Vec2::new(places[0][i], places[1][i]);
-                *found = (self.lookup(p), self.pdf_at(w(i), p));
+            for (i, value) in values[..count].iter_mut().enumerate() {
+                let p = Vec2::new(points[0][i], points[1][i]);
+                *value = LeAndPdf { le: self.lookup(p), pdf: self.pdf_at(w(i), p) };
             }
-            for (i, (le, pdf)) in found[..count].iter().enumerate() {
-                out(start + i, *le, *pdf);
+            for (i, value) in values[..count].iter().enumerate() {
+                out(start + i, *value);
             }
         }
     }
@@ -287,8 +294,8 @@ impl EnvironmentMap {
         let row = |y: usize| -> f64 {
             let at = |x: usize| {
                 let p = Vec2::new((x as f32 + 0.5) / width as f32, (y as f32 + 0.5) / height as f32);
-                let (w, density) = self.to_sphere(p);
-                f64::from(self.lookup(p).luminance() * weight(w) / density)
+                let MappedDirection { w, pdf } = self.to_sphere(p);
+                f64::from(self.lookup(p).luminance() * weight(w) / pdf)
             };
             (0..width).map(at).sum()
         };
@@ -305,14 +312,16 @@ impl EnvironmentMap {
         }
     }
 
-    /// The direction of a point of the square, and its density per steradian if the point is uniform.
+    /// The direction of a point of the square.
     #[inline]
-    fn to_sphere(&self, p: Vec2) -> (Vec3, f32) {
+    fn to_sphere(&self, p: Vec2) -> MappedDirection {
         match self.mapping {
-            EnvironmentMapping::EqualArea => (equal_area_square_to_sphere(p), pdf_equal_area_square_to_sphere()),
+            EnvironmentMapping::EqualArea => {
+                MappedDirection { w: equal_area_square_to_sphere(p), pdf: pdf_equal_area_square_to_sphere() }
+            }
             EnvironmentMapping::LatLong => {
                 let w = lat_long_to_sphere(p);
-                (w, pdf_lat_long_to_sphere(w))
+                MappedDirection { w, pdf: pdf_lat_long_to_sphere(w) }
             }
         }
     }

@@ -54,7 +54,8 @@ impl ImageLight {
         p: Vec3,
         world_from_light: Mat3,
         mapping: ImageMapping,
-        (texels, size): (Vec<Rgb>, [usize; 2]),
+        texels: Vec<Rgb>,
+        size: [usize; 2],
     ) -> Result<Self, String> {
         let [width, height] = size;
         if width == 0 || height == 0 || texels.len() != width * height {
@@ -137,25 +138,28 @@ impl ImageLight {
 
     /// Bounds for the light tree: a cone about the corners of a projector, or all directions, with the mean intensity.
     pub(in crate::lights) fn bounds(&self) -> LightBounds {
-        let (axis, cos_theta_o, steradians) = match self.mapping {
-            ImageMapping::Sphere => (Vec3::Z, -1.0, 4.0 * PI),
+        let at = Bounds3 { min: self.p, max: self.p };
+        match self.mapping {
+            ImageMapping::Sphere => LightBounds {
+                bounds: at,
+                cos_theta_o: -1.0,
+                cos_theta_e: 0.0,
+                intensity: self.phi / (4.0 * PI),
+                ..LightBounds::EMPTY
+            },
             ImageMapping::Plane { half: [hx, hy] } => {
                 // The cone touches the corners of the image
-                let cos = 1.0 / (1.0 + hx * hx + hy * hy).sqrt();
-                (
-                    (self.world_from_light * Vec3::Z).normalize(),
-                    cos - MARGIN,
-                    4.0 * corner([hx.into(), hy.into()]) as f32,
-                )
+                let cos_theta_o = 1.0 / (1.0 + hx * hx + hy * hy).sqrt() - MARGIN;
+                let steradians = 4.0 * corner([hx.into(), hy.into()]) as f32;
+                LightBounds {
+                    bounds: at,
+                    axis: (self.world_from_light * Vec3::Z).normalize(),
+                    cos_theta_o,
+                    cos_theta_e: if cos_theta_o < 0.0 { 0.0 } else { 1.0 },
+                    intensity: self.phi / steradians,
+                    ..LightBounds::EMPTY
+                }
             }
-        };
-        LightBounds {
-            bounds: Bounds3 { min: self.p, max: self.p },
-            axis,
-            cos_theta_o,
-            cos_theta_e: if cos_theta_o < 0.0 { 0.0 } else { 1.0 },
-            two_sided: false,
-            intensity: self.phi / steradians,
         }
     }
 }
@@ -191,7 +195,7 @@ mod tests {
     fn projector(p: Vec3, world_from_light: Mat3) -> ImageLight {
         let texels = (0..6).map(|i| Rgb::splat(1.0 + i as f32)).collect();
         let mapping = ImageMapping::Plane { half: [0.6, 0.4] };
-        ImageLight::new(p, world_from_light, mapping, (texels, [3, 2])).unwrap()
+        ImageLight::new(p, world_from_light, mapping, texels, [3, 2]).unwrap()
     }
 
     #[test]
@@ -215,8 +219,7 @@ mod tests {
         assert!((sum - 4.0 * corner([0.6_f32.into(), 0.4_f32.into()])).abs() < 1e-12);
         // A cube has six faces
         assert!((6.0 * 4.0 * corner([1.0, 1.0]) - 4.0 * std::f64::consts::PI).abs() < 1e-12);
-        let light =
-            ImageLight::new(Vec3::ZERO, Mat3::IDENTITY, ImageMapping::Sphere, (vec![Rgb::splat(2.0); 4], [2, 2]));
+        let light = ImageLight::new(Vec3::ZERO, Mat3::IDENTITY, ImageMapping::Sphere, vec![Rgb::splat(2.0); 4], [2, 2]);
         assert!((light.unwrap().phi() - 8.0 * PI).abs() < 1e-4);
     }
 
@@ -229,6 +232,6 @@ mod tests {
             let w = (light.world_from_light * Vec3::new(x, y, 1.0)).normalize();
             assert!(light.intensity(w).is_black() || w.dot(bounds.axis) > bounds.cos_theta_o);
         }
-        assert!(ImageLight::new(Vec3::ONE, Mat3::IDENTITY, ImageMapping::Sphere, (Vec::new(), [0, 0])).is_err());
+        assert!(ImageLight::new(Vec3::ONE, Mat3::IDENTITY, ImageMapping::Sphere, Vec::new(), [0, 0]).is_err());
     }
 }

@@ -14,7 +14,7 @@
 //! expectation does not depend on it.
 
 use super::environment::{EnvironmentMap, infinite_sample};
-use crate::lights::{EmissionSample, LightCtx, LightSample};
+use crate::lights::{EmissionSample, LeAndPdf, LightCtx, LightSample, Sphere};
 use lumiris_numbers::math::{Bounds3, Mat3, PiecewiseConstant2D, Rgb, Vec3};
 use rayon::prelude::*;
 use std::sync::Arc;
@@ -60,6 +60,13 @@ pub struct Portal {
     world_from_portal: Mat3,
     /// Lengths of the edges (m).
     extent: [f32; 2],
+}
+
+/// A row or column of the table, and the relative position within it.
+#[derive(Clone, Copy)]
+struct CellPosition {
+    index: usize,
+    within: f64,
 }
 
 /// The directions to the sky that are visible from a point, as corners in (s, t).
@@ -121,20 +128,33 @@ fn coordinate(x: f64) -> f64 {
     0.5 + 0.5 * h / (1.0 + (2.0 / (1.0 + r)).sqrt())
 }
 
-/// x and dx/ds at the coordinate s.
-#[inline]
-fn tangent(s: f64) -> (f64, f64) {
-    let a = 2.0 * s - 1.0;
-    let (a2, rest) = (a * a, (1.0 - a) * (1.0 + a));
-    (4.0 * a * (1.0 + a2) / (rest * rest), 8.0 * (1.0 + a2 * (6.0 + a2)) / (rest * rest * rest))
+/// The tangent x of a coordinate s, and its derivative dx/ds.
+struct Tangent {
+    x: f64,
+    dx: f64,
 }
 
-/// The direction in the frame of the portal, and J.
 #[inline]
-fn direction([s, t]: [f64; 2]) -> (Vec3, f64) {
-    let ((x, dx), (y, dy)) = (tangent(s), tangent(t));
+fn tangent(s: f64) -> Tangent {
+    let a = 2.0 * s - 1.0;
+    let (a2, rest) = (a * a, (1.0 - a) * (1.0 + a));
+    Tangent { x: 4.0 * a * (1.0 + a2) / (rest * rest), dx: 8.0 * (1.0 + a2 * (6.0 + a2)) / (rest * rest * rest) }
+}
+
+/// A direction in the frame of the portal, and J.
+#[derive(Clone, Copy)]
+struct PortalDirection {
+    w: Vec3,
+    jacobian: f64,
+}
+
+/// The direction with the coordinates (s, t).
+#[inline]
+fn direction([s, t]: [f64; 2]) -> PortalDirection {
+    let (Tangent { x, dx }, Tangent { x: y, dx: dy }) = (tangent(s), tangent(t));
     let z = 1.0 / (1.0 + x * x + y * y).sqrt();
-    (Vec3::new((x * z) as f32, (y * z) as f32, z as f32), dx * dy * z * z * z)
+    let w = Vec3::new((x * z) as f32, (y * z) as f32, z as f32);
+    PortalDirection { w, jacobian: dx * dy * z * z * z }
 }
 
 impl PortalLight {
@@ -174,19 +194,19 @@ impl PortalLight {
 
     /// [`le`](Self::le), and the density of [`sample_li`](Self::sample_li) per steradian.
     #[inline]
-    pub fn le_and_pdf(&self, p: Vec3, w: Vec3) -> (Rgb, f32) {
+    pub fn le_and_pdf(&self, p: Vec3, w: Vec3) -> LeAndPdf {
         let Some(window) = self.portal.window(p).filter(|_| self.portal.is_passed(p, w)) else {
-            return (Rgb::BLACK, 0.0);
+            return LeAndPdf::ZERO;
         };
         let v = (self.portal.world_from_portal.transpose() * w).as_dvec3();
         let pdf = self.pdf([v.x / v.z, v.y / v.z].map(coordinate), self.integral(&window));
-        (self.radiance(w), pdf.unwrap_or(0.0))
+        LeAndPdf { le: self.radiance(w), pdf: pdf.unwrap_or(0.0) }
     }
 
     /// Density per steradian at a point of a window with this integral; `None` unless it is positive and finite.
     #[inline]
     fn pdf(&self, st: [f64; 2], integral: f64) -> Option<f32> {
-        let pdf = (self.density(st) / integral / direction(st).1) as f32;
+        let pdf = (self.density(st) / integral / direction(st).jacobian) as f32;
         (pdf > 0.0 && pdf.is_finite()).then_some(pdf)
     }
 
@@ -196,7 +216,7 @@ impl PortalLight {
         let window = self.portal.window(ctx.p)?;
         let integral = self.integral(&window);
         let st = self.sample_window(&window, integral, u.map(f64::from))?;
-        let wi = (self.portal.world_from_portal * direction(st).0).normalize();
+        let wi = (self.portal.world_from_portal * direction(st).w).normalize();
         Some(infinite_sample(wi, self.radiance(wi), self.pdf(st, integral)?))
     }
 
@@ -204,51 +224,51 @@ impl PortalLight {
     /// uniform over it. The origin is moved out of the scene, so that objects in front of the portal cast shadows.
     pub(in crate::lights) fn sample_le(
         &self,
-        (centre, radius): (Vec3, f32),
+        scene: Sphere,
         u_position: [f32; 2],
         u_direction: [f32; 2],
     ) -> Option<EmissionSample> {
         let sample = self.emitted.sample(u_direction)?;
-        let (w, jacobian) = direction([sample.p.x.into(), sample.p.y.into()]);
+        let PortalDirection { w, jacobian } = direction([sample.p.x.into(), sample.p.y.into()]);
         let Portal { corner, world_from_portal, extent } = self.portal;
         let wi = (world_from_portal * w).normalize();
         let [x, y] = [u_position[0] * extent[0], u_position[1] * extent[1]];
         let p = corner + world_from_portal * Vec3::new(x, y, 0.0);
         let power = self.radiance(wi) * (w.z * extent[0] * extent[1] * jacobian as f32 / sample.pdf);
-        EmissionSample::in_space(p + wi * ((p - centre).length() + radius), -wi, power)
+        EmissionSample::in_space(p + wi * ((p - scene.center).length() + scene.radius), -wi, power)
     }
 
     /// The density of the table at a point, per unit of area in (s, t).
     #[inline]
     fn density(&self, st: [f64; 2]) -> f64 {
         let n = self.cells;
-        let [x, y] = st.map(|x| self.place(x).0);
+        let [x, y] = st.map(|x| self.position(x).index);
         let at = |x: usize, y: usize| self.sums[y * (n + 1) + x];
         ((at(x + 1, y + 1) - at(x, y + 1)) - (at(x + 1, y) - at(x, y))) * (n * n) as f64
     }
 
-    /// The sum at column `x` and at a height of `y` rows.
+    /// The sum at column `x` and at a position among the rows.
     #[inline]
-    fn at_column(&self, x: usize, (row, within): (usize, f64)) -> f64 {
+    fn at_column(&self, x: usize, CellPosition { index: row, within }: CellPosition) -> f64 {
         let lower = self.sums[row * (self.cells + 1) + x];
         let upper = self.sums[(row + 1) * (self.cells + 1) + x];
         lower + (upper - lower) * within
     }
 
-    /// The row or column of a coordinate, and the relative position within it.
+    /// The position of a coordinate among the rows or columns.
     #[inline]
-    fn place(&self, x: f64) -> (usize, f64) {
+    fn position(&self, x: f64) -> CellPosition {
         let x = x * self.cells as f64;
         let index = (x as usize).min(self.cells - 1);
-        (index, x - index as f64)
+        CellPosition { index, within: x - index as f64 }
     }
 
     /// Integral of the table from (0, 0).
     #[inline]
     fn sum(&self, [s, t]: [f64; 2]) -> f64 {
-        let ((column, within), row) = (self.place(s), self.place(t));
-        let [left, right] = [0, 1].map(|i| self.at_column(column + i, row));
-        left + (right - left) * within
+        let (column, row) = (self.position(s), self.position(t));
+        let [left, right] = [0, 1].map(|i| self.at_column(column.index + i, row));
+        left + (right - left) * column.within
     }
 
     #[inline]
@@ -264,19 +284,19 @@ impl PortalLight {
             return None;
         }
         // Choose s
-        let rows = [t0, t1].map(|t| self.place(t));
+        let rows = [t0, t1].map(|t| self.position(t));
         let strip = |x: usize| self.at_column(x, rows[1]) - self.at_column(x, rows[0]);
-        let (first, within) = self.place(s0);
+        let CellPosition { index: first, within } = self.position(s0);
         let begin = strip(first) + (strip(first + 1) - strip(first)) * within;
-        let s = invert(&strip, begin + xi[0] * integral, [first, self.place(s1).0], self.cells).clamp(s0, s1);
+        let s = invert(&strip, begin + xi[0] * integral, [first, self.position(s1).index], self.cells).clamp(s0, s1);
 
         // Choose t in its column
-        let column = self.place(s).0;
+        let column = self.position(s).index;
         let n = self.cells + 1;
         let strip = |y: usize| self.sums[y * n + column + 1] - self.sums[y * n + column];
-        let at = |(row, within): (usize, f64)| strip(row) + (strip(row + 1) - strip(row)) * within;
+        let at = |row: CellPosition| strip(row.index) + (strip(row.index + 1) - strip(row.index)) * row.within;
         let [begin, end] = rows.map(at);
-        let rows = [rows[0].0, rows[1].0];
+        let rows = rows.map(|row| row.index);
         let t = invert(&strip, begin + xi[1] * (end - begin), rows, self.cells).clamp(t0, t1);
         Some([s, t])
     }
@@ -311,15 +331,15 @@ fn cells(map: &EnvironmentMap, light_from_portal: Mat3, n: usize) -> Vec<Cell> {
     let cell = |x: usize, y: usize| {
         let at = |dx: f64, dy: f64| direction([(x as f64 + dx) / n as f64, (y as f64 + dy) / n as f64]);
         // Cells next to a corner have a wide range of azimuths
-        let lookups = |a: (Vec3, f64), b: (Vec3, f64)| {
-            let texels = (a.0 - b.0).length() / map.texel_angle();
+        let lookups = |a: PortalDirection, b: PortalDirection| {
+            let texels = (a.w - b.w).length() / map.texel_angle();
             (LOOKUPS_PER_TEXEL * texels).ceil().clamp(LOOKUPS[0], LOOKUPS[1]) as usize
         };
         let (across, down) = (lookups(at(0.01, 0.5), at(0.99, 0.5)), lookups(at(0.5, 0.01), at(0.5, 0.99)));
         let [mut square, mut sum, mut projected] = [0.0; 3];
         for k in 0..across * down {
             let midpoint = |i: usize, n: usize| (i as f64 + 0.5) / n as f64;
-            let (w, jacobian) = at(midpoint(k % across, across), midpoint(k / across, down));
+            let PortalDirection { w, jacobian } = at(midpoint(k % across, across), midpoint(k / across, down));
             square += jacobian * f64::from(map.le(light_from_portal * w).luminance()).powi(2);
             sum += jacobian;
             projected += jacobian * f64::from(w.z);
@@ -433,7 +453,7 @@ mod tests {
         {
             let w = (at(x, y) - p).normalize();
             assert_eq!(!light.le(p, w).is_black(), is_lit, "{x} {y}");
-            assert_eq!(light.le_and_pdf(p, w).1 > 0.0, is_lit, "{x} {y}");
+            assert_eq!(light.le_and_pdf(p, w).pdf > 0.0, is_lit, "{x} {y}");
             // No light from behind, nor in directions that miss the portal
             let behind = at(0.7, 0.2) + n;
             assert!(light.le(p, -w).is_black() && light.le(behind, (at(x, y) - behind).normalize()).is_black());
@@ -451,11 +471,11 @@ mod tests {
             for p in points(stream) {
                 for _ in 0..2000 {
                     let s = light.sample_li(&LightCtx::at(p), stream.random::<[f32; 2]>()).unwrap();
-                    let pdf = light.le_and_pdf(p, s.wi).1;
+                    let pdf = light.le_and_pdf(p, s.wi).pdf;
                     // Rounding may carry a direction over an edge of a cell, of a texel, or of the portal
                     let is_near = (pdf - s.pdf).abs() <= 2e-3 * s.pdf && light.le(p, s.wi) == s.li;
                     let moved = |e: f32| {
-                        light.le_and_pdf(p, (s.wi + portal().world_from_portal * Vec3::splat(e)).normalize()).1
+                        light.le_and_pdf(p, (s.wi + portal().world_from_portal * Vec3::splat(e)).normalize()).pdf
                     };
                     let is_edge = [-2e-5, 2e-5].into_iter().any(|e| (moved(e) - pdf).abs() > 1e-3 * pdf);
                     assert!(is_near || is_edge, "{p} {} {pdf} {}", s.wi, s.pdf);
@@ -472,7 +492,7 @@ mod tests {
                 let [mut density, mut difference] = [Moments::default(); 2];
                 for _ in 0..200_000 {
                     let w = sample_uniform_sphere(stream.random::<[f32; 2]>());
-                    density.add(f64::from(light.le_and_pdf(p, w).1) * 4.0 * PI);
+                    density.add(f64::from(light.le_and_pdf(p, w).pdf) * 4.0 * PI);
                     let s = light.sample_li(&LightCtx::at(p), stream.random::<[f32; 2]>()).unwrap();
                     difference.add(f64::from(light.le(p, w).g) * 4.0 * PI - f64::from(s.li.g / s.pdf));
                 }

@@ -54,7 +54,7 @@ fn split(items: &mut [Item]) -> usize {
         }
         // Long thin parts are worse: regularise by the aspect ratio.
         let stretch = longest / diagonal[axis];
-        best_cut(items, axis, min, extent).map(|(cost, cut)| (cost * stretch, axis, cut))
+        best_cut(items, axis, min, extent).map(|cut| Cut { cost: cut.cost * stretch, ..cut })
     };
     let cuts = if items.len() > MANY {
         let (x, (y, z)) = rayon::join(|| cut(0), || rayon::join(|| cut(1), || cut(2)));
@@ -62,9 +62,9 @@ fn split(items: &mut [Item]) -> usize {
     } else {
         [cut(0), cut(1), cut(2)]
     };
-    let cheaper = |best: (f32, usize, usize), other: (f32, usize, usize)| if other.0 < best.0 { other } else { best };
+    let cheaper = |best: Cut, other: Cut| if other.cost < best.cost { other } else { best };
     let best = cuts.into_iter().flatten().reduce(cheaper);
-    let Some((_, axis, cut)) = best else { return items.len() / 2 };
+    let Some(Cut { axis, bucket: cut, .. }) = best else { return items.len() / 2 };
 
     let (min, extent) = (centers.min[axis], centers.max[axis] - centers.min[axis]);
     let mut middle = 0;
@@ -77,8 +77,16 @@ fn split(items: &mut [Item]) -> usize {
     middle
 }
 
-/// The minimum cost of a split along an axis, and the first bucket right of the split.
-fn best_cut(items: &[Item], axis: usize, min: f32, extent: f32) -> Option<(f32, usize)> {
+/// A split along an axis.
+struct Cut {
+    cost: f32,
+    axis: usize,
+    /// The first bucket right of the split.
+    bucket: usize,
+}
+
+/// The split of minimum cost along an axis.
+fn best_cut(items: &[Item], axis: usize, min: f32, extent: f32) -> Option<Cut> {
     let mut buckets = [LightBounds::EMPTY; BUCKETS];
     for item in items {
         let b = &mut buckets[bucket(item.center[axis], min, extent)];
@@ -92,12 +100,15 @@ fn best_cut(items: &[Item], axis: usize, min: f32, extent: f32) -> Option<(f32, 
         right_costs[i] = if right.intensity > 0.0 { right.cost() } else { f32::INFINITY };
     }
     let mut left = LightBounds::EMPTY;
-    let mut best: Option<(f32, usize)> = None;
-    for cut in 1..BUCKETS {
-        left = left.union(&buckets[cut - 1]);
-        let cost = left.cost() + right_costs[cut];
-        if left.intensity > 0.0 && right_costs[cut] < f32::INFINITY && best.is_none_or(|(c, _)| cost < c) {
-            best = Some((cost, cut));
+    let mut best: Option<Cut> = None;
+    for bucket in 1..BUCKETS {
+        left = left.union(&buckets[bucket - 1]);
+        let cost = left.cost() + right_costs[bucket];
+        if left.intensity > 0.0
+            && right_costs[bucket] < f32::INFINITY
+            && best.as_ref().is_none_or(|best| cost < best.cost)
+        {
+            best = Some(Cut { cost, axis, bucket });
         }
     }
     best

@@ -1,7 +1,7 @@
 //! Tests of the choice of lights on glossy surfaces.
 
-use crate::bsdfs::{Bsdf, Conductor, KernelBsdf as _, TrowbridgeReitz};
-use crate::lights::{GlossyLobe, Light, LightCtx, LightTree};
+use crate::bsdfs::{Bsdf, Conductor, KernelBsdf as _, LobeWidth, TrowbridgeReitz};
+use crate::lights::{GlossyLobe, Light, LightCtx, LightTree, PointLight};
 use lumiris_numbers::math::warp::{sample_cosine_hemisphere, sample_uniform_sphere};
 use lumiris_numbers::math::{Rgb, Vec3};
 use lumiris_test_support::random::{RngExt, pcg32};
@@ -18,14 +18,14 @@ fn second_moments(alpha: f32) -> [f64; 2] {
         let lights: Vec<Light> = (0..60)
             .map(|_| {
                 let p = sample_uniform_sphere(s.random::<[f32; 2]>()) * (1.0 + 9.0 * s.random::<f32>());
-                Light::Point { p, intensity: Rgb::splat(s.random::<f32>() + 0.1) }
+                Light::Point(PointLight { p, intensity: Rgb::splat(s.random::<f32>() + 0.1) })
             })
             .collect();
         let tree = LightTree::new(&lights.iter().map(Light::bounds).collect::<Vec<_>>());
         let wo = sample_cosine_hemisphere(s.random::<[f32; 2]>());
 
         // Contexts with and without the lobe
-        let (alpha, share) = Bsdf::Conductor(metal).glossy_lobe(wo).unwrap();
+        let LobeWidth { alpha, share } = Bsdf::Conductor(metal).glossy_lobe(wo).unwrap();
         let diffuse = LightCtx::on(Vec3::ZERO, Vec3::Z);
         let glossy = LightCtx { lobe: GlossyLobe::new(wo, Vec3::Z, alpha, share), ..diffuse };
 

@@ -1,10 +1,10 @@
 //! A bounding volume hierarchy over lights, descended at random in proportion to an upper bound of each child's
 //! contribution ([`lumiris_numbers::math::light_bound`]) [Conty Estévez and Kulla 2018; Pharr et al. 2023, §12.6.3].
 
+use super::branches::{Branches, COLUMNS};
 use super::build::{Item, build};
 use super::node::Node;
-use super::sampled_light::LightRun;
-use super::turns::Turns;
+use super::sampled_light::{LightRun, SampledLight, UNIT};
 use crate::lights::{LightBounds, LightCtx, LightId};
 use lumiris_numbers::math::ONE_MINUS_EPSILON;
 use lumiris_numbers::math::light_bound::{LightBound, first_probability};
@@ -23,33 +23,68 @@ pub struct LightTree {
     trails: Vec<u64>,
     /// Per light, its leaf.
     leaves: Vec<u32>,
-    /// Index and number of the inner nodes with numbers below [`Turns::COUNT`].
-    tops: Vec<(u32, usize)>,
+    /// The inner nodes with heap indices below [`COLUMNS`].
+    top: Vec<IndexedNode>,
+}
+
+/// A node by its index in the list of nodes, and by its heap index.
+#[derive(Clone, Copy, Debug)]
+struct IndexedNode {
+    index: u32,
+    heap_index: usize,
+}
+
+impl IndexedNode {
+    /// The root has the heap index 1, the children of node n have 2n and 2n + 1. Heap indices from [`COLUMNS`] on are
+    /// not distinguished.
+    const ROOT: IndexedNode = IndexedNode { index: 0, heap_index: 1 };
+
+    /// A child of this node, at the given index.
+    #[inline]
+    fn child(self, index: u32, is_right: bool) -> Self {
+        let n = self.heap_index;
+        IndexedNode { index, heap_index: if n < COLUMNS { 2 * n + usize::from(is_right) } else { n } }
+    }
 }
 
 /// An inner node above a cut of the tree.
 #[derive(Clone, Copy, Debug)]
 pub struct CutNode {
-    place: usize,
-    number: usize,
+    node: IndexedNode,
     /// The first subtrees below its children.
     left: usize,
     right: usize,
 }
 
-/// The number of a child of the node `number`: 2n or 2n + 1, if below [`Turns::COUNT`]. The root has the number 1.
-#[inline]
-fn child(number: usize, is_right: bool) -> usize {
-    if number < Turns::COUNT { 2 * number + usize::from(is_right) } else { number }
+/// A subtree, and the positions that chose it.
+#[derive(Clone, Copy, Default)]
+struct SubtreeRun {
+    root: u32,
+    pmf: f32,
+    /// Range of the positions in their list.
+    range: [u32; 2],
+    /// The part of [0, 1) that chooses the subtree.
+    interval: [f64; 2],
 }
 
-/// Positions descending the tree.
-#[derive(Clone, Copy, Default)]
-struct Descent {
-    place: u32,
-    pmf: f32,
-    places: [u32; 2],
-    interval: [f64; 2],
+/// Positions of a sorted list for which [`LightTree::runs`] chooses lights.
+#[derive(Clone, Copy, Debug)]
+pub struct RunPositions<'a> {
+    /// All positions, ascending, in units of 2⁻³².
+    pub positions: &'a [u32],
+    /// Index of the first position to be considered.
+    pub first: usize,
+    /// Begin of the part of [0, 1) that is considered.
+    pub start: f64,
+    /// Factor of all probabilities.
+    pub fraction: f32,
+}
+
+impl<'a> RunPositions<'a> {
+    /// All positions in [0, 1).
+    pub fn all(positions: &'a [u32]) -> Self {
+        RunPositions { positions, first: 0, start: 0.0, fraction: 1.0 }
+    }
 }
 
 impl LightTree {
@@ -67,19 +102,20 @@ impl LightTree {
             tree.nodes = vec![Node::new(&LightBounds::EMPTY, true, 0); 2 * items.len() - 1];
             build(&mut tree.nodes, 0, &mut items, 0);
             tree.find_leaves();
-            tree.find_tops();
+            tree.find_top();
         }
         tree
     }
 
-    /// Sets `tops`.
-    fn find_tops(&mut self) {
-        let mut stack = vec![(0, 1)];
-        while let Some((place, number)) = stack.pop() {
-            let node = &self.nodes[place as usize];
-            if !node.is_leaf && number < Turns::COUNT {
-                self.tops.push((place, number));
-                stack.extend([(place + 1, child(number, false)), (node.index, child(number, true))]);
+    /// Sets `top`.
+    fn find_top(&mut self) {
+        let mut stack = vec![IndexedNode::ROOT];
+        while let Some(indexed) = stack.pop() {
+            let node = &self.nodes[indexed.index as usize];
+            if !node.is_leaf && indexed.heap_index < COLUMNS {
+                self.top.push(indexed);
+                let left = indexed.child(indexed.index + 1, false);
+                stack.extend([left, indexed.child(node.light_or_right_child, true)]);
             }
         }
     }
@@ -87,13 +123,16 @@ impl LightTree {
     /// Sets `leaves` and `trails`.
     fn find_leaves(&mut self) {
         let mut stack = vec![(0, 0, 0)];
-        while let Some((place, depth, trail)) = stack.pop() {
-            let node = &self.nodes[place as usize];
+        while let Some((index, depth, trail)) = stack.pop() {
+            let node = &self.nodes[index as usize];
             if node.is_leaf {
-                self.trails[node.index as usize] = trail;
-                self.leaves[node.index as usize] = place;
+                self.trails[node.light_or_right_child as usize] = trail;
+                self.leaves[node.light_or_right_child as usize] = index;
             } else {
-                stack.extend([(place + 1, depth + 1, trail), (node.index, depth + 1, trail | 1 << depth)]);
+                stack.extend([
+                    (index + 1, depth + 1, trail),
+                    (node.light_or_right_child, depth + 1, trail | 1 << depth),
+                ]);
             }
         }
     }
@@ -121,14 +160,15 @@ impl LightTree {
         self.nodes.first().map(|root| &root.bound)
     }
 
-    /// The numbers of the top inner nodes, below [`Turns::COUNT`], with the bounds of their left and right children.
-    pub fn tops(&self) -> impl Iterator<Item = (usize, [&LightBound; 2])> {
-        self.tops.iter().map(|&(place, number)| (number, self.children(place as usize).map(|node| &node.bound)))
+    /// The heap indices of the inner nodes below [`COLUMNS`], with the bounds of their left and right children.
+    pub(super) fn top_branches(&self) -> impl Iterator<Item = (usize, [&LightBound; 2])> {
+        let bounds = |node: &IndexedNode| self.children(node.index as usize).map(|child| &child.bound);
+        self.top.iter().map(move |node| (node.heap_index, bounds(node)))
     }
 
     #[inline]
-    fn children(&self, place: usize) -> [&Node; 2] {
-        [&self.nodes[place + 1], &self.nodes[self.nodes[place].index as usize]]
+    fn children(&self, index: usize) -> [&Node; 2] {
+        [&self.nodes[index + 1], &self.nodes[self.nodes[index].light_or_right_child as usize]]
     }
 
     /// Upper bound, up to a common factor, of the contribution of all lights together at a point; 0 if none can
@@ -147,94 +187,90 @@ impl LightTree {
     /// Probability of the left child of an inner node. If neither child can contribute, the intensities decide. The
     /// probabilities of all leaves therefore always add up to 1.
     #[inline]
-    fn left_probability(&self, ctx: &LightCtx, place: usize) -> f32 {
-        let [left, right] = self.children(place);
+    fn left_probability(&self, ctx: &LightCtx, index: u32) -> f32 {
+        let [left, right] = self.children(index as usize);
         first_probability([left.importance(ctx), right.importance(ctx)], [&left.bound, &right.bound])
     }
 
-    /// Chooses a light of the subtree below a node by `u` in [0, 1). Returns its id, its probability in the subtree,
-    /// and `u` remapped to be uniform again.
+    /// Chooses a light of the subtree below a node by `u` in [0, 1); `pmf` is the probability in the subtree.
     #[inline]
-    pub fn sample_below(&self, ctx: &LightCtx, place: u32, u: f32) -> Option<(LightId, f32, f32)> {
-        self.descend(place, u, |place, _| self.left_probability(ctx, place))
+    pub fn sample_below(&self, ctx: &LightCtx, root: u32, u: f32) -> Option<SampledLight> {
+        self.descend(IndexedNode { index: root, heap_index: 1 }, u, |node| self.left_probability(ctx, node.index))
     }
 
-    /// Chooses a light by `u` in [0, 1). Returns its id, its probability, and `u` remapped to be uniform again. `turns`
-    /// are the precomputed probabilities of the point.
+    /// Chooses a light by `u` in [0, 1). `branches` are the precomputed probabilities at the point.
     #[inline]
-    pub fn sample(&self, ctx: &impl Deref<Target = LightCtx>, u: f32, turns: Turns<'_>) -> Option<(LightId, f32, f32)> {
+    pub fn sample(&self, ctx: &impl Deref<Target = LightCtx>, u: f32, branches: Branches<'_>) -> Option<SampledLight> {
         if self.is_empty() {
             return None;
         }
-        self.descend(0, u, |place, number| turns.probability(number, || self.left_probability(ctx, place)))
+        self.descend(IndexedNode::ROOT, u, |node| {
+            branches.probability(node.heap_index, || self.left_probability(ctx, node.index))
+        })
     }
 
-    /// Descends from a node, which has the number 1; `left(node, number)` is the probability of the left child.
+    /// Descends from a node; `left` is the probability of the left child of a node.
     #[inline]
-    fn descend(&self, place: u32, u: f32, mut left: impl FnMut(usize, usize) -> f32) -> Option<(LightId, f32, f32)> {
-        let (mut place, mut number, mut pmf, mut u) = (place as usize, 1, 1.0, u);
-        let mut node = &self.nodes[place];
+    fn descend(
+        &self,
+        mut indexed: IndexedNode,
+        mut u: f32,
+        mut left: impl FnMut(IndexedNode) -> f32,
+    ) -> Option<SampledLight> {
+        let mut pmf = 1.0;
+        let mut node = &self.nodes[indexed.index as usize];
         while !node.is_leaf {
             // Descend, and rescale the random number
-            let p = left(place, number);
-            let turns_left = u < p;
-            if turns_left {
+            let p = left(indexed);
+            if u < p {
                 u /= p;
                 pmf *= p;
-                place += 1;
+                indexed = indexed.child(indexed.index + 1, false);
             } else {
                 u = (u - p) / (1.0 - p);
                 pmf *= 1.0 - p;
-                place = node.index as usize;
+                indexed = indexed.child(node.light_or_right_child, true);
             }
-            number = child(number, !turns_left);
             u = u.min(ONE_MINUS_EPSILON);
-            node = &self.nodes[place];
+            node = &self.nodes[indexed.index as usize];
         }
-        (pmf > 0.0).then_some((node.index, pmf, u))
+        (pmf > 0.0).then_some(SampledLight { light: node.light_or_right_child, pmf, u })
     }
 
-    /// Chooses a light for each of the ascending `positions[places[0]..places[1]]` in units of 2⁻³². The tree covers
-    /// the interval of length `fraction` from `start` on. The positions descend the tree together, so that each node is
-    /// evaluated once.
-    pub fn runs(
-        &self,
-        ctx: &LightCtx,
-        positions: &[u32],
-        places: [u32; 2],
-        (start, fraction): (f64, f32),
-        out: &mut Vec<LightRun>,
-    ) {
-        let mut stack = [Descent::default(); MAX_DEPTH];
-        stack[0] = Descent { place: 0, pmf: 1.0, places, interval: [start, 1.0] };
+    /// Appends runs for the positions. They descend the tree together, so that each node is evaluated once.
+    pub fn runs(&self, ctx: &LightCtx, at: RunPositions<'_>, out: &mut Vec<LightRun>) {
+        let mut stack = [SubtreeRun::default(); MAX_DEPTH];
+        let range = [at.first as u32, at.positions.len() as u32];
+        stack[0] = SubtreeRun { root: 0, pmf: 1.0, range, interval: [at.start, 1.0] };
         let mut size = 1;
         while size > 0 {
             size -= 1;
-            let Descent { place, pmf, places: [first, end], interval } = stack[size];
+            let SubtreeRun { root, pmf, range: [first, end], interval } = stack[size];
             if first == end {
                 continue;
             }
-            let node = &self.nodes[place as usize];
+            let node = &self.nodes[root as usize];
             if node.is_leaf {
                 if pmf > 0.0 {
-                    out.push(LightRun { light: node.index, pmf: pmf * fraction, places: [first, end], interval });
+                    let pmf = pmf * at.fraction;
+                    out.push(LightRun { light: node.light_or_right_child, pmf, range: [first, end], interval });
                 }
                 continue;
             }
 
             // Split the positions at the boundary between the children
-            let p = self.left_probability(ctx, place as usize);
+            let p = self.left_probability(ctx, root);
             let middle = interval[0] + (interval[1] - interval[0]) * f64::from(p);
-            let is_left = |&x: &u32| f64::from(x) * (1.0 / 4_294_967_296.0) < middle;
-            let split = first + positions[first as usize..end as usize].partition_point(is_left) as u32;
-            stack[size] = Descent {
-                place: node.index,
+            let is_left = |&x: &u32| f64::from(x) * UNIT < middle;
+            let split = first + at.positions[first as usize..end as usize].partition_point(is_left) as u32;
+            stack[size] = SubtreeRun {
+                root: node.light_or_right_child,
                 pmf: pmf * (1.0 - p),
-                places: [split, end],
+                range: [split, end],
                 interval: [middle, interval[1]],
             };
             stack[size + 1] =
-                Descent { place: place + 1, pmf: pmf * p, places: [first, split], interval: [interval[0], middle] };
+                SubtreeRun { root: root + 1, pmf: pmf * p, range: [first, split], interval: [interval[0], middle] };
             size += 2;
         }
     }
@@ -244,28 +280,28 @@ impl LightTree {
     pub fn cut(&self, max: usize) -> Vec<u32> {
         let mut cut: Vec<u32> = if self.is_empty() || max == 0 { Vec::new() } else { vec![0] };
         while cut.len() < max {
-            let spread = |&place: &u32| {
-                let node = &self.nodes[place as usize];
+            let spread = |&index: &u32| {
+                let node = &self.nodes[index as usize];
                 if node.is_leaf { -1.0 } else { node.bound.intensity * node.bound.radius_squared }
             };
             let widest = (0..cut.len()).max_by(|&a, &b| spread(&cut[a]).total_cmp(&spread(&cut[b])));
             let Some(widest) = widest.filter(|&i| !self.nodes[cut[i] as usize].is_leaf) else { break };
-            let place = cut[widest];
-            cut[widest] = place + 1;
-            cut.push(self.nodes[place as usize].index);
+            let index = cut[widest];
+            cut[widest] = index + 1;
+            cut.push(self.nodes[index as usize].light_or_right_child);
         }
         cut.sort_unstable();
         cut
     }
 
     /// Calls `visit` with each light of the subtree below a node.
-    pub fn visit_lights(&self, place: u32, visit: &mut dyn FnMut(LightId)) {
-        let node = &self.nodes[place as usize];
+    pub fn visit_lights(&self, index: u32, visit: &mut dyn FnMut(LightId)) {
+        let node = &self.nodes[index as usize];
         if node.is_leaf {
-            visit(node.index);
+            visit(node.light_or_right_child);
         } else {
-            self.visit_lights(place + 1, visit);
-            self.visit_lights(node.index, visit);
+            self.visit_lights(index + 1, visit);
+            self.visit_lights(node.light_or_right_child, visit);
         }
     }
 
@@ -273,45 +309,41 @@ impl LightTree {
     pub fn above(&self, cut: &[u32]) -> Vec<CutNode> {
         let mut above = Vec::new();
         if !cut.is_empty() {
-            self.add_above((0, 1), (cut, 0), &mut above);
+            self.add_above(IndexedNode::ROOT, cut, 0, &mut above);
         }
         above
     }
 
-    /// Appends the inner nodes from `place` on down; `number` is the number of that node and `first` the index of the
-    /// first subtree below it. Returns the index after its last subtree.
-    fn add_above(
-        &self,
-        (place, number): (u32, usize),
-        (cut, first): (&[u32], usize),
-        above: &mut Vec<CutNode>,
-    ) -> usize {
-        if cut.binary_search(&place).is_ok() {
+    /// Appends the inner nodes from `node` on down; `first` is the index of the first subtree below it. Returns the
+    /// index after its last subtree.
+    fn add_above(&self, node: IndexedNode, cut: &[u32], first: usize, above: &mut Vec<CutNode>) -> usize {
+        if cut.binary_search(&node.index).is_ok() {
             return first + 1;
         }
         let i = above.len();
-        above.push(CutNode { place: place as usize, number, left: first, right: first });
-        let right = self.add_above((place + 1, child(number, false)), (cut, first), above);
+        above.push(CutNode { node, left: first, right: first });
+        let right = self.add_above(node.child(node.index + 1, false), cut, first, above);
         above[i].right = right;
-        self.add_above((self.nodes[place as usize].index, child(number, true)), (cut, right), above)
+        let right_child = self.nodes[node.index as usize].light_or_right_child;
+        self.add_above(node.child(right_child, true), cut, right, above)
     }
 
     /// Probabilities with which [`sample`](Self::sample) enters each subtree of a non-empty cut, in its order. `above`
-    /// are the nodes [`above`](Self::above) the cut; `turns` are precomputed probabilities of the point.
+    /// are the nodes [`above`](Self::above) the cut; `branches` are precomputed probabilities at the point.
     #[inline]
-    pub fn cut_pmfs(&self, ctx: &LightCtx, above: &[CutNode], turns: Turns<'_>, pmfs: &mut [f32]) {
+    pub fn cut_pmfs(&self, ctx: &LightCtx, above: &[CutNode], branches: Branches<'_>, pmfs: &mut [f32]) {
         pmfs[0] = 1.0;
-        for node in above {
-            let p = turns.probability(node.number, || self.left_probability(ctx, node.place));
-            let pmf = pmfs[node.left];
-            pmfs[node.left] = pmf * p;
-            pmfs[node.right] = pmf * (1.0 - p);
+        for &CutNode { node, left, right } in above {
+            let p = branches.probability(node.heap_index, || self.left_probability(ctx, node.index));
+            let pmf = pmfs[left];
+            pmfs[left] = pmf * p;
+            pmfs[right] = pmf * (1.0 - p);
         }
     }
 
-    /// [`Self::sample`] with the importances `importance(place, node, count)`, which must be positive where the
-    /// importance of the node is. `count` is the number of `leaves` below the node; `leaves` are positions of leaves in
-    /// ascending order. These leaves are chosen only if no other light can contribute. Nodes are numbered as in
+    /// [`Self::sample`] with the importances `importance(index, node, count)`, which must be positive where the
+    /// importance of the node is. `count` is the number of `leaves` below the node; `leaves` are indices of leaves in
+    /// ascending order. These leaves are chosen only if no other light can contribute. Nodes are indexed as in
     /// [`Self::sums`].
     #[inline]
     pub(in crate::lights) fn sample_by(
@@ -319,9 +351,9 @@ impl LightTree {
         u: f32,
         leaves: &[u32],
         importance: impl Fn(usize, &Node, usize) -> f32,
-    ) -> Option<(LightId, f32, f32)> {
+    ) -> Option<SampledLight> {
         let mut left = self.left_by(leaves, importance);
-        if self.is_empty() { None } else { self.descend(0, u, |place, _| left(place)) }
+        if self.is_empty() { None } else { self.descend(IndexedNode::ROOT, u, |node| left(node.index)) }
     }
 
     /// The probability of the left child of each node on the way down, with the importances of [`Self::sample_by`].
@@ -330,21 +362,24 @@ impl LightTree {
         &'a self,
         leaves: &'a [u32],
         importance: impl Fn(usize, &Node, usize) -> f32 + 'a,
-    ) -> impl FnMut(usize) -> f32 + 'a {
-        // Those below the node, and which of them are to its right
+    ) -> impl FnMut(u32) -> f32 + 'a {
+        // Leaves below the node; those below its right child; the last node, with the number below its left child
         let (mut below, mut right_of, mut last) = (leaves, leaves, None);
-        move |place| {
+        move |index| {
+            // Keep the leaves below the chosen child of the last node
             if let Some((parent, middle)) = last {
-                below = if place == parent + 1 { &below[..middle] } else { right_of };
+                below = if index == parent + 1 { &below[..middle] } else { right_of };
             }
-            let right_place = self.nodes[place].index as usize;
-            let middle = below.partition_point(|&leaf| (leaf as usize) < right_place);
-            let [left, right] = self.children(place);
-            let of = |place: usize, child: &Node, count: usize| {
-                if child.is_leaf && count > 0 { 0.0 } else { importance(place, child, count) }
+            let right_index = self.nodes[index as usize].light_or_right_child;
+            let middle = below.partition_point(|&leaf| leaf < right_index);
+
+            // Importances of both children
+            let [left, right] = self.children(index as usize);
+            let of = |index: u32, child: &Node, count: usize| {
+                if child.is_leaf && count > 0 { 0.0 } else { importance(index as usize, child, count) }
             };
-            let importances = [of(place + 1, left, middle), of(right_place, right, below.len() - middle)];
-            (right_of, last) = (&below[middle..], Some((place, middle)));
+            let importances = [of(index + 1, left, middle), of(right_index, right, below.len() - middle)];
+            (right_of, last) = (&below[middle..], Some((index, middle)));
             first_probability(importances, [&left.bound, &right.bound])
         }
     }
@@ -359,21 +394,25 @@ impl LightTree {
     pub fn sums(&self, of: impl Fn(LightId) -> f32) -> Vec<f32> {
         let mut sums = vec![0.0; self.nodes.len()];
         // Children follow their parents
-        for (place, node) in self.nodes.iter().enumerate().rev() {
-            sums[place] = if node.is_leaf { of(node.index) } else { sums[place + 1] + sums[node.index as usize] };
+        for (index, node) in self.nodes.iter().enumerate().rev() {
+            sums[index] = if node.is_leaf {
+                of(node.light_or_right_child)
+            } else {
+                sums[index + 1] + sums[node.light_or_right_child as usize]
+            };
         }
         sums
     }
 
     /// The light of a tree of one light.
     pub fn only_light(&self) -> Option<LightId> {
-        if let [leaf] = &self.nodes[..] { Some(leaf.index) } else { None }
+        if let [leaf] = &self.nodes[..] { Some(leaf.light_or_right_child) } else { None }
     }
 
     /// Probability that [`sample`](Self::sample) chooses `light`.
     #[inline]
     pub fn pmf(&self, ctx: &LightCtx, light: LightId) -> f32 {
-        self.probability(light, |place| self.left_probability(ctx, place))
+        self.probability(light, |index| self.left_probability(ctx, index))
     }
 
     /// Probability that [`sample_by`](Self::sample_by) chooses `light`.
@@ -387,21 +426,21 @@ impl LightTree {
         self.probability(light, self.left_by(leaves, importance))
     }
 
-    /// Probability of the way down to a light: `left(node)` is that to turn left at a node.
+    /// Probability of the path to a light; `left` is the probability of the left child of a node.
     #[inline]
-    fn probability(&self, light: LightId, mut left: impl FnMut(usize) -> f32) -> f32 {
+    fn probability(&self, light: LightId, mut left: impl FnMut(u32) -> f32) -> f32 {
         if !self.contains(light) {
             return 0.0;
         }
-        let (mut place, mut pmf, mut trail) = (0, 1.0, self.trails[light as usize]);
-        while !self.nodes[place].is_leaf {
-            let p = left(place);
+        let (mut index, mut pmf, mut trail) = (0, 1.0, self.trails[light as usize]);
+        while !self.nodes[index as usize].is_leaf {
+            let p = left(index);
             if trail & 1 == 0 {
                 pmf *= p;
-                place += 1;
+                index += 1;
             } else {
                 pmf *= 1.0 - p;
-                place = self.nodes[place].index as usize;
+                index = self.nodes[index as usize].light_or_right_child;
             }
             trail >>= 1;
         }
@@ -413,7 +452,7 @@ impl LightTree {
 mod tests {
     use super::*;
     use crate::geometry::{Shape, TriangleMesh};
-    use crate::lights::{Emission, GlossyLobe, Light, area_lights_of};
+    use crate::lights::{Emission, GlossyLobe, Light, PointLight, SpotLight, area_lights_of};
     use lumiris_numbers::math::warp::sample_uniform_sphere;
     use lumiris_numbers::math::{Rgb, Vec3};
     use lumiris_test_support::assert_chi_squared;
@@ -431,11 +470,11 @@ mod tests {
                 let l = Rgb::splat(s.random::<f32>().powi(4) * 10.0 + 0.01);
                 let axis = sample_uniform_sphere(s.random::<[f32; 2]>());
                 match i % 5 {
-                    0 => Light::Point { p, intensity: l * scale * scale },
+                    0 => Light::Point(PointLight { p, intensity: l * scale * scale }),
                     1 => {
                         let (a, b) = (s.random::<f32>(), s.random::<f32>());
                         let (cos_total, cos_falloff_start) = (a.min(b) * 2.0 - 1.0, a.max(b) * 2.0 - 1.0);
-                        Light::Spot { p, axis, cos_total, cos_falloff_start, intensity: l * scale * scale }
+                        Light::Spot(SpotLight { p, axis, cos_total, cos_falloff_start, intensity: l * scale * scale })
                     }
                     k => {
                         let mut edge = || sample_uniform_sphere(s.random::<[f32; 2]>()) * scale * 0.01;
@@ -489,7 +528,7 @@ mod tests {
             let count = 100_000;
             let mut observed = vec![0.0; lights.len() * 4];
             for _ in 0..count {
-                let (light, pmf, u) = tree.sample(&&ctx, s.random::<f32>(), Turns::NONE).unwrap();
+                let SampledLight { light, pmf, u } = tree.sample(&&ctx, s.random::<f32>(), Branches::NONE).unwrap();
                 assert_eq!(pmf, tree.pmf(&ctx, light));
                 observed[light as usize * 4 + (u * 4.0) as usize] += 1.0;
             }
@@ -543,7 +582,7 @@ mod tests {
 
     #[test]
     fn near_lights_are_preferred() {
-        let at = |x: f32| Light::Point { p: Vec3::new(x, 0.0, 0.0), intensity: Rgb::WHITE };
+        let at = |x: f32| Light::Point(PointLight { p: Vec3::new(x, 0.0, 0.0), intensity: Rgb::WHITE });
         let tree = tree_of(&[at(0.0), at(10.0)]);
         let pmf = tree.pmf(&LightCtx::at(Vec3::new(1.0, 0.0, 0.0)), 0);
         assert!((pmf - 81.0 / 82.0).abs() < 1e-5, "{pmf}");
@@ -553,20 +592,25 @@ mod tests {
     fn degenerate_sets_are_handled() {
         let ctx = LightCtx::on(Vec3::ZERO, Vec3::Y);
         // None, or none that shines.
-        assert!(tree_of(&[]).sample(&&ctx, 0.5, Turns::NONE).is_none());
-        let black = Light::Point { p: Vec3::ONE, intensity: Rgb::BLACK };
+        assert!(tree_of(&[]).sample(&&ctx, 0.5, Branches::NONE).is_none());
+        let black = Light::Point(PointLight { p: Vec3::ONE, intensity: Rgb::BLACK });
         let mesh = TriangleMesh::new(vec![Vec3::ONE, Vec3::ONE, Vec3::X], vec![[0, 1, 2]]).unwrap();
         let flat = area_lights_of(&Shape::Mesh(mesh), &Emission::constant(Rgb::WHITE)).lights.remove(0);
         let dark = [black.clone(), Light::Area(flat), Light::InfiniteConstant { l: Rgb::WHITE }];
         let tree = tree_of(&dark);
-        assert!(tree.is_empty() && tree.sample(&&ctx, 0.5, Turns::NONE).is_none() && tree.pmf(&ctx, 0) == 0.0);
+        assert!(tree.is_empty() && tree.sample(&&ctx, 0.5, Branches::NONE).is_none() && tree.pmf(&ctx, 0) == 0.0);
 
         // One light, the same light many times, lights on a line, and the point on a light.
-        let one = Light::Point { p: Vec3::ONE, intensity: Rgb::WHITE };
-        assert_eq!(tree_of(&[black, one.clone()]).sample(&&ctx, 0.9, Turns::NONE).map(|s| (s.0, s.1)), Some((1, 1.0)));
+        let one = Light::Point(PointLight { p: Vec3::ONE, intensity: Rgb::WHITE });
+        assert_eq!(
+            tree_of(&[black, one.clone()]).sample(&&ctx, 0.9, Branches::NONE).map(|s| (s.light, s.pmf)),
+            Some((1, 1.0))
+        );
         let same = vec![one; 1000];
         let line: Vec<Light> = (0..1000)
-            .map(|i| Light::Point { p: Vec3::new(1e-3 * 1.01_f32.powi(i), 0.0, 0.0), intensity: Rgb::WHITE })
+            .map(|i| {
+                Light::Point(PointLight { p: Vec3::new(1e-3 * 1.01_f32.powi(i), 0.0, 0.0), intensity: Rgb::WHITE })
+            })
             .collect();
         for lights in [same, line] {
             let tree = tree_of(&lights);
@@ -577,8 +621,9 @@ mod tests {
             }
         }
         // Opposite axes have no common cone.
-        let spot =
-            |axis| Light::Spot { p: Vec3::ONE, axis, cos_total: 0.9, cos_falloff_start: 0.9, intensity: Rgb::WHITE };
+        let spot = |axis| {
+            Light::Spot(SpotLight { p: Vec3::ONE, axis, cos_total: 0.9, cos_falloff_start: 0.9, intensity: Rgb::WHITE })
+        };
         let tree = tree_of(&[spot(Vec3::Y), spot(-Vec3::Y)]);
         assert!(tree.pmf(&LightCtx::at(Vec3::new(1.0, 5.0, 1.0)), 0) == 1.0);
     }
@@ -590,7 +635,7 @@ mod tests {
         let mut s = pcg32([8, 1, 1]);
         let ctx = random_ctx(&mut s, 1.0);
         for _ in 0..100_000 {
-            let (light, pmf, _) = tree.sample(&&ctx, s.random::<f32>(), Turns::NONE).unwrap();
+            let SampledLight { light, pmf, .. } = tree.sample(&&ctx, s.random::<f32>(), Branches::NONE).unwrap();
             assert!(pmf > 0.0 && light < 100_000);
         }
     }

@@ -21,7 +21,7 @@ pub struct LightRun {
     /// Probability of the choice.
     pub pmf: f32,
     /// Index range in the list, end exclusive.
-    pub places: [u32; 2],
+    pub range: [u32; 2],
     /// The part of [0, 1) that chooses the light.
     pub interval: [f64; 2],
 }

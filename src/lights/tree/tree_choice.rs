@@ -1,8 +1,8 @@
 //! The choice of a light by a [`LightTree`] and, beside it, the infinite lights, which have no bounds.
 
-use super::light_tree::LightTree;
+use super::branches::Branches;
+use super::light_tree::{LightTree, RunPositions};
 use super::sampled_light::{LightRun, SampledLight, UNIT};
-use super::turns::Turns;
 use crate::lights::{Light, LightCtx, LightId};
 use lumiris_numbers::math::ONE_MINUS_EPSILON;
 use std::ops::Deref;
@@ -32,18 +32,19 @@ impl TreeChoice {
     /// A choice among `lights` that have power, in a scene of radius `scene_radius` (m); `infinite_fraction` as in [`new`](Self::new).
     pub(in crate::lights) fn of_lights(lights: &[Light], scene_radius: f32, infinite_fraction: Option<f32>) -> Self {
         let powers: Vec<f32> = lights.iter().map(|light| light.phi(scene_radius)).collect();
-        Self::new((lights, &powers), infinite_fraction, false)
+        Self::new(lights, &powers, infinite_fraction, false)
     }
 
-    /// A choice among `lights` with the given `powers`. `glows`: emitting parts of media are included.
+    /// A choice among `lights` with the given `powers`. `volumes`: emitting parts of media are included.
     /// `infinite_fraction` is the total probability of the infinite lights (0 to 1, exclusive); `None`: each has the
     /// same probability as the whole tree.
     pub(in crate::lights) fn new(
-        (lights, powers): (&[Light], &[f32]),
+        lights: &[Light],
+        powers: &[f32],
         infinite_fraction: Option<f32>,
-        glows: bool,
+        volumes: bool,
     ) -> Self {
-        let is_asked_for = |light: &&Light| glows || !matches!(light, Light::Glow(_));
+        let is_asked_for = |light: &&Light| volumes || !matches!(light, Light::Volume(_));
         let bounds: Vec<_> = lights.iter().map(|light| Some(light).filter(is_asked_for)?.bounds()).collect();
         let is_chosen = |&i: &usize| lights[i].is_infinite() && powers[i] > 0.0;
         let infinite: Vec<LightId> = (0..lights.len()).filter(is_chosen).map(|i| i as LightId).collect();
@@ -80,53 +81,50 @@ impl TreeChoice {
     /// Chooses a light by `u` in [0, 1); `None` if there is none.
     #[inline]
     pub fn sample(&self, ctx: &LightCtx, u: f32) -> Option<SampledLight> {
-        self.sample_again(&ctx, u, Turns::NONE)
+        self.sample_with(&ctx, u, Branches::NONE)
     }
 
-    /// [`Self::sample`] with precomputed probabilities `turns` of the point.
+    /// [`Self::sample`] with precomputed branch probabilities at the point.
     #[inline]
-    pub fn sample_again(&self, ctx: &impl Deref<Target = LightCtx>, u: f32, turns: Turns<'_>) -> Option<SampledLight> {
-        let p_infinite = turns.probability(Turns::BESIDE, || self.infinite_probability(ctx));
+    pub fn sample_with(
+        &self,
+        ctx: &impl Deref<Target = LightCtx>,
+        u: f32,
+        branches: Branches<'_>,
+    ) -> Option<SampledLight> {
+        let p_infinite = branches.infinite_probability(|| self.infinite_probability(ctx));
         if u < p_infinite {
             return Some(one_of(&self.infinite, u / p_infinite, p_infinite));
         }
         let u = ((u - p_infinite) / (1.0 - p_infinite)).min(ONE_MINUS_EPSILON);
-        let (light, pmf, u) = self.tree.sample(ctx, u, turns)?;
-        Some(SampledLight { light, pmf: pmf * (1.0 - p_infinite), u })
+        let choice = self.tree.sample(ctx, u, branches)?;
+        Some(SampledLight { pmf: choice.pmf * (1.0 - p_infinite), ..choice })
     }
 
-    /// Appends runs for the positions from `first` on, which are in [`start`, 1); `share` = 1 − `start` is a factor of
-    /// all probabilities.
-    pub(in crate::lights) fn runs(
-        &self,
-        ctx: &LightCtx,
-        positions: &[u32],
-        first: usize,
-        (start, share): (f64, f32),
-        out: &mut Vec<LightRun>,
-    ) {
+    /// Appends runs for the positions.
+    pub(in crate::lights) fn runs(&self, ctx: &LightCtx, at: RunPositions<'_>, out: &mut Vec<LightRun>) {
         let TreeChoice { tree, infinite, .. } = self;
+        let RunPositions { positions, mut first, start, fraction } = at;
 
         // Infinite lights first, in equal intervals
         let p_infinite = self.infinite_probability(ctx);
-        let each = f64::from(p_infinite * share) / infinite.len() as f64;
-        let mut first = first;
+        let each = f64::from(p_infinite * fraction) / infinite.len() as f64;
         for (i, &light) in infinite.iter().enumerate().filter(|_| p_infinite > 0.0) {
             let interval = [start + each * i as f64, start + each * (i + 1) as f64];
             let is_in = |&p: &u32| f64::from(p) * UNIT < interval[1] || p_infinite == 1.0 && i + 1 == infinite.len();
             let count = positions[first..].partition_point(is_in);
             if count > 0 {
-                let pmf = p_infinite * share / infinite.len() as f32;
-                out.push(LightRun { light, pmf, places: [first as u32, (first + count) as u32], interval });
+                let pmf = p_infinite * fraction / infinite.len() as f32;
+                out.push(LightRun { light, pmf, range: [first as u32, (first + count) as u32], interval });
             }
             first += count;
         }
 
         // The tree covers the rest
-        let places = [first as u32, positions.len() as u32];
         if !tree.is_empty() && p_infinite < 1.0 {
-            let start = start + f64::from(p_infinite * share);
-            tree.runs(ctx, positions, places, (start, (1.0 - p_infinite) * share), out);
+            let start = start + f64::from(p_infinite * fraction);
+            let fraction = (1.0 - p_infinite) * fraction;
+            tree.runs(ctx, RunPositions { positions, first, start, fraction }, out);
         }
     }
 

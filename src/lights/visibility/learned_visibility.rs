@@ -13,7 +13,7 @@
 //!
 //! The density of light samples with the least variance is proportional to E·√V̂, as the second moment of a sample is
 //! E²·V̂/p. On a glossy surface E is weighted by the reflection to the viewer, but V̂ uses the unweighted E.
-//! [`LearnedVisibility::sample_unseen`] chooses lights without photons in this way. For a node of the light tree,
+//! [`LearnedVisibility::sample_noncontributing`] chooses lights without photons in this way. For a node of the light tree,
 //! Φ/(A·N) is the sum over its lights.
 //!
 //! A node may hold many visible lights with few expected photons each. By [Good 1953], the expected contribution of its
@@ -50,12 +50,19 @@ pub struct LearnedVisibility {
 
 /// A light without photons in the visibility cache at a point.
 #[derive(Clone, Copy, Debug)]
-pub struct UnseenLight {
+pub struct NoncontributingLight {
     /// The light.
     pub choice: SampledLight,
+    /// Its expected contribution without photons.
+    pub expected: ExpectedContribution,
+}
+
+/// The expected contribution of a light at a point.
+#[derive(Clone, Copy, Debug)]
+pub struct ExpectedContribution {
     /// E, weighted by the reflection, up to a factor common to all lights.
     pub importance: f32,
-    /// V̂ of a light without photons.
+    /// V̂ of the light.
     pub visibility: f32,
 }
 
@@ -76,12 +83,12 @@ fn estimate(importance: f32, of_one_photon: f32, count: f32) -> f32 {
 pub(super) fn facing_irradiance(light: &Light, scene_radius: f32) -> f32 {
     let disk = PI * scene_radius * scene_radius;
     match light {
-        Light::Distant { .. } => light.phi(scene_radius) / disk,
+        Light::Distant(_) => light.phi(scene_radius) / disk,
         // π times the mean radiance
         Light::InfiniteConstant { .. } | Light::InfiniteImage { .. } => light.phi(scene_radius) / (4.0 * disk),
         // The mean over the scene
         Light::Portal(_) => light.phi(scene_radius) / disk,
-        Light::Point { .. } | Light::Spot { .. } | Light::Image(_) | Light::Area(_) | Light::Glow(_) => 0.0,
+        Light::Point(_) | Light::Spot(_) | Light::Image(_) | Light::Area(_) | Light::Volume(_) => 0.0,
     }
 }
 
@@ -113,13 +120,13 @@ impl LearnedVisibility {
         }
     }
 
-    /// E of a light, weighted by the reflection, and V̂ for its number of photons.
+    /// The expected contribution of a light with `count` photons.
     #[inline]
-    pub fn expect(&self, ctx: &LightCtx, light: LightId, count: u32) -> (f32, f32) {
+    pub fn expect(&self, ctx: &LightCtx, light: LightId, count: u32) -> ExpectedContribution {
         let e = self.importance(ctx, light);
         let is_by_lobe = is_glossy(ctx) && self.choice.tree.contains(light);
-        let reflected = if is_by_lobe { self.choice.tree.light_importance(ctx, light) } else { e };
-        (reflected, self.visibility(light, e, count))
+        let importance = if is_by_lobe { self.choice.tree.light_importance(ctx, light) } else { e };
+        ExpectedContribution { importance, visibility: self.visibility(light, e, count) }
     }
 
     /// V̂ of a light for its E and its number of photons, from [`MIN_VISIBILITY`] to 1.
@@ -134,53 +141,54 @@ impl LearnedVisibility {
         count as f32 * self.of_one_photon[light as usize]
     }
 
-    /// Appends the tree indices, ascending, of the lights in `seen` with exactly one photon.
-    pub fn find_singles(&self, seen: &ContributingLights<'_>, singles: &mut Vec<u32>) {
+    /// Appends the tree indices, ascending, of the contributing lights with exactly one photon.
+    pub fn find_singles(&self, contributing: &ContributingLights<'_>, singles: &mut Vec<u32>) {
         let first = singles.len();
-        let once = seen.lights.iter().filter(|(_, count)| *count == 1);
-        singles.extend(once.filter_map(|&(light, _)| self.choice.tree.leaf(light)));
+        let once = contributing.lights.iter().filter(|entry| entry.count == 1);
+        singles.extend(once.filter_map(|entry| self.choice.tree.leaf(entry.light)));
         singles[first..].sort_unstable();
     }
 
     /// Chooses a light by `u` in [0, 1), nearly in proportion to E·√V̂ for lights without photons. Every light that can
-    /// contribute and is not in `seen` has a positive probability. Lights in `seen` may be chosen too; single-photon
-    /// lights are chosen only if no other light below their node can contribute. `singles` are the tree indices of
-    /// single-photon lights in `seen`. Returns `None` if there is no light.
+    /// contribute and has no photons has a positive probability. `contributing` lights may be chosen too; those with a
+    /// single photon only if no other light below their node can contribute. `singles` are their tree indices. Returns `None` if there is no light.
     #[inline]
-    pub fn sample_unseen(
+    pub fn sample_noncontributing(
         &self,
         ctx: &LightCtx,
-        (seen, singles): (&ContributingLights<'_>, &[u32]),
+        contributing: &ContributingLights<'_>,
+        singles: &[u32],
         u: f32,
-    ) -> Option<UnseenLight> {
+    ) -> Option<NoncontributingLight> {
         let TreeChoice { tree, infinite, .. } = &self.choice;
-        let unseen = || infinite.iter().filter(|&&light| seen.place(light).is_none());
-        let count = unseen().count();
+        let others = || infinite.iter().filter(|&&light| contributing.index_of(light).is_none());
+        let count = others().count();
         let p_infinite = self.choice.probability_of_some(ctx, count);
         if u < p_infinite {
             let x = u / p_infinite * count as f32;
             let i = (x as usize).min(count - 1);
             let u = (x - i as f32).clamp(0.0, ONE_MINUS_EPSILON);
-            let light = *unseen().nth(i)?;
-            return Some(self.unseen(ctx, SampledLight { light, pmf: p_infinite / count as f32, u }));
+            let light = *others().nth(i)?;
+            return Some(self.evaluated(ctx, SampledLight { light, pmf: p_infinite / count as f32, u }));
         }
 
         // Lights in the tree
         let u = ((u - p_infinite) / (1.0 - p_infinite)).min(ONE_MINUS_EPSILON);
-        let (light, pmf, u) = tree.sample_by(u, singles, self.by_visibility(ctx))?;
-        Some(self.unseen(ctx, SampledLight { light, pmf: pmf * (1.0 - p_infinite), u }))
+        let choice = tree.sample_by(u, singles, self.by_visibility(ctx))?;
+        Some(self.evaluated(ctx, SampledLight { pmf: choice.pmf * (1.0 - p_infinite), ..choice }))
     }
 
-    /// Evaluates a light that is not in `seen`, with the probability that [`Self::sample_unseen`] chooses it.
+    /// Evaluates a light without photons, with the probability that [`Self::sample_noncontributing`] chooses it.
     #[inline]
-    pub fn unseen_light(
+    pub fn noncontributing_light(
         &self,
         ctx: &LightCtx,
-        (seen, singles): (&ContributingLights<'_>, &[u32]),
+        contributing: &ContributingLights<'_>,
+        singles: &[u32],
         light: LightId,
-    ) -> UnseenLight {
+    ) -> NoncontributingLight {
         let TreeChoice { tree, infinite, .. } = &self.choice;
-        let count = infinite.iter().filter(|&&light| seen.place(light).is_none()).count();
+        let count = infinite.iter().filter(|&&light| contributing.index_of(light).is_none()).count();
         let p_infinite = self.choice.probability_of_some(ctx, count);
         let pmf = if tree.contains(light) {
             tree.pmf_by(light, singles, self.by_visibility(ctx)) * (1.0 - p_infinite)
@@ -189,31 +197,32 @@ impl LearnedVisibility {
         } else {
             0.0
         };
-        self.unseen(ctx, SampledLight { light, pmf, u: 0.0 })
+        self.evaluated(ctx, SampledLight { light, pmf, u: 0.0 })
     }
 
-    /// E·√V̂ of nodes at a point, as a function of the place, the node, and the number of lights below it with a single photon.
+    /// E·√V̂ of nodes at a point, as a function of the index, the node, and the number of lights below it with a single photon.
     #[inline]
     fn by_visibility(&self, ctx: &LightCtx) -> impl Fn(usize, &Node, usize) -> f32 {
         let receiver = ctx.receiver();
         let diffuse = Receiver { lobe: None, ..receiver };
-        move |place, node, singles| {
+        move |index, node, singles| {
             let e = node.bound.importance(&diffuse);
             let reflected = if receiver.lobe.is_some() { node.bound.importance(&receiver) } else { e };
-            reflected * estimate(e, self.of_nodes[place], singles as f32).sqrt()
+            reflected * estimate(e, self.of_nodes[index], singles as f32).sqrt()
         }
     }
 
     #[inline]
-    fn unseen(&self, ctx: &LightCtx, choice: SampledLight) -> UnseenLight {
-        let (importance, visibility) = self.expect(ctx, choice.light, 0);
-        UnseenLight { choice, importance, visibility }
+    fn evaluated(&self, ctx: &LightCtx, choice: SampledLight) -> NoncontributingLight {
+        NoncontributingLight { choice, expected: self.expect(ctx, choice.light, 0) }
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::visibility_cache::{PathCount, PrimaryPhoton};
     use super::*;
+    use crate::lights::{DistantLight, PointLight, SurfacePoint};
     use lumiris_numbers::math::{Rgb, Vec3};
     use lumiris_test_support::random::{RngExt, pcg32};
 
@@ -222,17 +231,20 @@ mod tests {
 
     /// Lamps in a row above the floor, and two infinite lights.
     fn lamps() -> Vec<Light> {
-        let lamp = |i: i32| Light::Point { p: Vec3::new(i as f32, 0.3, 2.0), intensity: Rgb::splat(1.0 + i as f32) };
+        let lamp = |i: i32| {
+            Light::Point(PointLight { p: Vec3::new(i as f32, 0.3, 2.0), intensity: Rgb::splat(1.0 + i as f32) })
+        };
         let mut lights: Vec<Light> = (0..12).map(lamp).collect();
         lights.push(Light::InfiniteConstant { l: Rgb::splat(0.1) });
-        lights.push(Light::Distant { wi_world: Vec3::Z, l: Rgb::splat(0.2) });
+        lights.push(Light::Distant(DistantLight { wi: Vec3::Z, l: Rgb::splat(0.2) }));
         lights
     }
 
-    /// A cache with `count` photons of each light of `seen` at the point, and `paths` photon paths of every light.
+    /// A cache with `count` photons of each light of `contributing` at the point, and `paths` photon paths of every light.
     fn cache(seen: &[LightId], count: usize, paths: f32) -> VisibilityCache {
-        let photons = seen.iter().flat_map(|&light| vec![(AT, Vec3::Z, light); count]);
-        VisibilityCache::new(photons, 0.2).with_paths((0..14).map(|light| (light, paths)))
+        let at = SurfacePoint { p: AT, n: Vec3::Z };
+        let photons: Vec<_> = seen.iter().flat_map(|&light| vec![PrimaryPhoton { at, light }; count]).collect();
+        VisibilityCache::new(&photons, 0.2).with_paths((0..14).map(|light| PathCount { light, paths }))
     }
 
     fn learned(cache: &VisibilityCache) -> LearnedVisibility {
@@ -243,11 +255,12 @@ mod tests {
     #[test]
     fn visibility_is_the_ratio_of_photons_to_those_expected_and_the_prior_without_any() {
         // A lamp above a floor: the irradiance I/h² corresponds to N·A/(4π h²) photons.
-        let lights = [Light::Point { p: AT + Vec3::Z * 3.0, intensity: Rgb::splat(7.0) }];
+        let lights = [Light::Point(PointLight { p: AT + Vec3::Z * 3.0, intensity: Rgb::splat(7.0) })];
         let ctx = LightCtx::on(AT, Vec3::Z);
         let of = |paths: f32| {
-            let cache = VisibilityCache::new(std::iter::once((AT, Vec3::Z, 0)), 0.1);
-            let cache = cache.with_paths(std::iter::once((0, paths)));
+            let photon = PrimaryPhoton { at: SurfacePoint { p: AT, n: Vec3::Z }, light: 0 };
+            let cache = VisibilityCache::new(&[photon], 0.1);
+            let cache = cache.with_paths(std::iter::once(PathCount { light: 0, paths }));
             let learned = LearnedVisibility::new(TreeChoice::of_lights(&lights, RADIUS, None), &lights, RADIUS, &cache);
             let importance = learned.importance(&ctx, 0);
             move |count| learned.visibility(0, importance, count)
@@ -270,7 +283,7 @@ mod tests {
             let cache = cache(seen, count, paths);
             let learned = learned(&cache);
             let ctx = LightCtx::on(AT, Vec3::Z);
-            let contributing = cache.lookup_with_sums(AT, Vec3::Z);
+            let contributing = cache.lookup(AT, Vec3::Z);
             assert_eq!(contributing.lights.len(), seen.len());
             let mut singles = Vec::new();
             learned.find_singles(&contributing, &mut singles);
@@ -280,12 +293,12 @@ mod tests {
             let mut s = pcg32([3, 1, 4]);
             let (mut means, mut squares) = ([0.0_f64; 14], [0.0_f64; 14]);
             for _ in 0..draws {
-                let unseen = learned.sample_unseen(&ctx, (&contributing, &singles), s.random::<f32>()).unwrap();
-                let SampledLight { light, pmf, u } = unseen.choice;
+                let sampled = learned.sample_noncontributing(&ctx, &contributing, &singles, s.random::<f32>()).unwrap();
+                let SampledLight { light, pmf, u } = sampled.choice;
                 assert!((0.0..1.0).contains(&u) && pmf > 0.0);
-                assert_eq!(unseen.importance, learned.importance(&ctx, light));
+                assert_eq!(sampled.expected.importance, learned.importance(&ctx, light));
                 if !seen.contains(&light) {
-                    assert_eq!(learned.unseen_light(&ctx, (&contributing, &singles), light).choice.pmf, pmf);
+                    assert_eq!(learned.noncontributing_light(&ctx, &contributing, &singles, light).choice.pmf, pmf);
                 }
                 means[light as usize] += f64::from(1.0 / pmf) / f64::from(draws);
                 squares[light as usize] += f64::from(1.0 / pmf).powi(2) / f64::from(draws);
@@ -304,8 +317,9 @@ mod tests {
         let share_of_near = |paths: f32| {
             let cache = cache(&[5], 1, paths);
             let learned = learned(&cache);
-            let contributing = cache.lookup_with_sums(AT, Vec3::Z);
-            let near = |i: u32| learned.sample_unseen(&ctx, (&contributing, &[]), (i as f32 + 0.5) / 4096.0).unwrap();
+            let contributing = cache.lookup(AT, Vec3::Z);
+            let near =
+                |i: u32| learned.sample_noncontributing(&ctx, &contributing, &[], (i as f32 + 0.5) / 4096.0).unwrap();
             (0..4096).filter(|&i| near(i).choice.light < 3).count()
         };
         let [few, many] = [1.0, 1e6].map(share_of_near);
@@ -318,12 +332,13 @@ mod tests {
         let share_of_far = |seen: &[LightId], count: usize| {
             let cache = cache(seen, count, 1e5);
             let learned = learned(&cache);
-            let contributing = cache.lookup_with_sums(AT, Vec3::Z);
+            let contributing = cache.lookup(AT, Vec3::Z);
             let mut singles = Vec::new();
             learned.find_singles(&contributing, &mut singles);
             assert_eq!(singles.len(), if count == 1 { seen.len() } else { 0 });
-            let chosen =
-                |i: u32| learned.sample_unseen(&ctx, (&contributing, &singles), (i as f32 + 0.5) / 4096.0).unwrap();
+            let chosen = |i: u32| {
+                learned.sample_noncontributing(&ctx, &contributing, &singles, (i as f32 + 0.5) / 4096.0).unwrap()
+            };
             (0..4096).filter(|&i| (8..12).contains(&chosen(i).choice.light)).count()
         };
         let [none, many, single] = [share_of_far(&[], 0), share_of_far(&[9, 11], 50), share_of_far(&[9, 11], 1)];

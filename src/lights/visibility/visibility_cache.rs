@@ -11,17 +11,17 @@
 //! other side of a wall.
 //!
 //! A radius is safe if a visible light almost surely has a photon within it. If μ photons are expected, there is none
-//! with probability e^−μ. [`VisibilityCache::adapted`] chooses the radius at which a photon has on average
-//! [`SECURE_COUNT`] photons of its light around it.
+//! with probability e^−μ. [`VisibilityCache::adapted`] chooses the radius at which the photons found at a point have on
+//! average [`SECURE_COUNT`] photons of their light.
 
-use crate::lights::LightId;
+use crate::lights::{LightId, SurfacePoint};
 use lumiris_numbers::math::{Bounds3, Vec3};
 use rayon::prelude::*;
 
 /// Minimum cosine between a photon's normal and an axis direction for it to count on that side: cos(54.7° + 17.8°), the
 /// maximum angle between a direction and its nearest axis plus a margin.
 pub const SIDE_COS: f32 = 0.3;
-/// Mean number of photons of the same light around a photon, for [`VisibilityCache::adapted`].
+/// Mean number of photons of the same light in a lookup, for [`VisibilityCache::adapted`].
 pub const SECURE_COUNT: f64 = 128.0;
 /// Minimum and maximum radius of [`VisibilityCache::adapted`], relative to the radius of the scene.
 const RADIUS_RANGE: [f32; 2] = [1.0 / 4096.0, 1.0 / 16.0];
@@ -48,19 +48,56 @@ pub struct VisibilityCache {
     radius: f32,
     /// A hash table with linear probing, filled in the order of the keys.
     slots: Vec<Slot>,
-    /// Lights and their photon counts, cube by cube; ids ascend in each.
-    entries: Vec<(LightId, u32)>,
+    /// Photon counts of lights, cube by cube; ids ascend in each.
+    entries: Vec<PhotonCount>,
     /// Cumulative photon counts of each cube.
     sums: Vec<u32>,
-    /// Lights and their numbers of photon paths; ids ascend.
-    paths: Vec<(LightId, f32)>,
+    /// Numbers of photon paths; ids ascend.
+    paths: Vec<PathCount>,
+    /// Number of photons from which the cache was built.
+    photon_count: usize,
+}
+
+/// A photon that came straight from a light.
+#[derive(Clone, Copy, Debug)]
+pub struct PrimaryPhoton {
+    /// Where it arrived; the normal is on the illuminated side.
+    pub at: SurfacePoint,
+    /// Its light.
+    pub light: LightId,
+}
+
+/// The number of photons of a light around a point.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct PhotonCount {
+    /// The light.
+    pub light: LightId,
+    /// The number.
+    pub count: u32,
+}
+
+/// The number of photon paths from a light.
+#[derive(Clone, Copy, Debug)]
+pub struct PathCount {
+    /// The light.
+    pub light: LightId,
+    /// The number; an expected value if lights are chosen at random.
+    pub paths: f32,
+}
+
+/// The number of photons of a light in a cube, in the order of the cache.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+struct CubeCount {
+    key: u64,
+    light: LightId,
+    count: u32,
 }
 
 /// The contributing lights of a point.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct ContributingLights<'a> {
-    /// Lights and their photon counts, ids ascending.
-    pub lights: &'a [(LightId, u32)],
+    /// Photon counts, ids ascending.
+    pub lights: &'a [PhotonCount],
     /// Cumulative photon counts.
     pub sums: &'a [u32],
 }
@@ -68,14 +105,14 @@ pub struct ContributingLights<'a> {
 impl ContributingLights<'_> {
     /// Index of a light.
     #[inline]
-    pub fn place(&self, light: LightId) -> Option<usize> {
-        self.lights.binary_search_by_key(&light, |&(id, _)| id).ok()
+    pub fn index_of(&self, light: LightId) -> Option<usize> {
+        self.lights.binary_search_by_key(&light, |entry| entry.light).ok()
     }
 
     /// Number of photons of a light.
     #[inline]
     pub fn count(&self, light: LightId) -> u32 {
-        self.place(light).map_or(0, |i| self.lights[i].1)
+        self.index_of(light).map_or(0, |i| self.lights[i].count)
     }
 }
 
@@ -94,52 +131,18 @@ fn key_of([x, y, z]: [u64; 3], side: u64) -> u64 {
 
 /// The index of a cube along an axis for a distance from the origin in edges.
 #[inline]
-fn index_of(x: f32) -> u64 {
+fn cube_index(x: f32) -> u64 {
     // Casts saturate; NaN becomes 0
     (x as u64).min((1 << AXIS_BITS) - 1)
 }
 
 impl VisibilityCache {
-    /// Built from photons that came straight from lights: position, unit normal on the illuminated side, light.
-    /// `radius` (m) is enlarged if the scene has more than 2²⁰ cubes along an axis. Photons without a finite position
-    /// or without a normal are ignored.
-    pub fn new(primary: impl Iterator<Item = (Vec3, Vec3, LightId)>, radius: f32) -> Self {
-        let photons: Vec<_> = primary.collect();
-        VisibilityCache::of_photons(&photons, radius)
-    }
-
-    /// [`Self::new`] with a safe radius, bounded by `scene_radius` (m).
-    pub fn adapted(primary: &[(Vec3, Vec3, LightId)], scene_radius: f32) -> Self {
-        Self::adapted_by(primary, scene_radius, Self::mean_count)
-    }
-
-    /// [`Self::adapted`] to the points of later lookups: position and unit normal.
-    pub fn adapted_to(points: &[(Vec3, Vec3)], primary: &[(Vec3, Vec3, LightId)], scene_radius: f32) -> Self {
-        Self::adapted_by(primary, scene_radius, |cache| cache.mean_count_at(points))
-    }
-
-    fn adapted_by(
-        primary: &[(Vec3, Vec3, LightId)],
-        scene_radius: f32,
-        mean_count: impl Fn(&VisibilityCache) -> f64,
-    ) -> Self {
-        let [min, max] = RADIUS_RANGE.map(|share| share * scene_radius);
-        let mut cache = VisibilityCache::of_photons(primary, scene_radius / 64.0);
-        // Photon counts on a surface grow approximately with the square of the radius
-        for _ in 0..3 {
-            let ratio = (SECURE_COUNT / mean_count(&cache).max(1.0)).sqrt() as f32;
-            let radius = (cache.radius * ratio.clamp(0.125, 8.0)).clamp(min, max);
-            if (radius / cache.radius - 1.0).abs() < 0.1 {
-                break;
-            }
-            cache = VisibilityCache::of_photons(primary, radius);
-        }
-        cache
-    }
-
-    fn of_photons(photons: &[(Vec3, Vec3, LightId)], radius: f32) -> Self {
-        let photons = || photons.iter().filter(|(p, ..)| p.is_finite());
-        let bounds = Bounds3::from_points(photons().map(|&(p, ..)| p));
+    /// Built from photons. `radius` (m) is enlarged if the scene has more than 2²⁰ cubes along an axis. Photons without a
+    /// finite position or without a normal are ignored.
+    pub fn new(photons: &[PrimaryPhoton], radius: f32) -> Self {
+        let photon_count = photons.len();
+        let photons = || photons.iter().filter(|photon| photon.at.p.is_finite());
+        let bounds = Bounds3::from_points(photons().map(|photon| photon.at.p));
         let extent = if bounds.is_empty() { 0.0 } else { bounds.diagonal().max_element() };
         // Two cubes of margin at each end
         let radius = radius.max(extent / (2.0 * ((1_u64 << AXIS_BITS) - 8) as f32)).max(f32::MIN_POSITIVE);
@@ -148,31 +151,53 @@ impl VisibilityCache {
         let scale = 1.0 / edge;
 
         // Photons with the same 8 cubes, orientation and light are one item with their count
-        let mut items: Vec<(u64, LightId, u32)> = Vec::new();
-        for &(p, n, light) in photons() {
-            let lowest = ((p - origin) * scale - 0.5).to_array().map(index_of);
+        let mut items: Vec<CubeCount> = Vec::new();
+        for &PrimaryPhoton { at: SurfacePoint { p, n }, light } in photons() {
+            let lowest = ((p - origin) * scale - 0.5).to_array().map(cube_index);
             let sides = (0..6).filter(|&side| (if side & 1 == 0 { n[side / 2] } else { -n[side / 2] }) >= SIDE_COS);
-            items.extend(sides.map(|side| (key_of(lowest, side as u64), light, 1)));
+            items.extend(sides.map(|side| CubeCount { key: key_of(lowest, side as u64), light, count: 1 }));
         }
-        let mut ids: Vec<LightId> = photons().map(|&(.., light)| light).collect();
+
+        // Unless given, the number of paths of a light is the number of its photons
+        let mut ids: Vec<LightId> = photons().map(|photon| photon.light).collect();
         ids.par_sort_unstable();
-        let paths = ids.chunk_by(|a, b| a == b).map(|same| (same[0], same.len() as f32)).collect();
+        let of_light = |same: &[LightId]| PathCount { light: same[0], paths: same.len() as f32 };
+        let paths = ids.chunk_by(|a, b| a == b).map(of_light).collect();
+
+        // Spread the items over their 8 cubes
         let items = merged(items);
         let cubes = (0..8_u64).map(|i| key_of([i & 1, i >> 1 & 1, i >> 2], 0));
-        let spread = cubes.flat_map(|step| items.iter().map(move |&(key, light, count)| (key + step, light, count)));
-        VisibilityCache { paths, ..VisibilityCache::from_sorted(origin, radius, &merged(spread.collect())) }
+        let spread = cubes.flat_map(|step| items.iter().map(move |item| CubeCount { key: item.key + step, ..*item }));
+        let cache = VisibilityCache::from_sorted(origin, radius, &merged(spread.collect()));
+        VisibilityCache { paths, photon_count, ..cache }
+    }
+
+    /// [`Self::new`] with a safe radius for lookups at the given points, bounded by `scene_radius` (m).
+    pub fn adapted(points: &[SurfacePoint], photons: &[PrimaryPhoton], scene_radius: f32) -> Self {
+        let [min, max] = RADIUS_RANGE.map(|share| share * scene_radius);
+        let mut cache = VisibilityCache::new(photons, scene_radius / 64.0);
+        // Photon counts on a surface grow approximately with the square of the radius
+        for _ in 0..3 {
+            let ratio = (SECURE_COUNT / cache.mean_count_at(points).max(1.0)).sqrt() as f32;
+            let radius = (cache.radius * ratio.clamp(0.125, 8.0)).clamp(min, max);
+            if (radius / cache.radius - 1.0).abs() < 0.1 {
+                break;
+            }
+            cache = VisibilityCache::new(photons, radius);
+        }
+        cache
     }
 
     /// Sets the number of photon paths of each light, ids ascending, for scenes in which some photon paths did not
     /// reach a surface.
     #[must_use]
-    pub fn with_paths(self, paths: impl Iterator<Item = (LightId, f32)>) -> Self {
+    pub fn with_paths(self, paths: impl Iterator<Item = PathCount>) -> Self {
         VisibilityCache { paths: paths.collect(), ..self }
     }
 
-    fn from_sorted(origin: Vec3, radius: f32, items: &[(u64, LightId, u32)]) -> Self {
+    fn from_sorted(origin: Vec3, radius: f32, items: &[CubeCount]) -> Self {
         // A hash table with a load of at most one half
-        let cells = items.chunk_by(|a, b| a.0 == b.0);
+        let cells = items.chunk_by(|a, b| a.key == b.key);
         let slots = (2 * cells.clone().count()).next_power_of_two();
         let mut cache = VisibilityCache {
             origin,
@@ -182,16 +207,18 @@ impl VisibilityCache {
             entries: Vec::with_capacity(items.len()),
             sums: Vec::with_capacity(items.len()),
             paths: Vec::new(),
+            photon_count: 0,
         };
 
         // Entries and cumulative counts by cell
         for cell in cells {
-            let slot = cache.find(cell[0].0);
-            cache.slots[slot] = Slot { key: cell[0].0, first: cache.entries.len() as u32, len: cell.len() as u32 };
+            let key = cell[0].key;
+            let slot = cache.find(key);
+            cache.slots[slot] = Slot { key, first: cache.entries.len() as u32, len: cell.len() as u32 };
             let mut sum = 0_u32;
-            for &(_, light, count) in cell {
+            for &CubeCount { light, count, .. } in cell {
                 sum = sum.saturating_add(count);
-                cache.entries.push((light, count));
+                cache.entries.push(PhotonCount { light, count });
                 cache.sums.push(sum);
             }
         }
@@ -212,17 +239,21 @@ impl VisibilityCache {
     /// Restricts the cache to some of the lights.
     #[must_use]
     pub fn of_lights(self, is_light: impl Fn(LightId) -> bool) -> Self {
-        if self.entries.iter().all(|&(light, _)| is_light(light)) {
+        if self.entries.iter().all(|entry| is_light(entry.light)) {
             return self;
         }
         let items_of = |slot: &Slot| {
             let entries = &self.entries[slot.first as usize..(slot.first + slot.len) as usize];
-            entries.iter().map(|&(light, count)| (slot.key, light, count)).collect::<Vec<_>>()
+            entries
+                .iter()
+                .map(|&PhotonCount { light, count }| CubeCount { key: slot.key, light, count })
+                .collect::<Vec<_>>()
         };
         let mut items: Vec<_> = self.slots.iter().flat_map(items_of).collect();
-        items.retain(|&(_, light, _)| is_light(light));
+        items.retain(|item| is_light(item.light));
         items.sort_unstable();
-        VisibilityCache { paths: self.paths, ..VisibilityCache::from_sorted(self.origin, self.radius, &items) }
+        let cache = VisibilityCache::from_sorted(self.origin, self.radius, &items);
+        VisibilityCache { paths: self.paths, photon_count: self.photon_count, ..cache }
     }
 
     /// Area (m²) of a plane surface that a lookup covers: photons come from within r around a cube of edge 2r.
@@ -232,12 +263,17 @@ impl VisibilityCache {
 
     /// Number of photon paths of a light; by default, its number of photons.
     pub fn paths(&self, light: LightId) -> f32 {
-        self.paths.binary_search_by_key(&light, |&(id, _)| id).map_or(0.0, |i| self.paths[i].1)
+        self.paths.binary_search_by_key(&light, |entry| entry.light).map_or(0.0, |i| self.paths[i].paths)
     }
 
     /// The radius r (m) within which a lookup returns all photons.
     pub fn radius(&self) -> f32 {
         self.radius
+    }
+
+    /// Number of photons from which it was built.
+    pub fn photon_count(&self) -> usize {
+        self.photon_count
     }
 
     /// True if there was no photon.
@@ -247,34 +283,27 @@ impl VisibilityCache {
 
     /// Memory (bytes).
     pub fn bytes(&self) -> u64 {
-        let entry = size_of::<(LightId, u32)>() + size_of::<u32>();
+        let entry = size_of::<PhotonCount>() + size_of::<u32>();
         (self.slots.len() * size_of::<Slot>() + self.entries.len() * entry) as u64
     }
 
-    /// 𝓛_con of the point `p` on the side of the unit normal `n`, with photon counts; ids ascend. Empty without
-    /// photons, and for a zero normal.
+    /// 𝓛_con of the point `p` on the side of the unit normal `n`. Empty without photons, and for a zero normal.
     #[inline]
-    pub fn lookup(&self, p: Vec3, n: Vec3) -> &[(LightId, u32)] {
-        self.lookup_with_sums(p, n).lights
-    }
-
-    /// [`Self::lookup`] with cumulative counts.
-    #[inline]
-    pub fn lookup_with_sums(&self, p: Vec3, n: Vec3) -> ContributingLights<'_> {
+    pub fn lookup(&self, p: Vec3, n: Vec3) -> ContributingLights<'_> {
         if n == Vec3::ZERO {
             return ContributingLights::default();
         }
-        let place = ((p - self.origin) * self.scale).to_array().map(index_of);
-        let Slot { first, len, .. } = self.slots[self.find(key_of(place, side_of(n)))];
+        let cube = ((p - self.origin) * self.scale).to_array().map(cube_index);
+        let Slot { first, len, .. } = self.slots[self.find(key_of(cube, side_of(n)))];
         let range = first as usize..(first + len) as usize;
         ContributingLights { lights: &self.entries[range.clone()], sums: &self.sums[range] }
     }
 
     /// Mean over the points with photons: the expected count of a light, averaged over the photons of the lookup.
-    fn mean_count_at(&self, points: &[(Vec3, Vec3)]) -> f64 {
+    fn mean_count_at(&self, points: &[SurfacePoint]) -> f64 {
         let (mut sum, mut lit) = (0.0, 0);
-        for &(p, n) in points {
-            let counts = || self.lookup(p, n).iter().map(|&(_, count)| f64::from(count));
+        for &SurfacePoint { p, n } in points {
+            let counts = || self.lookup(p, n).lights.iter().map(|entry| f64::from(entry.count));
             let photons = counts().sum::<f64>();
             if photons > 0.0 {
                 sum += counts().map(|c| c * c).sum::<f64>() / photons;
@@ -283,22 +312,15 @@ impl VisibilityCache {
         }
         if lit > 0 { sum / f64::from(lit) } else { 0.0 }
     }
-
-    /// Mean over all photons: the number of photons of the same light in a lookup at their position.
-    pub fn mean_count(&self) -> f64 {
-        let sum = |f: fn(f64) -> f64| self.entries.iter().map(|&(_, count)| f(f64::from(count))).sum::<f64>();
-        let (photons, squares) = (sum(|c| c), sum(|c| c * c));
-        if photons > 0.0 { squares / photons } else { 0.0 }
-    }
 }
 
 /// Sorts the items and merges items of the same cube and light.
-fn merged(mut items: Vec<(u64, LightId, u32)>) -> Vec<(u64, LightId, u32)> {
+fn merged(mut items: Vec<CubeCount>) -> Vec<CubeCount> {
     items.par_sort_unstable();
     items.dedup_by(|next, kept| {
-        let is_same = (next.0, next.1) == (kept.0, kept.1);
+        let is_same = (next.key, next.light) == (kept.key, kept.light);
         if is_same {
-            kept.2 = kept.2.saturating_add(next.2);
+            kept.count = kept.count.saturating_add(next.count);
         }
         is_same
     });
@@ -312,41 +334,51 @@ mod tests {
     use lumiris_numbers::math::warp::sample_uniform_sphere;
     use lumiris_test_support::random::{RngExt, pcg32};
 
-    fn random_photons(count: usize, lights: u32) -> Vec<(Vec3, Vec3, LightId)> {
+    fn photon(p: Vec3, n: Vec3, light: LightId) -> PrimaryPhoton {
+        PrimaryPhoton { at: SurfacePoint { p, n }, light }
+    }
+
+    fn ids(contributing: ContributingLights<'_>) -> Vec<LightId> {
+        contributing.lights.iter().map(|entry| entry.light).collect()
+    }
+
+    fn random_photons(count: usize, lights: u32) -> Vec<PrimaryPhoton> {
         let mut s = pcg32([5, 5, 5]);
-        let photon = |_| {
+        let random = |_| {
             let [x, y] = s.random::<[f32; 2]>();
             let p = Vec3::new(x, y, s.random::<f32>()) * 4.0 - 1.0;
-            (p, sample_uniform_sphere(s.random::<[f32; 2]>()), (s.random::<f32>() * lights as f32) as LightId)
+            let n = sample_uniform_sphere(s.random::<[f32; 2]>());
+            photon(p, n, (s.random::<f32>() * lights as f32) as LightId)
         };
-        (0..count).map(photon).collect()
+        (0..count).map(random).collect()
     }
 
     #[test]
     fn every_photon_within_the_radius_on_the_same_side_is_found() {
         let photons = random_photons(20_000, 50);
         let radius = 0.1;
-        let cache = VisibilityCache::new(photons.iter().copied(), radius);
+        let cache = VisibilityCache::new(&photons, radius);
         let mut s = pcg32([6, 6, 6]);
         let mut found = 0;
         for _ in 0..2000 {
             let [x, y] = s.random::<[f32; 2]>();
             let (p, n) =
                 (Vec3::new(x, y, s.random::<f32>()) * 4.4 - 1.2, sample_uniform_sphere(s.random::<[f32; 2]>()));
-            let contributing = cache.lookup(p, n);
-            assert!(contributing.windows(2).all(|w| w[0].0 < w[1].0));
-            let near = |max: f32, turn: f32| {
-                let is_near =
-                    move |&&(q, m, _): &&(Vec3, Vec3, LightId)| (p - q).abs().max_element() <= max && n.dot(m) >= turn;
+            let contributing = cache.lookup(p, n).lights;
+            assert!(contributing.windows(2).all(|w| w[0].light < w[1].light));
+            let near = |max: f32, min_cos: f32| {
+                let is_near = move |photon: &&PrimaryPhoton| {
+                    (p - photon.at.p).abs().max_element() <= max && n.dot(photon.at.n) >= min_cos
+                };
                 photons.iter().filter(is_near)
             };
-            for (_, _, light) in near(radius * 0.999, 17.0_f32.to_radians().cos()) {
-                assert!(contributing.iter().any(|(id, _)| id == light));
+            for PrimaryPhoton { light, .. } in near(radius * 0.999, 17.0_f32.to_radians().cos()) {
+                assert!(contributing.iter().any(|entry| entry.light == *light));
                 found += 1;
             }
             // A lookup returns no photon beyond three radii or from the other side, and each photon only once.
-            for &(light, count) in contributing {
-                let max = near(radius * 3.001, -0.61).filter(|(_, _, id)| *id == light).count();
+            for &PhotonCount { light, count } in contributing {
+                let max = near(radius * 3.001, -0.61).filter(|photon| photon.light == light).count();
                 assert!(count as usize <= max, "{light} {count} {max}");
             }
         }
@@ -356,14 +388,16 @@ mod tests {
     #[test]
     fn both_sides_of_a_wall_have_contributing_lights_of_their_own() {
         let at = |x: f32, y: f32| Vec3::new(x, y, 1.0);
-        let photons = (0..100).flat_map(|i| {
-            let p = at((i % 10) as f32 * 0.1, (i / 10) as f32 * 0.1);
-            [(p, Vec3::Z, 3), (p, Vec3::NEG_Z, 7), (p + Vec3::Z * 5.0, Vec3::Z, 9)]
-        });
-        let cache = VisibilityCache::new(photons, 0.15);
+        let photons: Vec<_> = (0..100)
+            .flat_map(|i| {
+                let p = at((i % 10) as f32 * 0.1, (i / 10) as f32 * 0.1);
+                [photon(p, Vec3::Z, 3), photon(p, Vec3::NEG_Z, 7), photon(p + Vec3::Z * 5.0, Vec3::Z, 9)]
+            })
+            .collect();
+        let cache = VisibilityCache::new(&photons, 0.15);
 
         // Lookups on both sides, and outside of the cache
-        let lights = |p, n| cache.lookup(p, n).iter().map(|(id, _)| *id).collect::<Vec<_>>();
+        let lights = |p, n| ids(cache.lookup(p, n));
         assert_eq!(lights(at(0.5, 0.5), Vec3::Z), [3]);
         assert_eq!(lights(at(0.5, 0.5), Vec3::NEG_Z), [7]);
         assert!(lights(at(0.5, 0.5), Vec3::X).is_empty());
@@ -373,13 +407,14 @@ mod tests {
         assert!(cache.bytes() > 0 && cache.radius() == 0.15);
 
         // Counts
-        let contributing = cache.lookup_with_sums(at(0.5, 0.5), Vec3::Z);
-        assert_eq!(contributing.sums.last().copied(), Some(contributing.lights[0].1));
+        let contributing = cache.lookup(at(0.5, 0.5), Vec3::Z);
+        assert_eq!(contributing.sums.last().copied(), Some(contributing.lights[0].count));
         assert!(contributing.count(3) > 0 && contributing.count(8) == 0 && cache.paths(9) == 100.0);
 
         let some = cache.clone().of_lights(|light| light != 3);
-        assert_eq!(some.lookup(at(0.5, 0.5), Vec3::NEG_Z), cache.lookup(at(0.5, 0.5), Vec3::NEG_Z));
-        assert!(some.lookup(at(0.5, 0.5), Vec3::Z).is_empty());
+        let [some_below, all_below] = [&some, &cache].map(|cache| cache.lookup(at(0.5, 0.5), Vec3::NEG_Z).lights);
+        assert_eq!(some_below, all_below);
+        assert!(ids(some.lookup(at(0.5, 0.5), Vec3::Z)).is_empty());
         assert_eq!((some.paths(7), some.paths(11)), (100.0, 0.0));
     }
 
@@ -391,31 +426,30 @@ mod tests {
             let photons: Vec<_> = (0..count)
                 .map(|_| {
                     let [x, y] = s.random::<[f32; 2]>().map(|u| u * 10.0);
-                    (Vec3::new(x, y, 0.0), Vec3::Z, u32::from(x > 5.0) + 2 * u32::from(y > 5.0))
+                    photon(Vec3::new(x, y, 0.0), Vec3::Z, u32::from(x > 5.0) + 2 * u32::from(y > 5.0))
                 })
                 .collect();
-            let cache = VisibilityCache::adapted(&photons, 7.1);
-            assert!(
-                (SECURE_COUNT / 2.0..2.0 * SECURE_COUNT).contains(&cache.mean_count()),
-                "{} {}",
-                cache.radius(),
-                cache.mean_count()
-            );
-            let again = VisibilityCache::new(photons.iter().rev().copied(), cache.radius());
+            let points: Vec<_> = photons.iter().step_by(10).map(|photon| photon.at).collect();
+            let cache = VisibilityCache::adapted(&points, &photons, 7.1);
+            let mean = cache.mean_count_at(&points);
+            assert!((SECURE_COUNT / 2.0..2.0 * SECURE_COUNT).contains(&mean), "{} {mean}", cache.radius());
+            let reversed: Vec<_> = photons.iter().rev().copied().collect();
+            let again = VisibilityCache::new(&reversed, cache.radius());
             assert_eq!(cache.entries, again.entries, "the cache does not depend on the order of photons");
         }
     }
 
     #[test]
     fn no_photons_and_photons_in_one_place_are_handled() {
-        let none = VisibilityCache::new(std::iter::empty(), 1.0);
-        assert!(none.is_empty() && none.lookup(Vec3::ZERO, Vec3::Z).is_empty() && none.mean_count() == 0.0);
-        assert!(VisibilityCache::adapted(&[], 1.0).is_empty());
-        let same = [(Vec3::ONE, Vec3::Z, 1), (Vec3::splat(f32::NAN), Vec3::Z, 2), (Vec3::ONE, Vec3::ZERO, 3)];
-        assert_eq!(VisibilityCache::new(same.into_iter(), 0.0).lookup(Vec3::ONE, Vec3::Z), [(1, 1)]);
-        let far = [(Vec3::ZERO, Vec3::Z, 1), (Vec3::splat(1e9), Vec3::Z, 2)];
-        let cache = VisibilityCache::new(far.into_iter(), 1e-3);
-        assert_eq!(cache.lookup(Vec3::splat(1e9), Vec3::Z), [(2, 1)]);
-        assert_eq!(cache.lookup(Vec3::ZERO, Vec3::Z), [(1, 1)]);
+        let none = VisibilityCache::new(&[], 1.0);
+        assert!(none.is_empty() && ids(none.lookup(Vec3::ZERO, Vec3::Z)).is_empty());
+        assert!(VisibilityCache::adapted(&[SurfacePoint { p: Vec3::ZERO, n: Vec3::Z }], &[], 1.0).is_empty());
+        let same = [photon(Vec3::ONE, Vec3::Z, 1), photon(Vec3::NAN, Vec3::Z, 2), photon(Vec3::ONE, Vec3::ZERO, 3)];
+        let once = |light| [PhotonCount { light, count: 1 }];
+        assert_eq!(VisibilityCache::new(&same, 0.0).lookup(Vec3::ONE, Vec3::Z).lights, once(1));
+        let far = [photon(Vec3::ZERO, Vec3::Z, 1), photon(Vec3::splat(1e9), Vec3::Z, 2)];
+        let cache = VisibilityCache::new(&far, 1e-3);
+        assert_eq!(cache.lookup(Vec3::splat(1e9), Vec3::Z).lights, once(2));
+        assert_eq!(cache.lookup(Vec3::ZERO, Vec3::Z).lights, once(1));
     }
 }

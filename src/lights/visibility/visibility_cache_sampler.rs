@@ -12,9 +12,9 @@
 //! [`LightTree`]: crate::lights::LightTree
 
 use super::learned_visibility::facing_irradiance;
-use super::visibility_cache::{ContributingLights, VisibilityCache};
+use super::visibility_cache::{ContributingLights, PhotonCount, VisibilityCache};
 use crate::lights::tree::sampled_light::UNIT;
-use crate::lights::{Light, LightCtx, LightId, LightRun, SampledLight, TreeChoice};
+use crate::lights::{Light, LightCtx, LightId, LightRun, RunPositions, SampledLight, TreeChoice};
 use lumiris_numbers::math::{ONE_MINUS_EPSILON, cumulative};
 use std::sync::Arc;
 
@@ -33,23 +33,36 @@ pub struct VisibilityCacheSampler {
 }
 
 /// The contributing lights at a point, with their weights.
-struct Known<'a> {
-    contributing: ContributingLights<'a>,
+struct ContributingChoice<'a> {
+    lights: ContributingLights<'a>,
     /// Cumulative weights; unused if the weights are photon counts.
     sums: [f32; MAX_WEIGHTED],
     total: f32,
 }
 
-impl Known<'_> {
+/// The index of a contributing light, and the remapped random number.
+struct ChosenIndex {
+    i: usize,
+    u: f32,
+}
+
+impl ContributingChoice<'_> {
+    /// Light number `i`.
+    #[inline]
+    fn light(&self, i: usize) -> LightId {
+        self.lights.lights[i].light
+    }
+
+    /// True if the weights are photon counts.
     fn is_counted(&self) -> bool {
-        self.contributing.lights.len() > MAX_WEIGHTED
+        self.lights.lights.len() > MAX_WEIGHTED
     }
 
     /// Sum of the weights of the lights before index `i`.
     #[inline]
     fn sum_before(&self, i: usize) -> f32 {
         if self.is_counted() {
-            cumulative::sum_before(self.contributing.sums, i)
+            cumulative::sum_before(self.lights.sums, i)
         } else {
             cumulative::sum_before(&self.sums, i)
         }
@@ -63,24 +76,24 @@ impl Known<'_> {
 
     #[inline]
     fn pmf(&self, light: LightId) -> f32 {
-        self.contributing.place(light).map_or(0.0, |i| self.pmf_at(i))
+        self.lights.index_of(light).map_or(0.0, |i| self.pmf_at(i))
     }
 
     /// Chooses an index by `u` in [0, 1), and remaps `u` to be uniform again.
     #[inline]
-    fn choose(&self, u: f32) -> (usize, f32) {
+    fn choose(&self, u: f32) -> ChosenIndex {
         let x = u * self.total;
-        let count = self.contributing.lights.len();
-        let place = if self.is_counted() {
-            cumulative::find(self.contributing.sums, x)
+        let count = self.lights.lights.len();
+        let i = if self.is_counted() {
+            cumulative::find(self.lights.sums, x)
         } else {
             cumulative::find(&self.sums[..count], x)
         };
         // Rounding may reach the total: then take the last light with a weight
-        let place = if place < count { place } else { (0..count).rfind(|&i| self.pmf_at(i) > 0.0).unwrap_or(0) };
-        let before = self.sum_before(place);
-        let rest = (x - before) / (self.sum_before(place + 1) - before);
-        (place, rest.clamp(0.0, ONE_MINUS_EPSILON))
+        let i = if i < count { i } else { (0..count).rfind(|&i| self.pmf_at(i) > 0.0).unwrap_or(0) };
+        let before = self.sum_before(i);
+        let rest = (x - before) / (self.sum_before(i + 1) - before);
+        ChosenIndex { i, u: rest.clamp(0.0, ONE_MINUS_EPSILON) }
     }
 }
 
@@ -92,18 +105,18 @@ impl VisibilityCacheSampler {
 
     /// The contributing lights; `None` if none of them has a weight.
     #[inline]
-    fn known(&self, ctx: &LightCtx) -> Option<Known<'_>> {
-        let contributing = self.visibility_cache.as_ref()?.lookup_with_sums(ctx.p, ctx.n);
-        let mut known = Known { contributing, sums: [0.0; MAX_WEIGHTED], total: 0.0 };
-        if known.is_counted() {
-            known.total = contributing.sums.last().map_or(0.0, |&sum| sum as f32);
+    fn contributing(&self, ctx: &LightCtx) -> Option<ContributingChoice<'_>> {
+        let lights = self.visibility_cache.as_ref()?.lookup(ctx.p, ctx.n);
+        let mut choice = ContributingChoice { lights, sums: [0.0; MAX_WEIGHTED], total: 0.0 };
+        if choice.is_counted() {
+            choice.total = lights.sums.last().map_or(0.0, |&sum| sum as f32);
         } else {
-            for (sum, &(light, _)) in known.sums.iter_mut().zip(contributing.lights) {
-                known.total += self.weight(ctx, light);
-                *sum = known.total;
+            for (sum, &PhotonCount { light, .. }) in choice.sums.iter_mut().zip(lights.lights) {
+                choice.total += self.weight(ctx, light);
+                *sum = choice.total;
             }
         }
-        (known.total > 0.0 && known.total.is_finite()).then_some(known)
+        (choice.total > 0.0 && choice.total.is_finite()).then_some(choice)
     }
 
     #[inline]
@@ -117,54 +130,55 @@ impl VisibilityCacheSampler {
 
     #[inline]
     pub(in crate::lights) fn sample(&self, ctx: &LightCtx, u: f32) -> Option<SampledLight> {
-        let Some(known) = self.known(ctx) else { return self.base.sample(ctx, u) };
+        let Some(contributing) = self.contributing(ctx) else { return self.base.sample(ctx, u) };
         if u < BASE_FRACTION {
             let choice = self.base.sample(ctx, (u / BASE_FRACTION).min(ONE_MINUS_EPSILON))?;
-            let pmf = mixed(known.pmf(choice.light), choice.pmf);
+            let pmf = mixed(contributing.pmf(choice.light), choice.pmf);
             return Some(SampledLight { pmf, ..choice });
         }
-        let (place, u) = known.choose((u - BASE_FRACTION) / (1.0 - BASE_FRACTION));
-        let light = known.contributing.lights[place].0;
-        Some(SampledLight { light, pmf: mixed(known.pmf_at(place), self.base.pmf(ctx, light)), u })
+        let ChosenIndex { i, u } = contributing.choose((u - BASE_FRACTION) / (1.0 - BASE_FRACTION));
+        let light = contributing.light(i);
+        Some(SampledLight { light, pmf: mixed(contributing.pmf_at(i), self.base.pmf(ctx, light)), u })
     }
 
     #[inline]
     pub(in crate::lights) fn pmf(&self, ctx: &LightCtx, light: LightId) -> f32 {
         let base = self.base.pmf(ctx, light);
-        self.known(ctx).map_or(base, |known| mixed(known.pmf(light), base))
+        self.contributing(ctx).map_or(base, |contributing| mixed(contributing.pmf(light), base))
     }
 
     /// Runs of the contributing lights, then of the base; a light may have a run in each.
     pub(in crate::lights) fn runs(&self, ctx: &LightCtx, positions: &[u32], out: &mut Vec<LightRun>) {
-        let Some(known) = self.known(ctx) else {
-            self.base.runs(ctx, positions, 0, (0.0, 1.0), out);
+        let Some(contributing) = self.contributing(ctx) else {
+            self.base.runs(ctx, RunPositions::all(positions), out);
             return;
         };
 
         // Runs of the contributing lights
         let fraction = f64::from(1.0 - BASE_FRACTION);
-        let end_of = |i: usize| fraction * f64::from(known.sum_before(i + 1)) / f64::from(known.total);
-        let count = known.contributing.lights.len();
+        let end_of = |i: usize| fraction * f64::from(contributing.sum_before(i + 1)) / f64::from(contributing.total);
+        let count = contributing.lights.lights.len();
         let mut first = 0;
         while first < positions.len() && f64::from(positions[first]) * UNIT < fraction {
             let x = f64::from(positions[first]) * UNIT;
-            let place = cumulative::find_computed(count, end_of, x);
-            if place == count {
+            let i = cumulative::find_computed(count, end_of, x);
+            if i == count {
                 break;
             }
-            let interval = [if place > 0 { end_of(place - 1) } else { 0.0 }, end_of(place)];
+            let interval = [if i > 0 { end_of(i - 1) } else { 0.0 }, end_of(i)];
             let last = first + positions[first..].partition_point(|&p| f64::from(p) * UNIT < interval[1]);
-            let light = known.contributing.lights[place].0;
-            let pmf = mixed(known.pmf_at(place), self.base.pmf(ctx, light));
-            out.push(LightRun { light, pmf, places: [first as u32, last as u32], interval });
+            let light = contributing.light(i);
+            let pmf = mixed(contributing.pmf_at(i), self.base.pmf(ctx, light));
+            out.push(LightRun { light, pmf, range: [first as u32, last as u32], interval });
             first = last;
         }
 
         // Runs of the base, with the probabilities of both
         let of_base = out.len();
-        self.base.runs(ctx, positions, first, (fraction, BASE_FRACTION), out);
+        let at = RunPositions { positions, first, start: fraction, fraction: BASE_FRACTION };
+        self.base.runs(ctx, at, out);
         for run in &mut out[of_base..] {
-            run.pmf += (1.0 - BASE_FRACTION) * known.pmf(run.light);
+            run.pmf += (1.0 - BASE_FRACTION) * contributing.pmf(run.light);
         }
     }
 
@@ -175,11 +189,11 @@ impl VisibilityCacheSampler {
         group_of: impl Fn(LightId) -> Option<usize>,
         pmfs: &mut [f32],
     ) {
-        let Some(known) = self.known(ctx) else { return };
+        let Some(contributing) = self.contributing(ctx) else { return };
         pmfs.iter_mut().for_each(|p| *p *= BASE_FRACTION);
-        for (i, &(light, _)) in known.contributing.lights.iter().enumerate() {
+        for (i, &PhotonCount { light, .. }) in contributing.lights.lights.iter().enumerate() {
             if let Some(group) = group_of(light) {
-                pmfs[group] += (1.0 - BASE_FRACTION) * known.pmf_at(i);
+                pmfs[group] += (1.0 - BASE_FRACTION) * contributing.pmf_at(i);
             }
         }
     }
@@ -194,10 +208,10 @@ impl VisibilityCacheSampler {
         u: f32,
         base: impl Fn(f32) -> Option<SampledLight>,
     ) -> Option<SampledLight> {
-        let Some(known) = self.known(ctx) else { return base(u) };
-        let places = || (0..known.contributing.lights.len()).filter(|&i| is_in(known.contributing.lights[i].0));
-        let p_known = places().map(|i| known.pmf_at(i)).sum::<f32>();
-        let fraction = ((1.0 - BASE_FRACTION) * p_known / group_pmf).min(1.0);
+        let Some(contributing) = self.contributing(ctx) else { return base(u) };
+        let indices = || (0..contributing.lights.lights.len()).filter(|&i| is_in(contributing.light(i)));
+        let p_contributing = indices().map(|i| contributing.pmf_at(i)).sum::<f32>();
+        let fraction = ((1.0 - BASE_FRACTION) * p_contributing / group_pmf).min(1.0);
 
         // Choose by the base
         if u >= fraction {
@@ -206,24 +220,24 @@ impl VisibilityCacheSampler {
         }
 
         // Choose among the contributing lights of the group
-        let mut x = u / fraction * p_known;
+        let mut x = u / fraction * p_contributing;
         let mut chosen = None;
-        for i in places().filter(|&i| known.pmf_at(i) > 0.0) {
-            let p = known.pmf_at(i);
-            chosen = Some((i, (x / p).clamp(0.0, ONE_MINUS_EPSILON)));
+        for i in indices().filter(|&i| contributing.pmf_at(i) > 0.0) {
+            let p = contributing.pmf_at(i);
+            chosen = Some(ChosenIndex { i, u: (x / p).clamp(0.0, ONE_MINUS_EPSILON) });
             if x < p {
                 break;
             }
             x -= p;
         }
-        let (place, u) = chosen?;
-        let light = known.contributing.lights[place].0;
-        Some(SampledLight { light, pmf: mixed(known.pmf_at(place), self.base.pmf(ctx, light)), u })
+        let ChosenIndex { i, u } = chosen?;
+        let light = contributing.light(i);
+        Some(SampledLight { light, pmf: mixed(contributing.pmf_at(i), self.base.pmf(ctx, light)), u })
     }
 }
 
-/// The probability of a choice that has the probability `known` among the contributing lights and `base` in the base.
+/// The probability of a choice that has the probability `contributing` among the contributing lights and `base` in the base.
 #[inline]
-fn mixed(known: f32, base: f32) -> f32 {
-    (1.0 - BASE_FRACTION) * known + BASE_FRACTION * base
+fn mixed(contributing: f32, base: f32) -> f32 {
+    (1.0 - BASE_FRACTION) * contributing + BASE_FRACTION * base
 }

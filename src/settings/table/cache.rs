@@ -13,7 +13,7 @@ pub(super) const IRRADIANCE_CACHE: Group = Group {
         Setting {
             flag: "cached",
             parameters: &["cached"],
-            help: "What records hold: indirect light only, or direct light as well",
+            help: "Light stored in records: indirect only, or direct as well",
             applies: CACHE,
             ..row!(named("cached", Cached, integrator.cache.cached))
         },
@@ -21,8 +21,8 @@ pub(super) const IRRADIANCE_CACHE: Group = Group {
             flag: "cache-error",
             value_name: "KAPPA",
             parameters: &["cacheerror"],
-            help: "Maximum error of a record: it is used up to this fraction of the mean distance to the surfaces it \
-                   sees",
+            help: "Maximum error of a record: it is used up to this fraction of the mean distance to the surfaces visible \
+                   from it",
             applies: CACHE,
             ..row!(real("cache_error", Interval::open(0.0, 1.0), integrator.cache.error))
         },

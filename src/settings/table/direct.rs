@@ -6,7 +6,7 @@ use crate::settings::value::{Integers, Interval, Kind, Value};
 use crate::settings::{
     EstimatorKind, OcvForm, OptimalForm, ProposalPoints, Proposals, SamplingTechnique, Strata, Target,
 };
-use lumiris_numbers::estimators::mis::Heuristic;
+use lumiris_numbers::estimators::heuristics::Heuristic;
 use lumiris_numbers::estimators::ocv::MAX_COMPONENTS;
 use strum::VariantNames;
 
@@ -17,15 +17,15 @@ pub(super) const DIRECT: Group = Group {
         Setting {
             flag: "estimator",
             parameters: &["estimator"],
-            help: "Estimator of direct light at path vertices, or `auto`: what a rule chooses from what the camera sees",
+            help: "Estimator of direct light at path vertices, or `auto`: chosen by a rule from the surfaces visible to the camera",
             ..row!(named("estimator", EstimatorKind, integrator.estimator))
         },
         Setting {
             flag: "samples",
             parameters: &["samples"],
             help: "Samples per estimate (N): shadow rays per shading point, or `auto` for the estimator's default",
-            default: "auto: what --estimator auto chooses; 2 for mc, and for mis with more than one bounce; otherwise 4; ris halves \
-                      it at every bounce",
+            default: "auto: chosen by --estimator auto; otherwise 2 for mc, and for mis with more than one bounce, else 4; ris \
+                      halves it at every bounce",
             resolved: Some(|s| Some(Value::Integer(s.integrator.sample_counts().samples.into()))),
             ..row!(count_or("auto", "samples", 1, MAX_SAMPLES, integrator.samples))
         },
@@ -33,7 +33,7 @@ pub(super) const DIRECT: Group = Group {
             flag: "later-samples",
             parameters: &["latersamples"],
             help: "Samples per estimate at later vertices of a path than the first",
-            default: "auto: as many as at the first; ris halves them at every bounce",
+            default: "auto: the number at the first vertex; ris halves it at every bounce",
             applies: Applies::If(|s| s.integrator.depth() > 1, "paths of more than one bounce"),
             ..row!(count_or("auto", "later_samples", 1, MAX_SAMPLES, integrator.later_samples))
         },
@@ -76,7 +76,7 @@ pub(super) const RIS: Group = Group {
             key: "proposals",
             kind: Kind::Integer { range: Integers { min: 1, max: MAX_SAMPLES }, words: &["auto", "optimal"] },
             help: "Proposals per estimate (M): a number, `auto` (three for each sample) or `optimal` (per pixel, from variances \
-                   that a pilot finds)",
+                   measured by a pilot)",
             applies: Applies::Estimators(&[Ris]),
             get: |s| {
                 Some(match s.integrator.ris.proposals {
@@ -123,8 +123,9 @@ pub(super) const RIS: Group = Group {
         Setting {
             flag: "target",
             parameters: &["target"],
-            help: "Target density of resampling: f*G*L; with visibility V, where shading is more expensive than tracing rays; f*G*L with V estimated by the visibility cache (visibility), which may be a \
-                   control variate as well (visibility-control)",
+            help: "Target density of resampling: f*G*L (fgl); G*V or G*V*L with traced visibility V (gv, gvl), where shading \
+                   costs more than tracing rays; f*G*L*V with V estimated by the visibility cache (visibility), also as a \
+                   control variate (visibility-control)",
             applies: Applies::Estimators(&[Ris]),
             ..row!(named("target", Target, integrator.ris.target))
         },
@@ -142,7 +143,7 @@ pub(super) const CONTROL_VARIATES: Group = Group {
             old_parameters: &[("noncontributingsamples", "restsamples")],
             help: "Samples of contributing on non-contributing lights, in addition to --samples on the contributing \
                    ones; 0 leaves these lights out, which is biased",
-            default: "2; auto measures what is best",
+            default: "2; 1 or 2 chosen by --estimator auto",
             applies: Applies::Estimators(&[Contributing]),
             resolved: Some(|s| Some(Value::Integer(s.integrator.contributing.noncontributing_samples().into()))),
             ..row!(open_count(
@@ -170,8 +171,8 @@ pub(super) const CONTROL_VARIATES: Group = Group {
             flag: "ocv",
             value_name: "FORM",
             parameters: &["ocv"],
-            help: "What ocv fits the coefficients of its control variates to: the surrounding pixels, earlier samples of \
-                   the pixel, or (biased) the same samples",
+            help: "Samples to which ocv fits the coefficients of its control variates: of the surrounding pixels, earlier ones \
+                   of the pixel, or (biased) the same ones",
             applies: Applies::Estimators(&[Ocv]),
             ..row!(named("ocv", OcvForm, integrator.ocv.form))
         },

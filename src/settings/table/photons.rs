@@ -113,7 +113,7 @@ pub(super) const PHOTONS: Group = Group {
             key: "photon_radius",
             kind: Kind::Real { range: Interval::POSITIVE, words: &[] },
             help: "Initial radius of progressive photon mapping, which this option switches on",
-            default: "the distance of the K nearest photons where the camera looks",
+            default: "the distance of the K nearest photons at surfaces visible to the camera",
             applies: MAPS,
             get: |s| s.integrator.photons.progressive.and_then(|p| p.radius).map(Value::Real),
             set: |s, v| {

@@ -34,7 +34,7 @@ const REMOVED: &[Removed] = &[
         directive: Directive::Integrator,
         parameter: "stagetimes",
         key: "stage_times",
-        instead: "numbers of proposals do not depend on times",
+        instead: "proposal counts do not depend on measured times",
     },
     Removed {
         directive: Directive::Integrator,

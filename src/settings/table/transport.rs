@@ -54,9 +54,9 @@ pub(super) const TRANSPORT: Group = Group {
             flag: "path-reuse",
             value_name: "E",
             parameters: &["pathreuse"],
-            help: "Blocks of E × E pixels share what their paths find from the second diffuse vertex on, by E² − 1 shadow rays \
-                   more for each path: less noise, which is correlated within a block; 1: none do",
-            default: "auto: what --estimator auto chooses; 1 with others",
+            help: "Edge of the blocks of E × E pixels that share their paths from the second diffuse vertex on, at the cost of \
+                   E² − 1 shadow rays per path: less noise, which is correlated within a block; 1: no sharing",
+            default: "auto: chosen by --estimator auto, otherwise 1",
             applies: PATHS,
             resolved: Some(|s| Some(Value::Integer(s.integrator.path_reuse.unwrap_or(1).into()))),
             ..row!(count_or("auto", "path_reuse", 1, 16, integrator.path_reuse))
@@ -67,9 +67,9 @@ pub(super) const TRANSPORT: Group = Group {
             parameters: &["lightpaths"],
             key: "light_paths",
             kind: Kind::Real { range: Interval::closed(0.0, 64.0), words: &["auto"] },
-            help: "Light paths per camera sample that bring the light of emitting surfaces over metal and glass to diffuse \
-                   surfaces (caustics), which camera paths find by chance only; both share it; 0: none",
-            default: "auto: what --estimator auto chooses, or else 0",
+            help: "Light paths per camera sample, for caustics: light from emitting surfaces by way of metal and glass to \
+                   diffuse surfaces, which camera paths find only by chance. MIS combines both; 0: none",
+            default: "auto: chosen by --estimator auto, otherwise 0",
             applies: Applies::Integrators(&[IntegratorKind::Path]),
             get: |s| Some(s.integrator.light_paths.map_or(Value::Name("auto"), Value::Real)),
             resolved: Some(|s| Some(Value::Real(s.integrator.light_paths.unwrap_or(0.0)))),
@@ -85,8 +85,8 @@ pub(super) const TRANSPORT: Group = Group {
             parameters: &["lightgroups"],
             key: "light_groups",
             kind: Kind::Choice { names: &["layers", "none"], synonyms: &[] },
-            help: "What lights that name a group (\"string lightgroup\") have: a layer of the image for each group, light_NAME.R, \
-                   .G and .B, which add up to the image, or nothing",
+            help: "Layers of the image for light groups (\"string lightgroup\" of a light): light_NAME.R, .G and .B for each \
+                   group, which add up to the image; or none",
             get: |s| Some(Value::Name(if s.integrator.light_groups { "layers" } else { "none" })),
             set: |s, v| v.name().map(|name| s.integrator.light_groups = name == "layers"),
             ..Setting::BASE
@@ -112,7 +112,7 @@ pub(super) const TRANSPORT: Group = Group {
             parameters: &["infinitefraction"],
             help: "Fraction of the light samples by the light tree that go to lights at infinity: skies and suns",
             applies: Applies::If(|s| s.integrator.has_light_tree(), "the light samplers tree and photons"),
-            default: "as many to each of them as to all other lights together; auto measures what is best",
+            default: "each has the probability of all other lights together; --estimator auto measures it",
             ..row!(open_real("infinite_fraction", Interval::open(0.0, 1.0), integrator.infinite_fraction))
         },
         Setting {
@@ -148,15 +148,16 @@ pub(super) const SAMPLING: Group = Group {
             value_name: "K",
             directive: Directive::Sampler,
             parameters: &["pixelsamples"],
-            help: "Camera samples per pixel",
+            help: "Camera samples per pixel; the average over the image where sampling is adaptive (--allocation), and the \
+                   maximum with --noise",
             ..row!(count("spp", 1, MAX_U32, sampling.spp))
         },
         Setting {
             flag: "allocation",
             directive: Directive::Sampler,
             parameters: &["allocation"],
-            help: "Distribution of the camera samples over the pixels: as many in each, or more where a pilot finds more \
-                   noise, in about the time of --spp in each. Adaptive numbers are for the integrators direct and path, \
+            help: "Distribution of the camera samples over the pixels: the same number for each, or more where a pilot \
+                   measures more noise, in about the same time. Adaptive counts are for the integrators direct and path, \
                    from 8 samples per pixel on",
             default: "auto: adaptive with --estimator auto, otherwise uniform",
             resolved: Some(|s| Some(Value::Name(s.allocation().into()))),
@@ -169,9 +170,9 @@ pub(super) const SAMPLING: Group = Group {
             parameters: &["noise"],
             key: "noise",
             kind: Kind::Percentage { words: &["off"] },
-            help: "Standard error that every block of 16 x 16 pixels is to have, relative to its mean luminance plus 0.01, \
-                   such as 2% or 0.02. A pilot finds how many samples that takes; --spp is the maximum, 4096 if it is not given \
-                   as an option. For the integrators direct and path",
+            help: "Target standard error of every block of 16 x 16 pixels, relative to its mean luminance plus 0.01, such as \
+                   2% or 0.02: an aim, not a guarantee. A pilot estimates the samples that each block needs; --spp is the \
+                   maximum, 4096 unless given as an option. For the integrators direct and path",
             default: "off",
             get: |s| Some(s.sampling.noise.map_or(Value::Name("off"), Value::Real)),
             set: |s, v| {
@@ -198,9 +199,9 @@ pub(super) const SAMPLING: Group = Group {
             value_name: "K",
             directive: Directive::Sampler,
             parameters: &["pilotspp"],
-            help: "Camera samples per pixel that pilots are made for, if that is less than --spp: pilots take a part of their \
-                   time",
-            default: "--spp; with --time 64, or fewer where the time is short for the pixels",
+            help: "Camera samples per pixel that determine the length of pilots, if less than --spp: pilots take a fraction of \
+                   their time",
+            default: "--spp; with --time at most 64, fewer if the time per pixel is short",
             ..row!(open_count("pilot_spp", 1, MAX_U32, sampling.pilot_spp))
         },
         Setting {

@@ -8,7 +8,7 @@ use lumiris::settings::{
     Cached, EstimatorKind, IntegratorKind, OcvForm, OcvSettings, OptimalForm, ProposalPoints, Proposals,
     SamplingTechnique, Strata, Target,
 };
-use lumiris_numbers::estimators::mis::Heuristic;
+use lumiris_numbers::estimators::heuristics::Heuristic;
 use lumiris_numbers::samplers::SamplerKind;
 use std::fmt;
 use std::path::Path;

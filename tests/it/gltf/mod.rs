@@ -5,6 +5,7 @@ mod broken;
 mod materials;
 mod nodes;
 
+use lumiris::geometry::PrimitiveCounts;
 use lumiris::import::cache::FileCache;
 use lumiris::import::gltf::LightUnits;
 use lumiris::import::{LoadOptions, Loaded, load, load_text};
@@ -101,7 +102,7 @@ const PIXEL: &str = "iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAIAAACQd1PeAAAADElEQVR4nGN
 fn a_triangle_with_a_light_and_a_camera_is_read() {
     let folder = tempfile::tempdir().unwrap();
     let scene = loaded(folder.path(), &triangle()).unwrap().scene;
-    assert_eq!(scene.geometry.primitive_counts(), (1, 0, 0));
+    assert_eq!(scene.geometry.primitive_counts(), PrimitiveCounts { triangles: 1, ..PrimitiveCounts::default() });
     assert_eq!(scene.film.resolution, [1440, 720]);
     assert!((scene.lights.lights[0].phi(1.0) - 4.0 * std::f32::consts::PI).abs() < 1e-3, "683 cd are 1 W/sr");
 }

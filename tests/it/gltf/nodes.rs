@@ -44,7 +44,7 @@ fn hidden_nodes_and_their_children_are_left_out_but_for_cameras_and_joints() {
         );
         std::fs::write(&path, json).unwrap();
         let scene = load(&path, &LoadOptions::default()).map_err(|report| report.to_string()).unwrap().scene;
-        let points = scene.lights.lights.iter().filter(|light| matches!(light, Light::Point { .. })).count();
+        let points = scene.lights.lights.iter().filter(|light| matches!(light, Light::Point(_))).count();
         assert_eq!(scene.film.resolution, [1440, 720], "the camera is there");
         (scene.geometry.world_bounds().max.x, points)
     };

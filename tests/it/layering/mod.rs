@@ -43,6 +43,7 @@ const LAYERS: &[&[&str]] = &[
 
 /// Modules of the renderer whose `mod.rs` files define nothing.
 const INTERFACES_IN_FILES: &[&str] = &[
+    "imaging",
     "textures",
     "geometry",
     "bsdfs",
@@ -54,10 +55,12 @@ const INTERFACES_IN_FILES: &[&str] = &[
     "accel",
     "settings",
     "scene",
+    "import",
     "photons",
     "direct",
     "integrators",
     "render",
+    "planning",
 ];
 
 /// Modules of the numbers crate, with the modules that each may import.

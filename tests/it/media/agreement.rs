@@ -191,7 +191,7 @@ fn light_samples_find_what_glows_where_it_is_and_not_beyond_its_boundary() {
         assert!(p.cmpge(low).all() && p.cmple(high).all());
         let (r2, cos) = ((p - at).length_squared(), (p - at).normalize().z);
         let volume = fire.volume() / (steps * steps * steps) as f32;
-        let glow = fire.glow(unit).to_array();
+        let glow = fire.emission(unit).to_array();
         (0..3).for_each(|c| irradiance[c] += f64::from(glow[c] * cos / r2 * volume));
     }
     let rho = [0.5, 0.4, 0.8];

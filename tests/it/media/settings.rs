@@ -108,7 +108,7 @@ fn auto_has_light_samples_of_what_glows() {
             s.integrator.kind = if depth == 1 { IntegratorKind::Direct } else { IntegratorKind::Path };
         });
         let plan = prepare(&mut job, &Preparation::on(None)).unwrap();
-        assert!(job.lights.find_glows(), "{depth} bounces, {edge} pixels: {:?}", plan.chosen);
+        assert!(job.lights.samples_volumes(), "{depth} bounces, {edge} pixels: {:?}", plan.chosen);
     }
 }
 

@@ -34,7 +34,10 @@ pub struct OidnFilter {
 
 /// Declares [`Api`], and the symbol of each function.
 macro_rules! api {
-    ($($(#[doc = $doc:literal])* $symbol:literal fn $name:ident($($arg:ident: $type:ty),* $(,)?) $(-> $result:ty)?;)*) => {
+    ($(
+        $(#[doc = $doc:literal])*
+        $symbol:literal fn $name:ident($($arg:ident: $type:ty),* $(,)?) $(-> $result:ty)?;
+    )*) => {
         /// The functions. All of them are unsafe to call: names must end in a zero byte, objects must be live, and
         /// images must be valid as described until the filter has been executed.
         #[derive(Clone, Copy, Debug)]

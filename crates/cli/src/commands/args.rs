@@ -11,7 +11,7 @@ use super::part_args::{LONGEST, PartArgs};
 use super::settings_args::SettingsArgs;
 use super::watch_args::WatchArgs;
 use clap::builder::{BoolishValueParser, PossibleValuesParser, TypedValueParser};
-use clap::{Arg, ArgAction, Args};
+use clap::{ArgAction, Args};
 use lumiris::import::LoadOptions;
 use lumiris::import::gltf::LightUnits;
 use lumiris::render::output::Aov;
@@ -68,6 +68,10 @@ pub(super) struct SceneArgs {
     /// TMPDIR). Images are bit-identical [default: off]
     #[arg(long, value_name = "SIZE", value_parser = parse_limit)]
     pub texture_memory: Option<MemoryLimit>,
+    /// Folder for textures that later runs read by tiles, at once. Missing ones are added, changed images are noticed,
+    /// and several processes may share it. Images are bit-identical
+    #[arg(long, value_name = "FOLDER")]
+    pub texture_cache: Option<PathBuf>,
     /// Use a box filter of one pixel instead of the file's pixel filter
     #[arg(long)]
     pub box_filter: bool,
@@ -107,40 +111,6 @@ impl SceneArgs {
     }
 }
 
-/// Options of `render` that `-h` lists, in addition to `-h` itself.
-const IN_SHORT_HELP: [&str; 24] = [
-    "output",
-    "quiet",
-    "threads",
-    "plan",
-    "resolution",
-    "crop",
-    "camera",
-    "environment",
-    "frames",
-    "time",
-    "aov",
-    "integrator",
-    "max-depth",
-    "spp",
-    "noise",
-    "seed",
-    "estimator",
-    "samples",
-    "exposure",
-    "view-transform",
-    "denoise",
-    "view",
-    "checkpoint",
-    "resume",
-];
-
-/// Hides options that are not in [`IN_SHORT_HELP`] from `-h`.
-pub(super) fn in_short_help(option: Arg) -> Arg {
-    let is_hidden = option.get_long().is_some_and(|name| !IN_SHORT_HELP.contains(&name));
-    option.hide_short_help(is_hidden)
-}
-
 /// `lumiris render`
 #[derive(Args, Clone, Debug)]
 pub(super) struct RenderArgs {
@@ -163,8 +133,8 @@ pub(super) struct RenderArgs {
     /// With --frames: whether each frame has its own seed, computed from --seed and the frame number. The seed is in
     /// the metadata
     #[arg(
-        long, value_name = "on|off", default_value = "on", action = ArgAction::Set, value_parser = BoolishValueParser::new(),
-        requires = "frames"
+        long, value_name = "on|off", default_value = "on", action = ArgAction::Set,
+        value_parser = BoolishValueParser::new(), requires = "frames"
     )]
     pub seed_per_frame: bool,
     /// With --frames: skip frames whose images exist and were not interrupted by Ctrl-C

@@ -153,10 +153,11 @@ fn table(report: &Report) -> String {
     // Rays
     if let Some([ours, bare]) = report.build_seconds {
         text += &format!("\nbuild on all cores: renderer {ours:.3} s, bare {bare:.3} s\n");
-        text += "ratio: speed of the renderer by that of the bare loop, from medians of batches; of turns: median of whole runs (range)\n";
+        text += "ratio: speed of the renderer relative to the bare loop, from medians of batches;\n\
+                 whole runs: median (range) of the ratio of whole runs\n";
         text += &format!(
             "{:<22}{:>6}{:>10}{:>13}{:>13}{:>11}{:>20}\n",
-            "rays", "width", "rays", "Mrays/s", "bare Mrays/s", "ratio", "of turns"
+            "rays", "width", "rays", "Mrays/s", "bare Mrays/s", "ratio", "whole runs"
         );
     }
     for case in report.intersect.iter().chain(&report.t2) {

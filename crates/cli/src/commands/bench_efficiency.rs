@@ -260,7 +260,8 @@ fn between([low, high]: [f64; 2]) -> String {
 
 fn text(table: &Table) -> String {
     let mut text = format!(
-        "\n{}, {}, {} bounces; efficiency relative to the first row, [interval of 2 standard errors]\n{:<28}{:>8}{:>10}{:>11}{:>24}{:>11}{:>24}{:>11}{:>8}\n",
+        "\n{}, {}, {} bounces; efficiency relative to the first row, [interval of 2 standard errors]\n\
+         {:<28}{:>8}{:>10}{:>11}{:>24}{:>11}{:>24}{:>11}{:>8}\n",
         table.scene,
         table.integrator,
         table.max_depth,

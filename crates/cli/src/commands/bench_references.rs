@@ -2,7 +2,7 @@
 
 use super::args::SceneArgs;
 use super::progress;
-use anyhow::{Context, anyhow, bail};
+use anyhow::{Context, bail};
 use lumiris::film::PixelBounds;
 use lumiris::imaging::ColorChannels;
 use lumiris::imaging::oiio::{Part, ReadLimits, read_colors, write_image};
@@ -34,8 +34,7 @@ impl<'a> References<'a> {
         let keep = |folder: &'a Path| {
             // Fail before hours are spent if the folder cannot be created
             std::fs::create_dir_all(folder).with_context(|| format!("cannot create {}", folder.display()))?;
-            let fingerprint = files.fingerprint();
-            let fingerprint = fingerprint.map_err(|(path, e)| anyhow!("cannot read {}: {e}", path.display()))?;
+            let fingerprint = files.fingerprint()?;
             anyhow::Ok((folder, fingerprint))
         };
         Ok(References { scene, spp, kept: folder.map(keep).transpose()? })

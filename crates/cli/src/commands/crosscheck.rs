@@ -112,7 +112,8 @@ fn check_files(args: &CrosscheckArgs) -> anyhow::Result<()> {
 
 fn table(report: &Report) -> String {
     let mut text = format!(
-        "t equal within {T_TOLERANCE_ULPS} ulp of the largest coordinate; edge: the ray passes an edge within {EDGE_ULPS} ulp\n\
+        "t equal within {T_TOLERANCE_ULPS} ulp of the largest coordinate; edge: the ray passes an edge within \
+         {EDGE_ULPS} ulp\n\
          {:<10}{:>12}{:>12}{:>12}{:>8}{:>12}{:>14}{:>12}\n",
         "family", "rays", "hits", "equal", "ties", "edge flips", "disagreements", "max t ulps"
     );

@@ -44,12 +44,15 @@ pub(super) fn run(args: &DenoiseFileArgs) -> anyhow::Result<ExitCode> {
     // Check the arguments
     check_outputs(&args.output)?;
     if let Some(path) = args.output.iter().find(|path| is_part(path)) {
-        return Err(UsageError(format!("{}: a denoised image is no part of another", path.display())).into());
+        return Err(UsageError(format!("{}: a denoised image cannot be written as a part", path.display())).into());
     }
     args.look.check()?;
     if !is_exr(&args.input) {
         let path = args.input.display();
-        return Err(UsageError(format!("{path}: only EXR files hold what is denoised: linear light and layers")).into());
+        return Err(UsageError(format!(
+            "{path}: only EXR files have the linear light and the layers that denoising needs"
+        ))
+        .into());
     }
     let denoiser = open(args.oidn_library.as_deref(), args.threads)?;
 
@@ -60,7 +63,8 @@ pub(super) fn run(args: &DenoiseFileArgs) -> anyhow::Result<ExitCode> {
     let main = layer.part;
     if shares_paths(&parts) {
         progress::say(&format!(
-            "warning: {}: pixels share paths, and noise that they have in common is taken for detail: render with --path-reuse 1",
+            "warning: {}: pixels share paths, and the denoiser takes their common noise for detail: render with \
+             --path-reuse 1",
             args.input.display()
         ));
     }

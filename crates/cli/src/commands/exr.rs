@@ -69,7 +69,10 @@ pub(super) struct ExrArgs {
     #[arg(long, value_name = "TYPE", default_value = "float", value_parser = named::<ExrType>())]
     exr_type: ExrType,
     /// Compression. Cryptomatte layers need a lossless one: they get `zip` instead of pxr24, b44, b44a, dwaa or dwab
-    #[arg(long, value_name = "NAME", default_value = "zip", value_parser = PossibleValuesParser::new(COMPRESSIONS.map(|(name, _)| name)))]
+    #[arg(
+        long, value_name = "NAME", default_value = "zip",
+        value_parser = PossibleValuesParser::new(COMPRESSIONS.map(|(name, _)| name))
+    )]
     exr_compression: String,
     /// One part with all layers, or one part per layer
     #[arg(long, value_name = "PARTS", default_value = "single", value_parser = named::<ExrParts>())]
@@ -151,7 +154,10 @@ impl ExrArgs {
         write_rows(path, &self.parts(image, &parts), &values)?;
         let count = bright.into_iter().max().unwrap_or(0);
         Ok((count > 0).then(|| {
-            format!("warning: {count} pixels are brighter than 65504, and infinite as half floats; --exr-type float keeps them")
+            format!(
+                "warning: {count} pixels are brighter than 65504, the maximum of half floats, and become infinite; \
+                 --exr-type float keeps them"
+            )
         }))
     }
 

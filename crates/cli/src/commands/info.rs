@@ -58,7 +58,7 @@ fn facts(job: &RenderJob) -> Value {
     // Geometry
     let scene = &job.world.scene;
     let set = &scene.geometry;
-    let (triangles, quadrics, patches) = set.primitive_counts();
+    let counts = set.primitive_counts();
     let group_triangles = |group: &lumiris::geometry::Group| -> usize {
         let meshes = group.geometries.iter().map(|&id| match &set.geometries[id as usize].shape {
             Shape::Mesh(mesh) => mesh.triangle_count(),
@@ -77,9 +77,12 @@ fn facts(job: &RenderJob) -> Value {
         *materials.entry(entry.material.kind_name()).or_default() += 1;
     }
     let mut lights: BTreeMap<&str, usize> = BTreeMap::new();
-    for light in scene.lights.lights.iter().filter(|light| !matches!(light, Light::Glow(_))) {
+    for light in scene.lights.lights.iter().filter(|light| !matches!(light, Light::Volume(_))) {
         *lights.entry(light.kind_name()).or_default() += 1;
     }
+
+    let media = scene.media.names.iter().zip(&scene.media.media);
+    let media: BTreeMap<&String, &str> = media.map(|(name, medium)| (name, medium.kind_name())).collect();
 
     // Report
     let accel = job.world.accel.stats();
@@ -88,18 +91,18 @@ fn facts(job: &RenderJob) -> Value {
     json!({
         "geometry": {
             "geometries": set.geometries.len(),
-            "curves": set.curve_counts().0, "curve_pieces": set.curve_counts().1,
-            "triangles": triangles, "quadrics": quadrics, "patches": patches,
+            "curves": counts.curves, "curve_pieces": counts.curve_pieces,
+            "triangles": counts.triangles, "quadrics": counts.quadrics, "patches": counts.patches,
             "groups": set.groups.len(), "instances": set.instances.len(),
             "triangles_with_instances": group_triangles(&set.root) + instanced,
             "bounds": bounds,
         },
         "materials": materials,
         "lights": lights,
-        "media": scene.media.names.iter().zip(&scene.media.media).map(|(name, medium)| (name.clone(), medium.kind_name())).collect::<BTreeMap<_, _>>(),
+        "media": media,
         "textures": {
-            "float": scene.textures.floats.len(), "rgb": scene.textures.rgbs.len(), "images": scene.textures.images.len(),
-            "face_maps": scene.textures.face_maps.len(),
+            "float": scene.textures.floats.len(), "rgb": scene.textures.rgbs.len(),
+            "images": scene.textures.images.len(), "face_maps": scene.textures.face_maps.len(),
         },
         "memory": {
             "geometry_bytes": geometry_bytes(scene),
@@ -125,7 +128,8 @@ fn predicted(job: &RenderJob, has_layers: bool) -> Value {
     let prediction = predict(job, &Wanted { render: &render, cryptomattes: &[], is_denoised: false });
     let pixels = job.world.scene.film.bounds.area().max(1) as u64;
     json!({
-        "bytes": prediction.bytes(), "peak_bytes": most_taken().max(taken() + prediction.bytes()), "film_bytes": prediction.film, "film_bytes_per_pixel": prediction.film / pixels,
+        "bytes": prediction.bytes(), "peak_bytes": most_taken().max(taken() + prediction.bytes()),
+        "film_bytes": prediction.film, "film_bytes_per_pixel": prediction.film / pixels,
         "output_bytes": prediction.output, "fixed_bytes": prediction.fixed,
     })
 }

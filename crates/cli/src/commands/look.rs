@@ -43,7 +43,9 @@ enum View {
 #[command(next_help_heading = "PNG, JPEG, TIFF and TGA")]
 pub(super) struct LookArgs {
     /// Exposure in stops, or `auto`: the geometric mean of the luminance becomes middle grey
-    #[arg(long, value_name = "STOPS", default_value = "0", allow_negative_numbers = true, value_parser = parse_exposure)]
+    #[arg(
+        long, value_name = "STOPS", default_value = "0", allow_negative_numbers = true, value_parser = parse_exposure
+    )]
     exposure: Exposure,
     /// View transform. `ocio`: the view of the OpenColorIO configuration named by the environment variable OCIO
     #[arg(long, value_name = "NAME", default_value = "srgb", value_parser = view())]

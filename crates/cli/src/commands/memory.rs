@@ -63,7 +63,7 @@ pub(super) fn check(limit: Option<MemoryLimit>, prediction: &Prediction) -> anyh
     let needed = taken + prediction.bytes();
     if needed > limit {
         bail!(
-            "the image would need about {} ({needed} bytes): {} for the scene, {} for the film, {} for the rest. That is \
+            "the image would need about {} ({needed} bytes): {} for the scene, {} for the film, {} for the rest. This is \
              more than the {} that {origin}. --crop, --aov none and a lower --resolution need less, `--part-by tiles` \
              divides it; `--memory-limit SIZE|off` sets another limit",
             size(needed),

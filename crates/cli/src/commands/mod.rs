@@ -28,6 +28,7 @@ mod interrupt;
 mod laps;
 mod libraries;
 mod look;
+mod maketx;
 mod memory;
 mod merge;
 mod named;
@@ -45,6 +46,7 @@ mod rescue;
 mod settings;
 mod settings_args;
 mod shell;
+mod short_help;
 mod trials;
 mod typed_options;
 mod watch_args;
@@ -65,7 +67,7 @@ struct Cli {
 #[derive(Debug, Subcommand)]
 enum Command {
     /// Render a scene
-    #[command(mut_args(args::in_short_help))]
+    #[command(mut_args(short_help::with_example))]
     Render(Box<args::RenderArgs>),
     /// Measure the settings that a scene leaves open, and store the choices for render --plan
     Plan(plan::PlanArgs),
@@ -75,6 +77,8 @@ enum Command {
     Farm(farm::FarmArgs),
     /// Denoise an image with Open Image Denoise, guided by its layers
     Denoise(denoise::DenoiseFileArgs),
+    /// Convert images to tiled textures with all levels, which are read by tiles
+    Maketx(maketx::MaketxArgs),
     /// Compare images with a reference, by metrics and on an HTML page
     Compare(compare::CompareArgs),
     /// Compare Embree with the pure-Rust BVH, ray by ray and image by image
@@ -118,6 +122,7 @@ pub(crate) fn run() -> ExitCode {
         Command::Merge(args) => merge::run(args),
         Command::Denoise(args) => denoise::run(args),
         Command::Farm(args) => farm::run(args),
+        Command::Maketx(args) => maketx::run(args),
         Command::Compare(args) => compare::run(args),
         Command::Crosscheck(args) => crosscheck::run(args),
         Command::Bench(args) => bench::run(args),

@@ -169,6 +169,7 @@ pub(super) fn render_one(args: &RenderArgs, session: &Session, start: Instant) -
     laps::end("prepare", &[]);
     let loading = Loading::begin(outputs.iter().any(|path| !is_part(path)));
     let rendering = render_shown((&job, &settings), (canvas.as_ref(), &bar), continuation, preparing)?;
+    session.files.take_texture_warnings().iter().for_each(|warning| progress::say(&format!("warning: {warning}")));
     laps::end("passes", &[&rendering.phases[..], &[loading.end()]].concat());
     if interrupt::is_stopped() && rendering.film.summary().samples[1] == 0 {
         return Err(RenderError::Stopped.into());
@@ -397,8 +398,10 @@ fn stats(
         "cpu_seconds": laps.json(),
         "thread_seconds": thread_seconds,
         "counts": {
-            "replica_pixels": rendering.film.replicas().len(), "camera_rays": s.camera_rays, "bounce_rays": s.bounce_rays, "proposals": d.proposals,
-            "emitter_rays": d.emitter_rays, "shadow_segments": d.segments, "medium_collisions": s.collisions + d.collisions,
+            "replica_pixels": rendering.film.replicas().len(),
+            "camera_rays": s.camera_rays, "bounce_rays": s.bounce_rays, "proposals": d.proposals,
+            "emitter_rays": d.emitter_rays, "shadow_segments": d.segments,
+            "medium_collisions": s.collisions + d.collisions,
             "ocv_systems": d.systems, "ocv_ill_conditioned": d.ill_conditioned,
         },
         "rates": {

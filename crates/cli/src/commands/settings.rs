@@ -52,6 +52,9 @@ pub(super) fn load_scene(
     if let Some(MemoryLimit::Bytes(bytes)) = args.texture_memory {
         files.limit_textures(bytes);
     }
+    if let Some(folder) = &args.texture_cache {
+        files.cache_textures(folder).with_context(|| format!("--texture-cache {}", folder.display()))?;
+    }
     let options = args.load_options();
     let read = if is_standard_input(&args.scene) {
         let text = standard_input().context("the standard input cannot be read")?;
@@ -134,7 +137,8 @@ fn check_scene(args: &SceneArgs) -> anyhow::Result<()> {
     }
     if let Some(option) = args.load_options().of_gltf().filter(|_| !is_gltf(&args.scene)) {
         let text = format!(
-            "{option} is for glTF scenes: environment, camera, lights and time of a pbrt scene, such as {path}, are in its file"
+            "{option} is for glTF scenes: environment, camera, lights and time of a pbrt scene, such as {path}, are in \
+             its file"
         );
         return Err(UsageError(text).into());
     }
@@ -203,7 +207,7 @@ pub(super) fn plan(
     quiet: bool,
 ) -> anyhow::Result<PlanFile> {
     // Choose
-    let _preparing = interrupt::during(format!("measuring what the settings of {} leave open", args.name()));
+    let _preparing = interrupt::during(format!("completing the settings of {}", args.name()));
     let asked = *job.settings();
     let how = Preparation { threads: args.threads.map(|t| t as usize), observe: &progress::stage, ..*how };
     let plan = prepare(job, &how).map_err(RenderError::from)?;

@@ -15,11 +15,16 @@ const VIEW_PORT: u16 = 7575;
 #[command(next_help_heading = "Watching")]
 pub(super) struct WatchArgs {
     /// Show the image in tev while it converges [default address: 127.0.0.1:14158]
-    #[arg(long, value_name = "HOST[:PORT]", num_args = 0..=1, require_equals = true, default_missing_value = "127.0.0.1")]
+    #[arg(
+        long, value_name = "HOST[:PORT]", num_args = 0..=1, require_equals = true, default_missing_value = "127.0.0.1"
+    )]
     tev: Option<String>,
     /// Show the image on a web page while it converges, at an address or a port of this machine [default:
     /// 127.0.0.1:7575]
-    #[arg(long, value_name = "ADDRESS", num_args = 0..=1, require_equals = true, default_missing_value = "7575", value_parser = address)]
+    #[arg(
+        long, value_name = "ADDRESS", num_args = 0..=1, require_equals = true, default_missing_value = "7575",
+        value_parser = address
+    )]
     view: Option<SocketAddr>,
     /// Allow other machines to open the page, without password or encryption
     #[arg(long, requires = "view")]

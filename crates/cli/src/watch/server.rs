@@ -214,7 +214,8 @@ impl State {
             canvas.layers.iter().map(|l| json!({ "name": l.name, "channels": l.channels.len() })).collect();
         let progress = canvas.progress();
         json!({
-            "image": number, "name": canvas.name, "summary": canvas.summary.get(), "width": canvas.size[0], "height": canvas.size[1],
+            "image": number, "name": canvas.name, "summary": canvas.summary.get(),
+            "width": canvas.size[0], "height": canvas.size[1],
             "layers": layers, "finished": canvas.is_finished(), "version": canvas.version(),
             "done": progress.map_or(0, |p| p.samples_done), "total": progress.map_or(0, |p| p.samples_total),
             "seconds": progress.map_or(0.0, |p| p.elapsed.as_secs_f64()),

@@ -72,7 +72,7 @@ fn options_that_would_lose_the_image_itself_are_refused() {
         ("render scene.pbrt --denoise --part 1/2 -o a.part", "merge the parts"),
         ("render scene.pbrt --oidn-library a.so -o a.exr", "--denoise"),
         ("merge a.part --denoise -o a.png", "needs an EXR file"),
-        ("denoise in.exr -o a.part", "no part"),
+        ("denoise in.exr -o a.part", "as a part"),
         ("denoise in.png -o a.exr", "only EXR"),
     ] {
         // Impossible options are refused whether or not there is a library

@@ -43,5 +43,10 @@ fn the_name_of_lights_without_a_group_is_taken() {
     let folder = tempfile::tempdir().unwrap();
     let text = "WorldBegin\nLightSource \"infinite\" \"string lightgroup\" \"other\"\n";
     std::fs::write(folder.path().join("a.pbrt"), text).unwrap();
-    refuse("info a.pbrt", folder.path(), 3, &["a.pbrt:2:24", "light group `other` is that of lights that name none"]);
+    refuse(
+        "info a.pbrt",
+        folder.path(),
+        3,
+        &["a.pbrt:2:24", "light group `other` is reserved for lights without a group"],
+    );
 }

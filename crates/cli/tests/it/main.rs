@@ -20,4 +20,5 @@ mod plan;
 mod program;
 mod reproduce;
 mod shell;
+mod textures;
 mod watch;

@@ -107,7 +107,7 @@ impl Stage {
     /// Numbers of triangles and lights, for the page.
     pub fn facts(&self) -> (usize, usize) {
         let scene = &self.job.world.scene;
-        (scene.geometry.primitive_counts().0, scene.lights.lights.len())
+        (scene.geometry.primitive_counts().triangles, scene.lights.lights.len())
     }
 
     fn set(&mut self, method: &Method) {

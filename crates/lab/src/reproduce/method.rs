@@ -5,7 +5,7 @@ use lumiris::settings::{
     Cached, EstimatorKind, IntegratorKind, IntegratorSettings, OcvForm, OptimalForm, ProposalPoints, Proposals,
     Settings, Strata, Target,
 };
-use lumiris_numbers::estimators::mis::Heuristic;
+use lumiris_numbers::estimators::heuristics::Heuristic;
 use lumiris_numbers::samplers::SamplerKind;
 
 /// Light transport.

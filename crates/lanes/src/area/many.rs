@@ -89,8 +89,8 @@ fn spherical_place<S: Simd>(
     (u0, u1): (F<S>, F<S>),
 ) -> (F<S>, F<S>, F<S>, M<S>) {
     let simd = u0.token();
-    let seen = SphericalSetup::seen(rectangle, [widened(from.x), widened(from.y), widened(from.z)]);
-    let (s, t) = seen.place(widened(u0), widened(u1));
+    let seen = SphericalSetup::from_points(rectangle, [widened(from.x), widened(from.y), widened(from.z)]);
+    let (s, t) = seen.sample(widened(u0), widened(u1));
     let density = f64x8::splat(simd, 1.0) / seen.solid_angle;
     let density = narrowed(seen.is_accurate(rectangle).select(density, f64x8::splat(simd, 0.0)));
     let d = Vec3s::splat(simd, center).minus(from);

@@ -38,7 +38,7 @@ impl<S: Simd> SphericalSetup<S> {
 
     /// The setup for the points `from`.
     #[inline(always)]
-    pub(super) fn seen(rectangle: &Rectangle, from: [f64x8<S>; 3]) -> Self {
+    pub(super) fn from_points(rectangle: &Rectangle, from: [f64x8<S>; 3]) -> Self {
         let (corner, ex, ey) = (rectangle.corner.as_dvec3(), rectangle.ex.as_dvec3(), rectangle.ey.as_dvec3());
         let d = [-from[0] + corner.x, -from[1] + corner.y, -from[2] + corner.z];
         let (x0, y0, z0) = (dot(d, ex), dot(d, ey), -dot(d, ex.cross(ey)).abs());
@@ -56,7 +56,7 @@ impl<S: Simd> SphericalSetup<S> {
 
     /// Distances from the corner along the edges.
     #[inline(always)]
-    pub(super) fn place(&self, u0: f64x8<S>, u1: f64x8<S>) -> (f64x8<S>, f64x8<S>) {
+    pub(super) fn sample(&self, u0: f64x8<S>, u1: f64x8<S>) -> (f64x8<S>, f64x8<S>) {
         let simd = u0.token();
         let one = f64x8::splat(simd, 1.0);
         // cos and sin of u·S − (g2 + g3)

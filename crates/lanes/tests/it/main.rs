@@ -2,7 +2,6 @@
 #![allow(clippy::unwrap_used)]
 
 mod area;
-mod combine;
 mod connections;
 mod curve;
 mod environment;
@@ -10,6 +9,7 @@ mod kernels;
 mod lane;
 mod light;
 mod light_tree;
+mod ris_weights;
 mod sampler;
 mod sums;
 mod support;

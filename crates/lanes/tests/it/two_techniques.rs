@@ -1,7 +1,7 @@
-//! Proposals of two techniques weighted by [`lumiris_lanes::combine`], for an integral with a known value.
+//! Proposals of two techniques weighted by [`lumiris_lanes::ris_weights`], for an integral with a known value.
 
-use lumiris_lanes::combine;
-use lumiris_numbers::estimators::mis::Heuristic;
+use lumiris_lanes::ris_weights;
+use lumiris_numbers::estimators::heuristics::Heuristic;
 use lumiris_numbers::estimators::ris::systematic;
 use lumiris_numbers::estimators::stats::{Welford, sidak, z_test};
 use lumiris_test_support::integrals::{Integral, run};
@@ -63,7 +63,7 @@ impl Table {
         let ones = [1.0; (NUMBERS[0] + NUMBERS[1]) as usize];
         let first = NUMBERS[0] as usize;
         for (own, range) in [(0, 0..first), (1, first..self.x.len())] {
-            let proposals = combine::Proposals {
+            let proposals = ris_weights::Proposals {
                 f_cos: self.colour.each_ref().map(|c| &c[range.clone()]),
                 li: [&ones[range.clone()]; 3],
                 p: &self.p[own][range.clone()],
@@ -72,12 +72,12 @@ impl Table {
                 m_other: m[1 - own],
                 heuristic,
             };
-            let mut out = combine::Weights {
+            let mut out = ris_weights::Weights {
                 q_hat: &mut self.q_hat[range.clone()],
                 r: &mut self.r[range.clone()],
                 w: &mut self.weight[range.clone()],
             };
-            combine::combine(lumiris_lanes::level(), &proposals, &mut out);
+            ris_weights::weigh(lumiris_lanes::level(), &proposals, &mut out);
         }
     }
 }

@@ -4,7 +4,7 @@ use super::support::assert_same_bits;
 use lumiris_lanes::lane::LANES;
 use lumiris_lanes::level;
 use lumiris_lanes::vertex::*;
-use lumiris_numbers::estimators::mis::{Heuristic, Technique};
+use lumiris_numbers::estimators::heuristics::{Heuristic, Technique};
 use lumiris_numbers::math::Vec3;
 use lumiris_numbers::math::ray::{SEGMENT_END, offset_origin};
 use lumiris_numbers::math::warp::sample_uniform_sphere;

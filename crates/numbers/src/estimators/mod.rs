@@ -13,8 +13,8 @@
 
 pub mod correlated;
 pub mod efficiency;
+pub mod heuristics;
 pub mod mc;
-pub mod mis;
 pub mod ocv;
 pub mod optimal_mis;
 pub mod ris;

@@ -8,9 +8,9 @@
 //! once more by a hash of all bits of the seed, the domains, and the pixel or block, so that no two of them are
 //! correlated.
 
-mod domains;
+mod columns;
 
-pub use domains::{Domain, Split};
+pub use columns::{StreamColumns, StreamKind};
 
 use crate::math::ONE_MINUS_EPSILON;
 use crate::math::hash::{pcg4d, unit_f32};
@@ -18,7 +18,6 @@ use openqmc::bntables::{self, table_value};
 use openqmc::float::uint_to_float;
 use openqmc::owen::{scramble_and_reverse, shuffled_scrambled_sobol};
 use openqmc::rotate::rotate_bytes;
-use std::ops::Range;
 use strum::{EnumIter, EnumString, IntoStaticStr, VariantNames};
 
 /// The sequence.
@@ -50,15 +49,18 @@ impl SamplerKind {
 /// Domain of Russian roulette; an arbitrary reserved key.
 const ROULETTE: u32 = 0x9e37_79b9;
 
+/// Combined with the key of a stream of independent numbers to give its numbers.
+pub const INDEPENDENT: u32 = 0x5bd1_e995;
+
 /// Edge of the blocks of blue noise (pixels): small relative to the table of openqmc (256 pixels), so that blocks use
 /// different parts of it.
 const BLOCK: u32 = 16;
 
 /// A node in the tree of domains of one sample.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct SampleStream(Kind);
 
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Kind {
     Independent { key: [u32; 3] },
     Sobol(Net),
@@ -66,7 +68,7 @@ enum Kind {
 }
 
 /// A point of a net in the tree of domains.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Net {
     /// Hash of the seed, the domains, and the pixel or its block.
     key: [u32; 2],
@@ -102,24 +104,10 @@ impl Net {
         NetPoint { index: u32::from(self.index), seed: self.key[0], scramble: self.key[1] }
     }
 
-    /// Neighbouring pixels of a block have errors of opposite signs. Index and seed refer to a table with a random
-    /// offset and reflection, and the block has a single scramble.
     #[inline]
     fn blue_noise_point(&self) -> NetPoint {
-        let [first, scramble] = self.key;
-        let [mut x, mut y] = self.pixel.map(u16::from);
-        if first >> 16 & 1 != 0 {
-            (x, y) = (y, x);
-        }
-        if first >> 17 & 1 != 0 {
-            x = BLOCK as u16 - 1 - x;
-        }
-        if first >> 18 & 1 != 0 {
-            y = BLOCK as u16 - 1 - y;
-        }
-        let (keys, ranks) = (bntables::sobol::key_table(), bntables::sobol::rank_table());
-        let t = table_value::<8, 8, 0>(y << 8 | x, first as u16, keys, ranks);
-        NetPoint { index: u32::from(self.index) ^ t.rank, seed: t.key, scramble }
+        let BlueNoise { seed, rank } = BlueNoise::of(self.key[0], self.words()[2] >> 16);
+        NetPoint { index: u32::from(self.index) ^ rank, seed, scramble: self.key[1] }
     }
 
     /// A number that is independent of all others.
@@ -131,15 +119,45 @@ impl Net {
     }
 }
 
-/// A point of an Owen-scrambled Sobol' sequence in four dimensions, with a second Owen scramble.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct NetPoint {
-    /// Its index.
-    pub index: u32,
+/// Entry of the table of blue noise.
+#[derive(Clone, Copy, Debug)]
+pub struct BlueNoise {
     /// Seed of the sequence.
     pub seed: u32,
+    /// Combined with the index of a point by exclusive or.
+    pub rank: u32,
+}
+
+impl BlueNoise {
+    /// The entry of a pixel of a block; x of the pixel is in the lowest byte of `pixel`, y above it. Neighbouring pixels
+    /// of a block have errors of opposite signs: they have neighbouring entries, with an offset and a reflection by the
+    /// first word of the key, and the block has a single scramble.
+    #[inline]
+    pub fn of(key: u32, pixel: u32) -> Self {
+        let [mut x, mut y] = [pixel as u8, (pixel >> 8) as u8].map(u16::from);
+        if key >> 16 & 1 != 0 {
+            (x, y) = (y, x);
+        }
+        if key >> 17 & 1 != 0 {
+            x = BLOCK as u16 - 1 - x;
+        }
+        if key >> 18 & 1 != 0 {
+            y = BLOCK as u16 - 1 - y;
+        }
+        let (keys, ranks) = (bntables::sobol::key_table(), bntables::sobol::rank_table());
+        let entry = table_value::<8, 8, 0>(y << 8 | x, key as u16, keys, ranks);
+        BlueNoise { seed: entry.key, rank: entry.rank }
+    }
+}
+
+/// A point of an Owen-scrambled Sobol' sequence in four dimensions, with a second Owen scramble.
+#[derive(Clone, Copy, Debug)]
+struct NetPoint {
+    index: u32,
+    /// Seed of the sequence.
+    seed: u32,
     /// Seed of the second scramble.
-    pub scramble: u32,
+    scramble: u32,
 }
 
 impl NetPoint {
@@ -173,47 +191,6 @@ impl SampleStream {
         })
     }
 
-    /// Appends the root streams of some samples of a pixel, and the points of their domains `key`, if their numbers are
-    /// points of a sequence. Hashes of a net shared by samples are computed once.
-    pub fn append(
-        (kind, pixel, seed): (SamplerKind, [u32; 2], u32),
-        samples: Range<u32>,
-        key: u32,
-        (roots, points): (&mut Vec<Self>, &mut Vec<NetPoint>),
-    ) {
-        let mut start = samples.start;
-        while start < samples.end {
-            let root = SampleStream::new(kind, pixel, start, seed);
-            let point = root.domain(key).net_point();
-            let end = match kind {
-                SamplerKind::Independent | SamplerKind::Stratified => start + 1,
-                // The index of a point has 16 bits
-                SamplerKind::Sobol | SamplerKind::SobolBlueNoise => (start | 0xffff).saturating_add(1).min(samples.end),
-            };
-            // Copies that differ in one number: reading a whole value just after writing its parts would stall the
-            // processor
-            let count = (end - start) as usize;
-            let (first, first_point) = (roots.len(), points.len());
-            roots.resize(first + count, root);
-            roots[first..].iter_mut().zip(start..end).skip(1).for_each(|(root, sample)| root.set_index(sample as u16));
-            if let Some(point) = point {
-                points.resize(first_point + count, point);
-                let of_samples = points[first_point..].iter_mut().zip(start..end);
-                of_samples.for_each(|(point, sample)| point.index ^= u32::from((sample ^ start) as u16));
-            }
-            start = end;
-        }
-    }
-
-    /// Moves it to another point of its net.
-    #[inline]
-    fn set_index(&mut self, index: u16) {
-        match &mut self.0 {
-            Kind::Independent { .. } => {}
-            Kind::Sobol(net) | Kind::SobolBlueNoise(net) => net.index = index,
-        }
-    }
-
     /// The domain `key` below this node.
     #[inline]
     pub fn domain(&self, key: u32) -> Self {
@@ -242,7 +219,7 @@ impl SampleStream {
     pub fn draw<const N: usize>(&self) -> [f32; N] {
         let mut u: [f32; N] = match &self.0 {
             Kind::Independent { key } => {
-                let h = pcg4d([key[0], key[1], key[2], 0x5bd1_e995]);
+                let h = pcg4d([key[0], key[1], key[2], INDEPENDENT]);
                 std::array::from_fn(|i| unit_f32(h[i]))
             }
             Kind::Sobol(net) => net.point().coordinates(),
@@ -252,16 +229,6 @@ impl SampleStream {
             *x = x.min(ONE_MINUS_EPSILON);
         }
         u
-    }
-
-    /// The point whose coordinates [`draw`](Self::draw) returns; `None` if the numbers are independent.
-    #[inline]
-    pub fn net_point(&self) -> Option<NetPoint> {
-        match &self.0 {
-            Kind::Independent { .. } => None,
-            Kind::Sobol(net) => Some(net.point()),
-            Kind::SobolBlueNoise(net) => Some(net.blue_noise_point()),
-        }
     }
 
     /// One number in [0, 1) of a sub-domain, for decisions that do not benefit from stratification (Russian roulette).
@@ -286,22 +253,6 @@ mod tests {
             let draw = |seed| SampleStream::new(kind, [3, 9], 17, seed).domain(4).split(2, 8, 5).draw::<4>();
             assert_eq!(draw(1), draw(1));
             assert_ne!(draw(1), draw(2));
-        }
-    }
-
-    #[test]
-    fn samples_of_a_pixel_have_the_streams_and_points_of_each_by_itself() {
-        for kind in SamplerKind::iter() {
-            for samples in [0..0, 5..6, 7..90, 65_500..65_600, u32::MAX - 9..u32::MAX] {
-                let (mut roots, mut points) = (Vec::new(), Vec::new());
-                SampleStream::append((kind, [70, 9], 3), samples.clone(), 4, (&mut roots, &mut points));
-                assert_eq!(roots.len(), samples.len());
-                for (i, sample) in samples.clone().enumerate() {
-                    let stream = SampleStream::new(kind, [70, 9], sample, 3);
-                    assert_eq!(roots[i].domain(6).draw::<4>(), stream.domain(6).draw::<4>(), "{kind:?} {sample}");
-                    assert_eq!(points.get(i).copied(), stream.domain(4).net_point(), "{kind:?} {sample}");
-                }
-            }
         }
     }
 

@@ -2,7 +2,7 @@
 
 use super::mixtures::{DEGENERATE, Density, Mixture, PROPER, Sampler};
 use super::{assert_means, assert_variances, level, oracle};
-use lumiris_numbers::estimators::mis::{Heuristic, Technique};
+use lumiris_numbers::estimators::heuristics::{Heuristic, Technique};
 use lumiris_numbers::estimators::ocv::{Form, System};
 use lumiris_numbers::estimators::stats::{Welford, z_test};
 use lumiris_numbers::estimators::{correlated, optimal_mis};

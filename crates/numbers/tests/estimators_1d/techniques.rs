@@ -1,7 +1,7 @@
 //! Two techniques, on samples. On proposals they are weighted in lanes, and tested there.
 
 use super::assert_means;
-use lumiris_numbers::estimators::mis::{Heuristic, Technique};
+use lumiris_numbers::estimators::heuristics::{Heuristic, Technique};
 use lumiris_numbers::estimators::ris::with_replacement;
 use lumiris_test_support::integrals::{Integral, fill, run};
 use lumiris_test_support::random::RngExt;

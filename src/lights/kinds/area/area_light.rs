@@ -3,6 +3,7 @@
 use super::area_shape::AreaShape;
 use super::emission::{Emission, luminance_of};
 use super::plane::Plane;
+use super::quadric::DirectionBounds;
 use super::shape_sample::{ShapePoint, ShapeSample};
 use crate::lights::{LightBounds, LightCtx, LightHit, LightSample};
 use lumiris_numbers::math::{Rgb, Vec2, Vec3};
@@ -61,11 +62,11 @@ impl AreaLight {
     /// Multiplies a radiance by alpha at the point `p`.
     #[inline]
     fn covered(&self, l: Rgb, p: Vec3) -> Rgb {
-        match &self.emission.cover {
-            Some(cover) if !l.is_black() => {
+        match &self.emission.alpha {
+            Some(mask) if !l.is_black() => {
                 // A rectangle can be made of two triangles
                 let count = if matches!(self.shape, AreaShape::Rectangle(_)) { 2 } else { 1 };
-                l * cover.alpha((self.primitive, count), p, || self.uv(p))
+                l * mask.alpha(self.primitive, count, p, || self.uv(p))
             }
             _ => l,
         }
@@ -149,20 +150,25 @@ impl AreaLight {
 
     /// Bounds for the light tree.
     pub fn bounds(&self) -> LightBounds {
-        let (bounds, axis, cos_theta_o, projected_area) = match &self.shape {
-            AreaShape::Triangle(t) => (t.bounds(), t.n, 1.0, t.area),
-            AreaShape::Rectangle(r) => (r.bounds(), r.n, 1.0, r.area()),
-            AreaShape::Quadric(q) => q.emission_bounds(),
-            AreaShape::Patch(p) => (p.bounds(), p.cone_axis, p.cos_cone, p.area),
-        };
-        LightBounds {
+        // Bounds for a radiance of 1
+        let of = |bounds, axis, cos_theta_o, intensity| LightBounds {
             bounds,
             axis,
             cos_theta_o,
             cos_theta_e: 0.0,
             two_sided: self.emission.two_sided,
-            intensity: projected_area * self.mean_luminance(),
-        }
+            intensity,
+        };
+        let unit = match &self.shape {
+            AreaShape::Triangle(t) => of(t.bounds(), t.n, 1.0, t.area),
+            AreaShape::Rectangle(r) => of(r.bounds(), r.n, 1.0, r.area()),
+            AreaShape::Quadric(q) => {
+                let DirectionBounds { axis, cos, max_projected_area } = q.direction_bounds();
+                of(q.bounds(), axis, cos, max_projected_area)
+            }
+            AreaShape::Patch(p) => of(p.bounds(), p.cone_axis, p.cos_cone, p.area),
+        };
+        LightBounds { intensity: unit.intensity * self.mean_luminance(), ..unit }
     }
 
     /// True if no emitting side is visible from `p`: `p` is in the plane of a flat light, or behind a one-sided light.

@@ -1,6 +1,6 @@
 //! Emission of an area light's surface.
 
-use super::cover::Cover;
+use super::alpha_mask::AlphaMask;
 use crate::imaging::AxisWrap;
 use crate::lights::kinds::environment::cleaned;
 use glam::Affine2;
@@ -19,19 +19,19 @@ pub struct Emission {
     /// True if the vertex colours of a triangle mesh are a factor.
     pub has_vertex_colors: bool,
     /// The alpha texture of the surface, if it has one.
-    pub cover: Option<Arc<Cover>>,
+    pub alpha: Option<Arc<AlphaMask>>,
 }
 
 impl Emission {
     /// The same radiance everywhere, on the side of the normal.
     pub fn constant(l: Rgb) -> Self {
-        Emission { l, two_sided: false, image: None, has_vertex_colors: false, cover: None }
+        Emission { l, two_sided: false, image: None, has_vertex_colors: false, alpha: None }
     }
 
     /// True if the emission varies with the texture coordinates.
     #[inline]
     pub fn is_textured(&self) -> bool {
-        self.image.is_some() || self.cover.is_some()
+        self.image.is_some() || self.alpha.is_some()
     }
 
     /// Radiance at `uv` in direction `w`, where the normal is `n`.

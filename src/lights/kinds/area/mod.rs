@@ -9,10 +9,10 @@
 //! | [`quadric`] others | uniform in the area of the local quadric |
 //! | [`patch`] | uniform in (u, v) |
 
+pub mod alpha_mask;
 pub mod area_light;
 pub mod area_shape;
 pub mod build;
-pub mod cover;
 pub mod emission;
 pub mod patch;
 pub mod plane;
@@ -21,10 +21,10 @@ pub mod rectangle;
 mod shape_sample;
 pub mod triangle;
 
+pub use alpha_mask::AlphaMask;
 pub use area_light::AreaLight;
 pub use area_shape::AreaShape;
 pub use build::{AreaLights, area_lights_of};
-pub use cover::Cover;
 pub use emission::{Emission, EmissionImage, EmissionMapping};
 pub use patch::PatchLight;
 pub use plane::Plane;

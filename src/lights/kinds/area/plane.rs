@@ -4,6 +4,7 @@
 //! a tiny offset from the plane gives a large angle, so points within the rounding error count as on the plane.
 
 use super::area_shape::AreaShape;
+use super::quadric::DiskPlane;
 use lumiris_numbers::math::{Vec3, gamma};
 
 /// Bound of the rounding errors of a point of the plane, of the plane itself, and of the distance between them,
@@ -33,7 +34,7 @@ impl Plane {
                 let plane = Plane::new(&r.corners(), r.n);
                 Some(Plane { error: plane.error + r.flatness_error, ..plane })
             }
-            AreaShape::Quadric(quadric) => quadric.disk_plane().map(|([center, extent], n)| Plane {
+            AreaShape::Quadric(quadric) => quadric.disk_plane().map(|DiskPlane { center, extent, n }| Plane {
                 error: n.abs().dot(extent) * ROUNDING,
                 ..Plane::new(&[center], n)
             }),

@@ -6,6 +6,7 @@
 
 use super::shape_sample::{ShapePoint, ShapeSample, pdf_by_area};
 use crate::geometry::{Quadric, QuadricKind};
+use crate::lights::Sphere;
 use lumiris_numbers::math::warp::{
     azimuth, direction, pdf_uniform_cone, sample_uniform_cone, sample_uniform_disk_concentric,
 };
@@ -21,10 +22,45 @@ pub struct QuadricLight {
     local_area: f32,
     /// Area in world space.
     pub area: f32,
-    /// Centre and radius, if it is a full sphere in world space.
-    sphere: Option<(Vec3, f32)>,
+    /// The sphere in world space, if it is a full one.
+    sphere: Option<Sphere>,
     /// True if the normal is the reverse of the outward one (of +z for a disk).
     reversed: bool,
+}
+
+/// A point of the local surface, and its normal before flipping.
+struct LocalPoint {
+    p: Vec3,
+    n: Vec3,
+}
+
+/// The cone that a sphere subtends at a point.
+struct SubtendedCone {
+    /// 1 − cos θmax.
+    one_minus_cos: f32,
+    /// Unit direction to the centre.
+    axis: Vec3,
+    /// sin² θmax.
+    sin2: f32,
+}
+
+/// The plane of a disk.
+pub(super) struct DiskPlane {
+    pub(super) center: Vec3,
+    /// The largest coordinates of the terms that the points of the disk are sums of.
+    pub(super) extent: Vec3,
+    /// Unit normal.
+    pub(super) n: Vec3,
+}
+
+/// Bounds of the normals and of the projected area of a quadric.
+pub(super) struct DirectionBounds {
+    /// Axis and cosine of a cone about all normals.
+    pub(super) axis: Vec3,
+    pub(super) cos: f32,
+    /// Maximum intensity for a radiance of 1: a quarter of the area for full spheres, 1/π of it for full cylinders, half
+    /// of it for parts of them.
+    pub(super) max_projected_area: f32,
 }
 
 fn cofactor_matrix(m: &Mat3) -> Mat3 {
@@ -69,14 +105,14 @@ impl QuadricLight {
             reversed: (m.determinant() < 0.0) != quadric.flip_normal,
         };
         if let Some(radius) = sphere_radius(&quadric.kind, &m) {
-            light.sphere = Some((quadric.group_from_local.translation.into(), radius));
+            light.sphere = Some(Sphere { center: quadric.group_from_local.translation.into(), radius });
         }
         light.area = light.world_area();
         light
     }
 
-    /// Centre and radius, if it is a full sphere whose normal points outwards.
-    pub(in crate::lights) fn outward_sphere(&self) -> Option<(Vec3, f32)> {
+    /// The sphere, if it is a full one whose normal points outwards.
+    pub(in crate::lights) fn outward_sphere(&self) -> Option<Sphere> {
         self.sphere.filter(|_| !self.reversed)
     }
 
@@ -85,19 +121,19 @@ impl QuadricLight {
         const CELLS: u32 = 32;
         let sum: f64 = (0..CELLS * CELLS)
             .map(|i| [(i % CELLS) as f32 + 0.5, (i / CELLS) as f32 + 0.5].map(|x| x / CELLS as f32))
-            .map(|u| f64::from((self.cofactor * self.sample_local(u).1).length()))
+            .map(|u| f64::from((self.cofactor * self.sample_local(u).n).length()))
             .sum();
         let area = (sum / f64::from(CELLS * CELLS)) as f32 * self.local_area;
         if area.is_finite() { area } else { 0.0 }
     }
 
-    /// A point uniform in local area, and its normal before flipping.
-    fn sample_local(&self, u: [f32; 2]) -> (Vec3, Vec3) {
+    /// A point uniform in local area.
+    fn sample_local(&self, u: [f32; 2]) -> LocalPoint {
         match self.quadric.kind {
             QuadricKind::Sphere { radius, z_min, z_max, phi_max } => {
                 // Uniform in z (Archimedes)
                 let n = direction((z_max + (z_min - z_max) * u[0]) / radius, phi_max * u[1]);
-                (n * radius, n)
+                LocalPoint { p: n * radius, n }
             }
             QuadricKind::Disk { height, radius, inner_radius, phi_max } => {
                 let xy = if inner_radius <= 0.0 && phi_max >= TAU {
@@ -106,11 +142,11 @@ impl QuadricLight {
                     let r = safe_sqrt(sqr(inner_radius) + u[0] * (sqr(radius) - sqr(inner_radius)));
                     Vec2::from_angle(phi_max * u[1]) * r
                 };
-                (xy.extend(height), Vec3::Z)
+                LocalPoint { p: xy.extend(height), n: Vec3::Z }
             }
             QuadricKind::Cylinder { radius, z_min, z_max, phi_max } => {
                 let xy = Vec2::from_angle(phi_max * u[1]);
-                ((xy * radius).extend(z_min + (z_max - z_min) * u[0]), xy.extend(0.0))
+                LocalPoint { p: (xy * radius).extend(z_min + (z_max - z_min) * u[0]), n: xy.extend(0.0) }
             }
         }
     }
@@ -125,11 +161,10 @@ impl QuadricLight {
         }
     }
 
-    /// The cone that the sphere subtends at `from`: 1 − cos θmax, the unit direction to the centre, and sin²θmax.
-    /// `None` if the shape is not a full sphere or `from` is inside.
+    /// The cone that the sphere subtends at `from`. `None` if the shape is not a full sphere or `from` is inside.
     #[inline]
-    fn cone(&self, from: Vec3) -> Option<(f32, Vec3, f32)> {
-        let (center, radius) = self.sphere?;
+    fn cone(&self, from: Vec3) -> Option<SubtendedCone> {
+        let Sphere { center, radius } = self.sphere?;
         let d = center - from;
         let distance = d.length();
         if distance <= radius * (1.0 + ON_SURFACE) {
@@ -137,7 +172,7 @@ impl QuadricLight {
         }
         let sin2 = sqr(radius / distance);
         let cos = ((distance - radius) * (distance + radius)).sqrt() / distance;
-        Some((sin2 / (1.0 + cos), d / distance, sin2))
+        Some(SubtendedCone { one_minus_cos: sin2 / (1.0 + cos), axis: d / distance, sin2 })
     }
 
     pub(super) fn sample(&self, from: Vec3, u: [f32; 2]) -> Option<ShapeSample> {
@@ -151,8 +186,8 @@ impl QuadricLight {
         &self,
         from: Vec3,
         u: [f32; 2],
-        (center, radius): (Vec3, f32),
-        (one_minus_cos, axis, sin2_max): (f32, Vec3, f32),
+        Sphere { center, radius }: Sphere,
+        SubtendedCone { one_minus_cos, axis, sin2: sin2_max }: SubtendedCone,
     ) -> Option<ShapeSample> {
         // The point is computed from the angle α at the centre, which stays accurate for small and distant spheres: cos
         // α = sin²θ/sin θmax + cos θ·sqrt(1 − sin²θ/sin²θmax).
@@ -177,7 +212,7 @@ impl QuadricLight {
 
     /// A point uniform in the area of the local quadric.
     pub(super) fn sample_point(&self, u: [f32; 2]) -> ShapePoint {
-        let (local, local_n) = self.sample_local(u);
+        let LocalPoint { p: local, n: local_n } = self.sample_local(u);
         let to_world = &self.quadric.group_from_local;
         let scaled_n = self.cofactor * local_n;
         let jacobian = scaled_n.length();
@@ -191,7 +226,7 @@ impl QuadricLight {
     }
 
     pub(super) fn pdf(&self, from: Vec3, p: Vec3) -> f32 {
-        if let Some((one_minus_cos, ..)) = self.cone(from) {
+        if let Some(SubtendedCone { one_minus_cos, .. }) = self.cone(from) {
             return pdf_uniform_cone(one_minus_cos);
         }
         let scaled_n = self.cofactor * self.local_normal(self.quadric.local_from_group.transform_point3(p));
@@ -199,16 +234,16 @@ impl QuadricLight {
         pdf_by_area(from, p, scaled_n / jacobian, 1.0 / (self.local_area * jacobian))
     }
 
-    /// Two points and the unit normal of a disk's plane: a point of the plane, and the largest coordinates of the terms
-    /// that its points are sums of. `None` for other quadrics.
-    pub(super) fn disk_plane(&self) -> Option<([Vec3; 2], Vec3)> {
+    /// The plane of a disk; `None` for other quadrics.
+    pub(super) fn disk_plane(&self) -> Option<DiskPlane> {
         let QuadricKind::Disk { height, radius, .. } = self.quadric.kind else { return None };
         let m = self.quadric.group_from_local.as_daffine3();
         let n = m.matrix3.x_axis.cross(m.matrix3.y_axis).normalize_or_zero().as_vec3();
         let center = m.transform_point3(Vec3::new(0.0, 0.0, height).as_dvec3());
         let local = Vec3::new(radius, radius, height.abs()).as_dvec3();
         let extent = m.matrix3.abs() * local + m.translation.abs();
-        Some(([center.as_vec3(), extent.as_vec3()], if self.quadric.flip_normal { -n } else { n }))
+        let n = if self.quadric.flip_normal { -n } else { n };
+        Some(DiskPlane { center: center.as_vec3(), extent: extent.as_vec3(), n })
     }
 
     /// True if the side of the normal is not visible from `p`: `p` is outside a sphere whose normal points inwards, or
@@ -216,7 +251,7 @@ impl QuadricLight {
     #[inline]
     pub(super) fn is_behind(&self, p: Vec3) -> bool {
         match (self.quadric.kind, self.sphere) {
-            (QuadricKind::Sphere { .. }, Some((center, radius))) => {
+            (QuadricKind::Sphere { .. }, Some(Sphere { center, radius })) => {
                 // A point on the sphere, which rounding may put on either side, counts as inside.
                 let distance = p.distance(center);
                 let is_inside = distance < radius * (1.0 - ON_SURFACE);
@@ -227,20 +262,26 @@ impl QuadricLight {
         }
     }
 
-    /// Bounds, axis and cosine of the cone of normals, and the factor of the radiance in the maximum intensity: a
-    /// quarter of the area for full spheres, 1/π of it for full cylinders, half of it for parts of them.
-    pub(super) fn emission_bounds(&self) -> (Bounds3, Vec3, f32, f32) {
-        let bounds = self.quadric.bounds();
+    pub(super) fn bounds(&self) -> Bounds3 {
+        self.quadric.bounds()
+    }
+
+    /// Bounds of the normals and of the projected area.
+    pub(super) fn direction_bounds(&self) -> DirectionBounds {
+        let all = DirectionBounds { axis: Vec3::Z, cos: -1.0, max_projected_area: 0.0 };
         match self.quadric.kind {
             QuadricKind::Disk { .. } => {
                 let n = (self.cofactor * Vec3::Z).normalize_or_zero();
-                (bounds, if self.quadric.flip_normal { -n } else { n }, 1.0, self.area)
+                let axis = if self.quadric.flip_normal { -n } else { n };
+                DirectionBounds { axis, cos: 1.0, max_projected_area: self.area }
             }
             QuadricKind::Sphere { .. } => {
                 let factor = if self.sphere.is_some() { 0.25 } else { 0.5 };
-                (bounds, Vec3::Z, -1.0, self.area * factor)
+                DirectionBounds { max_projected_area: self.area * factor, ..all }
             }
-            QuadricKind::Cylinder { .. } => (bounds, Vec3::Z, -1.0, self.area * std::f32::consts::FRAC_1_PI),
+            QuadricKind::Cylinder { .. } => {
+                DirectionBounds { max_projected_area: self.area * std::f32::consts::FRAC_1_PI, ..all }
+            }
         }
     }
 
@@ -270,7 +311,7 @@ impl QuadricLight {
     /// face away from `from`.
     pub(crate) fn pdf_is_visible(&self, from: Vec3, p: Vec3) -> bool {
         match (self.cone(from), self.sphere) {
-            (Some(_), Some((center, _))) => (p - center).dot(from - p) > 0.0,
+            (Some(_), Some(Sphere { center, .. })) => (p - center).dot(from - p) > 0.0,
             _ => true,
         }
     }

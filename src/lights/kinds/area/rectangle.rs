@@ -11,6 +11,7 @@
 //! function, so they always agree.
 
 use super::shape_sample::{ShapePoint, ShapeSample, pdf_by_area};
+use glam::DVec2;
 use lumiris_lanes::area::many::MAX_EXTENT;
 use lumiris_lanes::area::spherical::{MIN_HEIGHT, MIN_SOLID_ANGLE};
 use lumiris_numbers::math::{Bounds3, Vec2, Vec3, gamma};
@@ -45,28 +46,28 @@ struct SphericalRectangle {
     z0: f64,
     /// Solid angle.
     solid_angle: f64,
-    /// e^{i(g2 + g3)} of the inner angles.
-    g23: (f64, f64),
+    /// e^{i(g2 + g3)} of the inner angles; x is the real part.
+    g23: DVec2,
 }
 
 /// The argument of a product of complex numbers, in [0, 2π); a negative zero of rounding is 0.
 #[inline]
-fn angle(z: (f64, f64)) -> f64 {
-    let a = z.1.atan2(z.0);
+fn angle(z: DVec2) -> f64 {
+    let a = z.y.atan2(z.x);
     if a < -1e-6 { a + TAU } else { a.max(0.0) }
 }
 
 #[inline]
-fn complex_product(a: (f64, f64), b: (f64, f64)) -> (f64, f64) {
-    (a.0 * b.0 - a.1 * b.1, a.0 * b.1 + a.1 * b.0)
+fn complex_product(a: DVec2, b: DVec2) -> DVec2 {
+    DVec2::new(a.x * b.x - a.y * b.y, a.x * b.y + a.y * b.x)
 }
 
 /// e^{i·g} up to a positive factor, as two pairwise products: for the inner angles at (x1, y0) and (x1, y1), and for
 /// the inner angles at (x0, y1) and (x0, y0).
 #[inline]
-fn inner_angles(x: [f64; 2], y: [f64; 2], z0: f64) -> [(f64, f64); 2] {
+fn inner_angles(x: [f64; 2], y: [f64; 2], z0: f64) -> [DVec2; 2] {
     let (xx, yy, zz) = ([x[0] * x[0], x[1] * x[1]], [y[0] * y[0], y[1] * y[1]], z0 * z0);
-    let corner = |i: usize, j: usize, sign: f64| (sign * x[i] * y[j], -z0 * (xx[i] + yy[j] + zz).sqrt());
+    let corner = |i: usize, j: usize, sign: f64| DVec2::new(sign * x[i] * y[j], -z0 * (xx[i] + yy[j] + zz).sqrt());
     [complex_product(corner(1, 0, 1.0), corner(1, 1, -1.0)), complex_product(corner(0, 1, 1.0), corner(0, 0, -1.0))]
 }
 
@@ -100,8 +101,9 @@ fn sample_spherical(spherical: &SphericalRectangle, u: [f32; 2]) -> [f64; 2] {
     let b1 = y[1] / (y[1] * y[1] + z0 * z0).sqrt();
     // cos and sin of u·S − (g2 + g3).
     let (sin_us, cos_us) = (f64::from(u[0]) * solid_angle).sin_cos();
-    let scale = 1.0 / (g23.0 * g23.0 + g23.1 * g23.1).sqrt();
-    let (cos, sin) = complex_product((cos_us, sin_us), (g23.0 * scale, -g23.1 * scale));
+    let scale = 1.0 / (g23.x * g23.x + g23.y * g23.y).sqrt();
+    let DVec2 { x: cos, y: sin } =
+        complex_product(DVec2::new(cos_us, sin_us), DVec2::new(g23.x * scale, -g23.y * scale));
     let fu = (cos * b0 - b1) / sin;
     let cu = (1.0 / (fu * fu + b0 * b0).sqrt()).copysign(fu).clamp(-1.0, 1.0);
     let xu = (-(cu * z0) / (1.0 - cu * cu).max(1e-300).sqrt()).clamp(x[0], x[1]);
@@ -111,6 +113,12 @@ fn sample_spherical(spherical: &SphericalRectangle, u: [f32; 2]) -> [f64; 2] {
     let hv = h[0] + f64::from(u[1]) * (h[1] - h[0]);
     let yv = (hv * (d2 / (1.0 - hv * hv).max(1e-300)).sqrt()).clamp(y[0], y[1]);
     [xu, yv]
+}
+
+/// A point, and the bound of its rounding error per axis.
+struct PointWithError {
+    p: Vec3,
+    p_error: Vec3,
 }
 
 impl RectangleLight {
@@ -131,7 +139,7 @@ impl RectangleLight {
             return ShapeSample::by_area(from, self.sample_point(u));
         };
         let [x, y] = sample_spherical(&spherical, u);
-        let (p, p_error) = self.point((x - spherical.x[0]) as f32, (y - spherical.y[0]) as f32);
+        let PointWithError { p, p_error } = self.point((x - spherical.x[0]) as f32, (y - spherical.y[0]) as f32);
         let d = p - from;
         let t = d.length();
         (t > 0.0).then(|| {
@@ -142,7 +150,7 @@ impl RectangleLight {
 
     #[inline]
     pub(super) fn sample_point(&self, u: [f32; 2]) -> ShapePoint {
-        let (p, p_error) = self.point(u[0] * self.size.x, u[1] * self.size.y);
+        let PointWithError { p, p_error } = self.point(u[0] * self.size.x, u[1] * self.size.y);
         ShapePoint { p, n: self.n, p_error, pdf_area: 1.0 / self.area() }
     }
 
@@ -154,17 +162,17 @@ impl RectangleLight {
         }
     }
 
-    /// The point at `s` along one edge and `t` along the other, and the bound of its error.
+    /// The point at `s` along one edge and `t` along the other.
     #[inline]
-    fn point(&self, s: f32, t: f32) -> (Vec3, Vec3) {
+    fn point(&self, s: f32, t: f32) -> PointWithError {
         let (x, y) = (self.ex * s, self.ey * t);
         let p_error = (self.corner.abs() + x.abs() + y.abs()) * gamma(6) + Vec3::splat(self.flatness_error);
-        (self.corner + x + y, p_error)
+        PointWithError { p: self.corner + x + y, p_error }
     }
 
     pub(super) fn corners(&self) -> [Vec3; 4] {
         let (w, h) = (self.size.x, self.size.y);
-        [(0.0, 0.0), (w, 0.0), (0.0, h), (w, h)].map(|(s, t)| self.point(s, t).0)
+        [(0.0, 0.0), (w, 0.0), (0.0, h), (w, h)].map(|(s, t)| self.point(s, t).p)
     }
 
     pub(super) fn bounds(&self) -> Bounds3 {

@@ -11,7 +11,7 @@ use super::cases::LONG_TURNS;
 use super::report::{Asked, HEADER, method_json, method_row, summary, variances};
 use super::truth::{Errors, Truth};
 use lumiris::settings::OcvForm;
-use lumiris_numbers::estimators::mis::Heuristic;
+use lumiris_numbers::estimators::heuristics::Heuristic;
 use serde_json::{Value, json};
 use std::time::{Duration, Instant};
 

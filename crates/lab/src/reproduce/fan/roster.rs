@@ -5,7 +5,7 @@
 use super::super::method::{Method, Points};
 use lumiris::lights::LightSamplerKind;
 use lumiris::settings::{OcvForm, OptimalForm, SampleCounts, Strata};
-use lumiris_numbers::estimators::mis::Heuristic;
+use lumiris_numbers::estimators::heuristics::Heuristic;
 
 /// Roles of the methods, in this order for each kind of sampling.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

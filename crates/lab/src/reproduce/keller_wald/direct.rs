@@ -165,8 +165,8 @@ fn measure(setup: &Setup<'_>, file: &str, time: Duration) -> Result<Outcome, Rep
 fn prepare_visibility_cache(setup: &Setup<'_>, stage: &mut Stage) -> (u64, f64) {
     let start = Instant::now();
     let visibility_cache = setup.pool.install(|| build_visibility_cache(stage.job()));
-    let count = visibility_cache.as_ref().map_or(0, |(_, count)| *count as u64);
-    stage.set_visibility_cache(visibility_cache.map(|(visibility_cache, _)| visibility_cache));
+    let count = visibility_cache.as_ref().map_or(0, |cache| cache.photon_count() as u64);
+    stage.set_visibility_cache(visibility_cache);
     (count, start.elapsed().as_secs_f64())
 }
 

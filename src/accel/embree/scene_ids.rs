@@ -34,7 +34,7 @@ pub(super) enum Refined {
 
 /// The numbering of a scene in Embree.
 #[derive(Debug)]
-pub(super) struct World {
+pub(super) struct SceneIds {
     /// The scene.
     pub set: Arc<GeometrySet>,
     /// Geometry of each id in Embree's root scene. Instances have the ids after them.
@@ -60,9 +60,9 @@ impl Refined {
     }
 }
 
-impl World {
+impl SceneIds {
     /// Assigns ids to everything that rays can hit.
-    pub(super) fn new(set: Arc<GeometrySet>) -> World {
+    pub(super) fn new(set: Arc<GeometrySet>) -> SceneIds {
         let members = |group: &Group| group.geometries.iter().copied().filter(|&id| can_be_met(&set, id)).collect();
         let groups: Vec<Vec<GeometryId>> = set.groups.iter().map(members).collect();
         let root = members(&set.root);
@@ -70,7 +70,7 @@ impl World {
         let instances =
             (0..set.instances.len() as u32).filter(|&i| filled(i) && set.instances[i as usize].is_usable()).collect();
         let group_from_world = set.instances.iter().map(Instance::group_from_world).collect();
-        World { root, groups, instances, group_from_world, set }
+        SceneIds { root, groups, instances, group_from_world, set }
     }
 
     /// The instance of an `instID`.

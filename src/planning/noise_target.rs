@@ -37,22 +37,22 @@ pub(super) fn counts_for(job: &RenderJob, threshold: f32, how: &Preparation<'_>)
     let bounds = job.world.scene.film.bounds;
     let blocks = bounds.tiles(BLOCK);
     let left = LeftToLightPaths::new(job, how);
-    let stage = Stage::new(how, "measuring how much noise there is", blocks.len());
+    let stage = Stage::new(how, "measuring the noise of each block", blocks.len());
     let of_block = |probe: &mut _, block| {
         how.goes_on()?;
-        let numbers = numbers_of_block(job, probe, block, seeds, threshold, how.stop);
+        let counts = counts_of_block(job, probe, block, seeds, threshold, how.stop);
         stage.add(1);
-        Ok(numbers)
+        Ok(counts)
     };
     let probe = || Probe::new(job, &left, FeatureSet::None);
-    let of_blocks: Vec<Numbers> = blocks.par_iter().map_init(probe, of_block).collect::<Result<_, PlanError>>()?;
+    let of_blocks: Vec<BlockCounts> = blocks.par_iter().map_init(probe, of_block).collect::<Result<_, PlanError>>()?;
 
     // Spread the counts over the pixels
     let (mut counts, mut emission_rays) = (vec![1; bounds.area()], vec![1; bounds.area()]);
-    for (block, numbers) in blocks.iter().zip(of_blocks) {
-        for (pixel, of_pixel) in block.pixels().zip(numbers.emission_rays) {
+    for (block, of_block) in blocks.iter().zip(of_blocks) {
+        for (pixel, of_pixel) in block.pixels().zip(of_block.emission_rays) {
             let pixel = bounds.index_of(pixel);
-            (counts[pixel], emission_rays[pixel]) = (numbers.samples, of_pixel);
+            (counts[pixel], emission_rays[pixel]) = (of_block.samples, of_pixel);
         }
     }
     if emission_rays.iter().all(|n| *n == 1) {
@@ -65,7 +65,7 @@ pub(super) fn counts_for(job: &RenderJob, threshold: f32, how: &Preparation<'_>)
 }
 
 /// Samples per pixel of a block, and emission rays per sample, pixel by pixel.
-struct Numbers {
+struct BlockCounts {
     samples: u32,
     emission_rays: Vec<u8>,
 }
@@ -80,14 +80,14 @@ struct Sums {
     costs: [f64; 2],
 }
 
-fn numbers_of_block(
+fn counts_of_block(
     job: &RenderJob,
     probe: &mut Probe<'_>,
     block: &PixelBounds,
     seeds: [u32; 2],
     threshold: f32,
     stop: &AtomicBool,
-) -> Numbers {
+) -> BlockCounts {
     // Settings of the samples and of emission rays
     let Settings { integrator, sampling } = job.settings();
     let integrator = &Estimator::without_fits(integrator, 0);
@@ -114,17 +114,23 @@ fn numbers_of_block(
 
         // Estimate the samples that are needed
         done = until;
-        let (needed, emission_rays) = numbers_for(&sums, block.width() as usize, done, threshold);
-        if needed <= f64::from(REACH * 2 * done) || 2 * done >= pilot_limit || stop.load(Ordering::Relaxed) {
-            return Numbers { samples: needed.clamp(1.0, f64::from(limit)) as u32, emission_rays };
+        let Needed { samples, emission_rays } = needed_for(&sums, block.width() as usize, done, threshold);
+        if samples <= f64::from(REACH * 2 * done) || 2 * done >= pilot_limit || stop.load(Ordering::Relaxed) {
+            return BlockCounts { samples: samples.clamp(1.0, f64::from(limit)) as u32, emission_rays };
         }
         until = 2 * done;
     }
 }
 
-/// Samples for a noise of `threshold`, and emission rays of each pixel. The pixels, in rows of `width`, have sums of
+/// Estimated samples per pixel of a block, without limits, and emission rays per sample, pixel by pixel.
+struct Needed {
+    samples: f64,
+    emission_rays: Vec<u8>,
+}
+
+/// The samples for a noise of `threshold`. The pixels, in rows of `width`, have sums of
 /// `n` samples of each seed.
-fn numbers_for(Sums { all, emission, costs }: &Sums, width: usize, n: u32, threshold: f32) -> (f64, Vec<u8>) {
+fn needed_for(Sums { all, emission, costs }: &Sums, width: usize, n: u32, threshold: f32) -> Needed {
     let pixels = all[0].len();
     let per_sample = 1.0 / f64::from(n);
     let luminances =
@@ -146,7 +152,7 @@ fn numbers_for(Sums { all, emission, costs }: &Sums, width: usize, n: u32, thres
     let count = pixels.max(1) as f64;
     let [mean, whole, rest] = [mean, whole, rest].map(|sum| sum / count);
     let samples = |variance: f64| (of_block(mean, variance) / f64::from(threshold)).powi(2).ceil();
-    let alone = (samples(whole), vec![1; pixels]);
+    let alone = Needed { samples: samples(whole), emission_rays: vec![1; pixels] };
     if emission_variance == 0.0 {
         return alone;
     }
@@ -163,7 +169,8 @@ fn numbers_for(Sums { all, emission, costs }: &Sums, width: usize, n: u32, thres
     if emission_rays < 2.0 || split * (cost + part * emission_rays * ray_cost) >= whole * cost {
         return alone;
     }
-    (samples(split), edges.into_iter().map(|is_edge| if is_edge { emission_rays as u8 } else { 1 }).collect())
+    let of_pixel = |is_edge| if is_edge { emission_rays as u8 } else { 1 };
+    Needed { samples: samples(split), emission_rays: edges.into_iter().map(of_pixel).collect() }
 }
 
 /// Marks pixels, in rows of `width`, whose value or a neighbour's is not 0: few samples do not hit an edge in all
@@ -194,12 +201,13 @@ mod tests {
         // Mean 1 and variance 1/3 of each of 4 samples
         let still = sums(4096, |_| 0.0);
         let expected = 1.0 / 3.0 / (0.02 * 1.01_f64).powi(2);
-        let (radiance, emission_rays) = numbers_for(&still, 64, 4, 0.02);
-        assert!((radiance / expected - 1.0).abs() < 0.07, "{radiance} {expected}");
+        let Needed { samples, emission_rays } = needed_for(&still, 64, 4, 0.02);
+        assert!((samples / expected - 1.0).abs() < 0.07, "{samples} {expected}");
         assert!(emission_rays.iter().all(|n| *n == 1));
         let black = || [0, 1].map(|_| vec![[0.0; 3]; 4]);
         let black = Sums { all: black(), emission: black(), costs: [1.0; 2] };
-        assert_eq!(numbers_for(&black, 2, 4, 0.02), (0.0, vec![1; 4]));
+        let Needed { samples, emission_rays } = needed_for(&black, 2, 4, 0.02);
+        assert_eq!((samples, emission_rays), (0.0, vec![1; 4]));
     }
 
     #[test]
@@ -207,7 +215,7 @@ mod tests {
         // One column of 64 covers the edge of a lamp
         let is_edge = |i: usize| i % 64 == 20;
         let lamp = sums(4096, |i| if is_edge(i) { 100.0 } else { 0.0 });
-        let (radiance, emission_rays) = numbers_for(&lamp, 64, 4, 0.02);
+        let Needed { samples, emission_rays } = needed_for(&lamp, 64, 4, 0.02);
         assert!((0..4096).all(|i| (emission_rays[i] > 1) == (19..=21).contains(&(i % 64))), "in pixels beside it, too");
         let n = f64::from(emission_rays[20]);
         // √(s c/(r c_look)), where s is the mean over three columns
@@ -215,9 +223,9 @@ mod tests {
         assert!((n / best - 1.0).abs() < 0.1, "{n} {best}");
         let wanted = |mean: f64| (0.02 * (mean + 0.01)).powi(2);
         let expected = (1.0 / 3.0 + 1e4 / 3.0 / 64.0 / n) / wanted(1.0 + 100.0 / 64.0);
-        assert!((radiance / expected - 1.0).abs() < 0.2, "{radiance} {expected}");
+        assert!((samples / expected - 1.0).abs() < 0.2, "{samples} {expected}");
         // If the rest varies as much, additional emission rays are not worth their time
         let faint = sums(4096, |i| if is_edge(i) { 0.2 } else { 0.0 });
-        assert!(numbers_for(&faint, 64, 4, 0.02).1.iter().all(|n| *n == 1));
+        assert!(needed_for(&faint, 64, 4, 0.02).emission_rays.iter().all(|n| *n == 1));
     }
 }

@@ -1,8 +1,8 @@
 //! Tests of `lumiris_lanes::combine`.
 
 use super::support::{LENGTHS, assert_same_bits, levels};
-use lumiris_lanes::combine::*;
-use lumiris_numbers::estimators::mis::{Heuristic, Technique};
+use lumiris_lanes::ris_weights::*;
+use lumiris_numbers::estimators::heuristics::{Heuristic, Technique};
 use lumiris_numbers::math::Rgb;
 use lumiris_test_support::random::{Pcg32, RngExt, pcg32};
 
@@ -27,7 +27,7 @@ fn weights_are_those_of_single_samples_to_the_bit_at_all_levels() {
             let (m, m_other) = (8.0, 3.0);
             let proposals = Proposals { f_cos, li, p: &v[6], p_other: &v[7], m, m_other, heuristic };
             assert_same_bits::<3>(n, |level, [q_hat, r, w]| {
-                combine(level, &proposals, &mut Weights { q_hat, r, w });
+                weigh(level, &proposals, &mut Weights { q_hat, r, w });
                 for i in 0..n {
                     let x = proposals.p[i] * m;
                     let product = Rgb::new(v[0][i] * v[3][i], v[1][i] * v[4][i], v[2][i] * v[5][i]);
@@ -59,7 +59,7 @@ fn weights_of_two_techniques_sum_to_one_at_the_edges_of_a_tie() {
                 let [mut q_hat, mut r, mut w] = [(); 3].map(|()| vec![0.0; p.len()]);
                 let (f_cos, heuristic) = ([&ones[..]; 3], Heuristic::Maximum);
                 let proposals = Proposals { f_cos, li: f_cos, p, p_other, m: 1.0, m_other: 1.0, heuristic };
-                combine(level, &proposals, &mut Weights { q_hat: &mut q_hat, r: &mut r, w: &mut w });
+                weigh(level, &proposals, &mut Weights { q_hat: &mut q_hat, r: &mut r, w: &mut w });
                 r.iter().zip(p).map(|(r, p)| r * p).collect::<Vec<_>>()
             };
             for level in levels() {

@@ -3,7 +3,7 @@
 
 use super::callbacks::first_filter;
 use super::context::{QueryContext, RtcContext, Ties};
-use super::world::World;
+use super::scene_ids::SceneIds;
 use crate::accel::RayBatch;
 use embree4_sys as sys;
 use lumiris_lanes::hits::BLOCK;
@@ -122,7 +122,7 @@ impl<const N: usize> RayHitPacket<N> {
 }
 
 /// The context of queries for a batch.
-pub(super) fn query_context<'a>(world: &'a World, rays: &'a RayBatch, mode: Mode) -> QueryContext<'a> {
+pub(super) fn query_context<'a>(world: &'a SceneIds, rays: &'a RayBatch, mode: Mode) -> QueryContext<'a> {
     let ties = if let QueryKind::First(ties) = mode.query { ties } else { Ties::Noted };
     QueryContext::new(rtc_context(mode), world, rays, ties)
 }

@@ -9,7 +9,7 @@ use std::sync::Arc;
 /// its radiance. Light samples therefore multiply the radiance by alpha, so that both techniques have the same
 /// expectation.
 #[derive(Clone)]
-pub struct Cover {
+pub struct AlphaMask {
     /// All shapes.
     pub geometry: Arc<GeometrySet>,
     /// The emitting geometry, in world space.
@@ -20,39 +20,45 @@ pub struct Cover {
     pub source: Arc<dyn AlphaSource>,
 }
 
-impl fmt::Debug for Cover {
+impl fmt::Debug for AlphaMask {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("Cover").field("id", &self.id).field("texture", &self.texture).finish_non_exhaustive()
+        f.debug_struct("AlphaMask").field("id", &self.id).field("texture", &self.texture).finish_non_exhaustive()
     }
 }
 
-impl Cover {
+impl AlphaMask {
     /// The alpha texture of a geometry; `None` if it has none.
-    pub fn of(geometry: &Arc<GeometrySet>, id: GeometryId, source: Arc<dyn AlphaSource>) -> Option<Arc<Cover>> {
+    pub fn of(geometry: &Arc<GeometrySet>, id: GeometryId, source: Arc<dyn AlphaSource>) -> Option<Arc<AlphaMask>> {
         let texture = geometry.geometries[id as usize].alpha?;
-        Some(Arc::new(Cover { geometry: Arc::clone(geometry), id, texture, source }))
+        Some(Arc::new(AlphaMask { geometry: Arc::clone(geometry), id, texture, source }))
     }
 
     /// Alpha, from 0 to 1, at the point `p` of a light with `count` primitives, the first of which is `first`. `uv`
     /// gives the texture coordinates at `p`; it is called for shapes other than triangle meshes.
-    pub(super) fn alpha(&self, (first, count): (u32, u32), p: Vec3, uv: impl FnOnce() -> Vec2) -> f32 {
+    pub(super) fn alpha(&self, first: u32, count: u32, p: Vec3, uv: impl FnOnce() -> Vec2) -> f32 {
         let shape = &self.geometry.geometries[self.id as usize].shape;
-        let (primitive, place) = match shape {
+        let PointOfMesh { primitive, uv: local } = match shape {
             Shape::Mesh(mesh) => triangle_at(mesh, first, count, p),
-            _ => (first, [0.0; 2]),
+            _ => PointOfMesh { primitive: first, uv: [0.0; 2] },
         };
         let st = match shape {
-            Shape::Mesh(_) => shape.texture_coordinates(primitive, place),
+            Shape::Mesh(_) => shape.texture_coordinates(primitive, local),
             _ => uv(),
         };
-        let alpha = self.source.alpha(self.texture, st, &shape.vertex_values(primitive, place), p);
+        let alpha = self.source.alpha(self.texture, st, &shape.vertex_values(primitive, local), p);
         if alpha.is_nan() { 0.0 } else { alpha.clamp(0.0, 1.0) }
     }
 }
 
-/// Index of the triangle that contains the point, among `count` triangles from `first` on, and the weights of its
-/// vertices 1 and 2 there.
-fn triangle_at(mesh: &TriangleMesh, first: u32, count: u32, p: Vec3) -> (u32, [f32; 2]) {
+/// A point of a primitive.
+struct PointOfMesh {
+    primitive: u32,
+    /// Weights of vertices 1 and 2 of a triangle.
+    uv: [f32; 2],
+}
+
+/// The point `p` in the triangle that contains it, among `count` triangles from `first` on.
+fn triangle_at(mesh: &TriangleMesh, first: u32, count: u32, p: Vec3) -> PointOfMesh {
     let weights = |i: u32| {
         let [a, b, c] = mesh.triangle(i as usize);
         // Least squares for p − a = b1·e1 + b2·e2
@@ -63,6 +69,7 @@ fn triangle_at(mesh: &TriangleMesh, first: u32, count: u32, p: Vec3) -> (u32, [f
         [(bb * x - ab * y) / determinant, (aa * y - ab * x) / determinant]
     };
     let inside = |[b1, b2]: [f32; 2]| b1.min(b2).min(1.0 - b1 - b2);
-    let all = (first..first + count).map(|i| (i, weights(i)));
-    all.max_by(|a, b| inside(a.1).total_cmp(&inside(b.1))).unwrap_or((first, [0.0; 2]))
+    let all = (first..first + count).map(|primitive| PointOfMesh { primitive, uv: weights(primitive) });
+    let nearest = all.max_by(|a, b| inside(a.uv).total_cmp(&inside(b.uv)));
+    nearest.unwrap_or(PointOfMesh { primitive: first, uv: [0.0; 2] })
 }

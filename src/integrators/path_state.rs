@@ -1,16 +1,14 @@
 //! The state of a path between two vertices.
 
 use super::domain;
+use super::last_vertices::{BsdfTechnique, LastVertices};
 use super::light_paths::{Chain, Guide};
 use crate::accel::Hit;
-use crate::direct::{Techniques, Vertices};
 use crate::film::{FeatureSet, Features};
-use crate::lights::{LightCtx, LightHit};
+use crate::lights::LightHit;
 use crate::materials::SurfaceBsdf;
 use crate::media::MediumId;
 use crate::scene::{RenderJob, SurfaceInteraction};
-use crate::settings::IntegratorSettings;
-use lumiris_numbers::estimators::mis::Technique;
 use lumiris_numbers::math::{Ray, Rgb};
 use lumiris_numbers::samplers::SampleStream;
 
@@ -134,74 +132,13 @@ impl PathState {
     }
 }
 
-/// BSDF sampling at the last vertex, for its MIS weight against light sampling there.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct BsdfTechnique {
-    /// The row of the last vertex; [`Self::NO_ROW`] if no light was sampled there.
-    pub(super) row: u32,
-    /// Density of the direction; `None` for a specular lobe, which no other technique samples.
-    pub(super) pdf: Option<f32>,
-    /// Throughput beyond the first surface; `None` if roulette ends the path there.
-    pub(super) survivor: Option<Rgb>,
-}
-
-impl BsdfTechnique {
-    /// Stands for a point where no light was sampled.
-    pub(super) const NO_ROW: u32 = u32::MAX;
-}
-
-/// The last vertices of the paths of a batch, and the direct-light techniques used there.
-pub(super) struct LastVertices<'a, 'w> {
-    pub(super) vertices: &'a Vertices<'w>,
-    pub(super) techniques: Option<Techniques>,
-}
-
-impl LastVertices<'_, '_> {
-    /// The point at which light was sampled last.
-    #[inline]
-    pub(super) fn ctx(&self, path: &PathState) -> LightCtx {
-        match path.technique {
-            Some(technique) if technique.row != BsdfTechnique::NO_ROW => {
-                self.vertices.surface.lit_points().get(technique.row as usize)
-            }
-            _ => LightCtx::at(path.ray.o),
-        }
-    }
-
-    /// MIS weight of an emitter hit by the BSDF sample of a path; light sampling has the density `p_light`.
-    #[inline]
-    pub(super) fn weight(&self, path: &PathState, p_light: impl FnOnce(&LightCtx) -> f32) -> f32 {
-        let Some(techniques) = &self.techniques else { return 1.0 };
-        path.technique.and_then(|technique| technique.pdf).map_or(1.0, |p| {
-            let light = Technique { n: techniques.light_samples(), p: p_light(&self.ctx(path)) };
-            techniques.heuristic.weight(Technique { n: 1.0, p }, light)
-        })
-    }
-}
-
-/// Russian roulette before bounce `bounce`, for a path that leaves the vertex of `stream` with the throughput `beta`.
-/// The survival probability is the maximum of β · `eta_scale`, so refraction does not count as a loss. Returns the
-/// throughput of a path that survives.
-#[inline]
-pub(super) fn survive(
-    beta: Rgb,
-    eta_scale: f32,
-    stream: &SampleStream,
-    bounce: u32,
-    settings: &IntegratorSettings,
-) -> Option<Rgb> {
-    let survival = (beta * eta_scale).map(f32::abs).max_component();
-    if !settings.has_roulette(bounce) || !(survival < 1.0) {
-        return Some(beta);
-    }
-    (stream.draw_random(domain::ROULETTE) < survival).then(|| beta / survival)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::direct::{Estimator, Techniques, Vertices};
+    use crate::settings::IntegratorSettings;
+    use lumiris_numbers::estimators::heuristics::Technique;
     use lumiris_numbers::math::Vec3;
-    use lumiris_numbers::samplers::SamplerKind;
 
     fn path(technique: Option<BsdfTechnique>) -> PathState {
         let ray = Ray { o: Vec3::ZERO, d: Vec3::Z, t_max: f32::INFINITY, time: 0.0 };
@@ -241,7 +178,6 @@ mod tests {
 
     #[test]
     fn an_emitter_hit_has_the_weight_that_light_samples_leave() {
-        use crate::direct::Estimator;
         let settings = IntegratorSettings { samples: Some(4), ..IntegratorSettings::default() };
         let techniques = Techniques::of(&Estimator::at_vertex(&settings, 0), true);
         let (vertices, n) = (Vertices::default(), techniques.unwrap().light_samples());
@@ -255,28 +191,5 @@ mod tests {
         // Only BSDF sampling finds emitters in specular directions, and where no light is sampled
         assert_eq!(last.weight(&path(Some(technique(None))), |_| 0.5), 1.0);
         assert_eq!(LastVertices { vertices: &vertices, techniques: None }.weight(&sampled, |_| 0.5), 1.0);
-    }
-
-    #[test]
-    fn roulette_keeps_the_mean_of_the_throughput() {
-        let settings = IntegratorSettings { roulette_depth: Some(3), ..IntegratorSettings::default() };
-        let streams = (0..4096).map(|i| SampleStream::new(SamplerKind::Sobol, [i % 64, i / 64], i, 1));
-        let (beta, eta_scale) = (Rgb::new(0.1, 0.2, 0.05), 2.25);
-
-        // Refraction does not count as a loss: the survival probability is 0.2·2.25
-        let (mut sum, mut count) = (Rgb::BLACK, 0);
-        for stream in streams.clone() {
-            assert_eq!(survive(beta, eta_scale, &stream, 2, &settings), Some(beta));
-            let Some(survivor) = survive(beta, eta_scale, &stream, 3, &settings) else { continue };
-            (sum, count) = (sum + survivor, count + 1);
-        }
-        // Five standard deviations of independent numbers
-        let (mean, share) = (sum * (1.0 / 4096.0), count as f32 / 4096.0);
-        assert!((share - 0.45).abs() < 0.04, "{share}");
-        assert!((mean.g - 0.2).abs() < 0.02 && (mean.r - 0.1).abs() < 0.01, "{mean:?}");
-
-        // A throughput above 1 is unchanged
-        let bright = Rgb::splat(1.5);
-        assert!(streams.into_iter().all(|stream| survive(bright, 1.0, &stream, 9, &settings) == Some(bright)));
     }
 }

@@ -27,7 +27,7 @@ const PROBES: usize = 2;
 
 /// An emitting part of a medium.
 #[derive(Clone, Debug)]
-pub struct Glow {
+pub struct VolumeLight {
     medium: Arc<Heterogeneous>,
     /// The medium.
     pub id: MediumId,
@@ -52,12 +52,12 @@ impl Parts {
     }
 
     /// The emitting parts, x fastest; `None` for dark ones.
-    pub fn glows(self, medium: &Arc<Heterogeneous>, id: MediumId) -> Vec<Option<Glow>> {
+    pub fn lights(self, medium: &Arc<Heterogeneous>, id: MediumId) -> Vec<Option<VolumeLight>> {
         let [nx, ny, nz] = self.0;
         let of = |i: usize| {
             let place = [i % nx, i / nx % ny, i / (nx * ny)].map(|x| x as f32);
             let size = Vec3::ONE / Vec3::new(nx as f32, ny as f32, nz as f32);
-            Glow::new(medium, id, Vec3::from(place) * size, size)
+            VolumeLight::new(medium, id, Vec3::from(place) * size, size)
         };
         (0..nx * ny * nz).into_par_iter().map(of).collect()
     }
@@ -77,24 +77,24 @@ fn place(x: f32, n: usize) -> usize {
     ((x * n as f32).max(0.0) as usize).min(n - 1)
 }
 
-impl Glow {
+impl VolumeLight {
     /// A part; `None` if it is dark.
     fn new(medium: &Arc<Heterogeneous>, id: MediumId, corner: Vec3, size: Vec3) -> Option<Self> {
         // Mean luminance of the probes in each cell
         let step = size / (CELLS * PROBES) as f32;
-        let mut glowing = Bounds3::EMPTY;
+        let mut emitting = Bounds3::EMPTY;
         let mut weights = [0.0_f32; CELLS.pow(3)];
         for (i, weight) in weights.iter_mut().enumerate() {
             let first = [i % CELLS, i / CELLS % CELLS, i / CELLS.pow(2)].map(|x| (x * PROBES) as f32);
             let low = corner + Vec3::from(first) * step;
             let probe = |k: usize| {
                 let offset = [k % PROBES, k / PROBES % PROBES, k / PROBES.pow(2)].map(|x| x as f32 + 0.5);
-                medium.glow(low + Vec3::from(offset) * step).luminance()
+                medium.emission(low + Vec3::from(offset) * step).luminance()
             };
             *weight = (0..PROBES.pow(3)).map(probe).sum::<f32>() / PROBES.pow(3) as f32;
             if *weight > 0.0 {
                 let high = low + step * PROBES as f32;
-                glowing = glowing.union(medium.world_bounds(Bounds3 { min: low, max: high }));
+                emitting = emitting.union(medium.world_bounds(Bounds3 { min: low, max: high }));
             }
         }
 
@@ -111,15 +111,15 @@ impl Glow {
         }));
         let cell_volume = medium.volume() * size.element_product() / CELLS.pow(3) as f32;
         let bounds = LightBounds {
-            bounds: glowing,
+            bounds: emitting,
             axis: Vec3::Z,
             cos_theta_o: -1.0,
             cos_theta_e: 0.0,
             two_sided: false,
             intensity: total * cell_volume,
         };
-        let is_bright = bounds.intensity > 0.0 && bounds.intensity.is_finite() && glowing.diagonal().is_finite();
-        is_bright.then(|| Glow { medium: Arc::clone(medium), id, corner, size, sums, cell_volume, bounds })
+        let is_bright = bounds.intensity > 0.0 && bounds.intensity.is_finite() && emitting.diagonal().is_finite();
+        is_bright.then(|| VolumeLight { medium: Arc::clone(medium), id, corner, size, sums, cell_volume, bounds })
     }
 
     /// Bounds for the light tree.
@@ -147,14 +147,14 @@ impl Glow {
         // Choose a point of the cell
         let low = [cell % CELLS, cell / CELLS % CELLS, cell / CELLS.pow(2)].map(|x| x as f32);
         let p = self.corner + (Vec3::from(low) + Vec3::new(u0, u[1], u2)) * self.size / CELLS as f32;
-        let rate = self.medium.glimpse_rate(p);
+        let rate = self.medium.emission_lookup_rate(p);
         let point = self.medium.world_point(p);
         let to_point = point - ctx.p;
         let t = to_point.length();
         let sample = LightSample {
-            li: self.medium.glow(p) / rate,
+            li: self.medium.emission(p) / rate,
             wi: to_point / t,
-            pdf: self.pdf(ctx, (p, point), rate),
+            pdf: self.pdf(ctx, p, point, rate),
             t,
             p: point,
             n: Vec3::ZERO,
@@ -167,7 +167,7 @@ impl Glow {
     /// Density per steradian of [`sample_li`](Self::sample_li) in the direction of a point, which is given in the unit
     /// cube and in world space. `rate` (1/m) is the rate at which paths collect emission there.
     #[inline]
-    pub fn pdf(&self, ctx: &LightCtx, (unit, p): (Vec3, Vec3), rate: f32) -> f32 {
+    pub fn pdf(&self, ctx: &LightCtx, unit: Vec3, p: Vec3, rate: f32) -> f32 {
         self.density(unit) * (p - ctx.p).length_squared() / rate
     }
 }
@@ -199,28 +199,29 @@ mod tests {
     fn samples_of_all_parts_integrate_what_glows_and_have_their_density() {
         let (medium, ctx) = (medium(), LightCtx::at(Vec3::new(-1.0, 0.3, 2.0)));
         let parts = Parts::of(&medium);
-        let glows = parts.glows(&medium, 3);
-        assert!(glows.iter().flatten().count() > 4);
+        let lights = parts.lights(&medium, 3);
+        assert!(lights.iter().flatten().count() > 4);
         // ∫ σ_a L_e/r² dV, by the midpoint rule in the unit cube
         let steps = 90;
         let term = |i: i32| {
             let place = [i % steps, i / steps % steps, i / (steps * steps)];
             let unit = Vec3::from(place.map(|x| (x as f32 + 0.5) / steps as f32));
-            f64::from(medium.glow(unit).g / (medium.world_point(unit) - ctx.p).length_squared())
+            f64::from(medium.emission(unit).g / (medium.world_point(unit) - ctx.p).length_squared())
         };
         let count = steps * steps * steps;
         let integral = (0..count).map(term).sum::<f64>() * f64::from(medium.volume()) / f64::from(count);
 
         let (mut s, mut moments) = (pcg32([5, 2, 1]), Moments::default());
         for _ in 0..200_000 {
-            let i = s.random_range(0..glows.len());
-            let sample = glows[i].as_ref().and_then(|glow| Some((glow, glow.sample_li(&ctx, s.random::<[f32; 2]>())?)));
-            moments.add(sample.map_or(0.0, |(glow, sample)| {
+            let i = s.random_range(0..lights.len());
+            let sample =
+                lights[i].as_ref().and_then(|light| Some((light, light.sample_li(&ctx, s.random::<[f32; 2]>())?)));
+            moments.add(sample.map_or(0.0, |(light, sample)| {
                 let unit = medium.unit_point(sample.p);
-                assert!(glow.bounds().bounds.contains(sample.p) && parts.at(unit) == i, "{i}: {unit} {sample:?}");
-                let pdf = glow.pdf(&ctx, (unit, sample.p), medium.glimpse_rate(unit));
+                assert!(light.bounds().bounds.contains(sample.p) && parts.at(unit) == i, "{i}: {unit} {sample:?}");
+                let pdf = light.pdf(&ctx, unit, sample.p, medium.emission_lookup_rate(unit));
                 assert!((pdf - sample.pdf).abs() < 1e-3 * pdf, "{pdf} {}", sample.pdf);
-                glows.len() as f64 * f64::from(sample.li.g / sample.pdf)
+                lights.len() as f64 * f64::from(sample.li.g / sample.pdf)
             }));
         }
         moments.assert_mean(integral, 1e-5, 2e-3);

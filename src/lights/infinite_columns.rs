@@ -1,5 +1,5 @@
-//! Vectorised sampling of one infinite light, as a structure of arrays. [`super::choice::many`] has the kernels for
-//! area lights, where the points differ.
+//! Samples of one infinite light for columns of random numbers. [`super::choice::sample_columns`] has area lights, where
+//! the points differ.
 
 use super::light::Light;
 
@@ -8,7 +8,7 @@ pub use lumiris_lanes::LightLanes;
 impl Light {
     /// [`sample_li`](Self::sample_li) of an infinite light for each pair of numbers `u[0][i]`, `u[1][i]`. Returns false
     /// if the light has no kernel. The results equal single samples up to rounding.
-    pub fn sample_li_lanes(&self, u: [&[f32]; 2], out: &mut LightLanes<'_>) -> bool {
+    pub fn sample_li_columns(&self, u: [&[f32]; 2], out: &mut LightLanes<'_>) -> bool {
         let level = lumiris_lanes::level();
         match self {
             Light::InfiniteConstant { l } if !l.is_black() => {
@@ -39,7 +39,7 @@ mod tests {
             let u: [Vec<f32>; 2] = std::array::from_fn(|_| (0..n).map(|_| stream.random()).collect());
             let mut columns: [Vec<f32>; 7] = std::array::from_fn(|_| vec![0.0; n]);
             let [x, y, z, r, g, b, pdf] = &mut columns;
-            assert!(light.sample_li_lanes([&u[0], &u[1]], &mut LightLanes { wi: [x, y, z], li: [r, g, b], pdf }));
+            assert!(light.sample_li_columns([&u[0], &u[1]], &mut LightLanes { wi: [x, y, z], li: [r, g, b], pdf }));
 
             // Compare with single samples
             for i in 0..n {

@@ -8,7 +8,7 @@
 use super::lane::{F, LANES, Vec3s, begin, load, or_zero, padded, store};
 use super::wide::Wide;
 use fearless_simd::{Level, Simd, dispatch, prelude::*};
-use lumiris_numbers::estimators::mis::Heuristic;
+use lumiris_numbers::estimators::heuristics::Heuristic;
 use lumiris_numbers::estimators::ris::weight;
 use lumiris_numbers::math::rgb::LUMINANCE;
 
@@ -31,7 +31,7 @@ pub struct Proposals<'a> {
     pub heuristic: Heuristic,
 }
 
-/// Output of [`combine`].
+/// Output of [`weigh`].
 #[derive(Debug)]
 pub struct Weights<'a> {
     /// q̂, the luminance of f·cos θ·li; 0 if p is not positive.
@@ -43,24 +43,24 @@ pub struct Weights<'a> {
 }
 
 /// Computes the weights of proposals; see [`Weights`].
-pub fn combine(level: Level, proposals: &Proposals<'_>, out: &mut Weights<'_>) {
+pub fn weigh(level: Level, proposals: &Proposals<'_>, out: &mut Weights<'_>) {
     let n = proposals.p.len();
     if n >= LANES {
-        return dispatch!(level, simd => combine_lanes(simd, proposals, out));
+        return dispatch!(level, simd => weigh_lanes(simd, proposals, out));
     }
     let (f_cos, li) = (proposals.f_cos.map(padded), proposals.li.map(padded));
     let (p, p_other) = (padded(proposals.p), padded(proposals.p_other));
     let (f_cos, li) = (f_cos.each_ref().map(|v| &v[..]), li.each_ref().map(|v| &v[..]));
     let [mut q_hat, mut r, mut w] = [[0.0; LANES]; 3];
     let few = Proposals { f_cos, li, p: &p, p_other: &p_other, ..*proposals };
-    combine(level, &few, &mut Weights { q_hat: &mut q_hat, r: &mut r, w: &mut w });
+    weigh(level, &few, &mut Weights { q_hat: &mut q_hat, r: &mut r, w: &mut w });
     out.q_hat.copy_from_slice(&q_hat[..n]);
     out.r.copy_from_slice(&r[..n]);
     out.w.copy_from_slice(&w[..n]);
 }
 
 #[inline(always)]
-fn combine_lanes<S: Simd>(simd: S, proposals: &Proposals<'_>, out: &mut Weights<'_>) {
+fn weigh_lanes<S: Simd>(simd: S, proposals: &Proposals<'_>, out: &mut Weights<'_>) {
     let zero = F::splat(simd, 0.0);
     for i in (0..proposals.p.len()).step_by(LANES) {
         let i = begin(i, proposals.p.len());

@@ -7,7 +7,9 @@
 use super::groups::MAX_GROUPS;
 use super::light_sampler::LightSampler;
 use super::sampling::LightSampling;
-use crate::lights::{AreaLight, AreaShape, Light, LightCtx, LightId, LightLanes, LightSample, Tops};
+use crate::lights::{
+    AreaLight, AreaShape, BranchTable, LeAndPdf, Light, LightCtx, LightId, LightLanes, LightSample, SampledLight,
+};
 use lumiris_lanes::area::{Rectangle, many};
 use lumiris_lanes::columns::{Column, Columns3, padded, reserve};
 use lumiris_lanes::level;
@@ -22,6 +24,25 @@ const MAX_COUNTED: usize = 256;
 
 /// The choice of no light.
 pub const NO_LIGHT: LightId = LightId::MAX;
+
+/// The light that a point chose.
+#[derive(Clone, Copy, Debug)]
+pub struct ChosenLight {
+    /// The light.
+    pub light: LightId,
+    /// Probability of the choice.
+    pub pmf: f32,
+}
+
+impl ChosenLight {
+    /// The choice of no light.
+    pub const NONE: ChosenLight = ChosenLight { light: NO_LIGHT, pmf: 0.0 };
+
+    /// True if no light was chosen.
+    fn is_none(self) -> bool {
+        self.light == NO_LIGHT
+    }
+}
 
 /// Illuminated points, in columns; see [`LightCtx`].
 #[derive(Clone, Copy, Debug)]
@@ -137,10 +158,10 @@ impl LobeColumns {
 /// Memory of [`LightSampling::sample_many`].
 #[derive(Debug, Default)]
 pub struct Scratch {
-    /// The light that each point chose, and the probability.
-    chosen: Vec<(LightId, f32)>,
-    /// Precomputed probabilities of the choices at the points.
-    tops: Tops,
+    /// The light that each point chose.
+    chosen: Vec<ChosenLight>,
+    /// Precomputed branch probabilities at the points.
+    branches: BranchTable,
     lobes: LobeColumns,
     /// Points sorted by light.
     order: Vec<u32>,
@@ -153,13 +174,13 @@ pub struct Scratch {
 impl Scratch {
     /// Prepares for samples of `lights` at the `n` points `at`; each point may be sampled several times.
     pub fn begin(&mut self, lights: &LightSampling, n: usize, at: LitPoints<'_>) {
-        self.tops.clear();
+        self.branches.clear();
         if let LightSampler::Tree(choice) = &lights.sampler
             && lights.sampler.only_light().is_none()
         {
             let len = padded(n);
             let lobes = self.lobes.set(at.lobes, len);
-            self.tops.determine(choice, &Receivers { p: at.p.get(len), ns: at.ns.get(len), lobes });
+            self.branches.compute(choice, &Receivers { p: at.p.get(len), ns: at.ns.get(len), lobes });
         }
     }
 
@@ -167,12 +188,12 @@ impl Scratch {
     /// more than one light.
     #[inline]
     pub fn group_pmfs(&self, lights: &LightSampling, i: usize, at: &LightCtx) -> [f32; MAX_GROUPS] {
-        lights.groups.pmfs_again(&lights.sampler, at, self.tops.of(i))
+        lights.groups.pmfs_with(&lights.sampler, at, self.branches.at(i))
     }
 
     /// The light that point `i` chose in the last [`LightSampling::sample_many`], if there is more than one light.
     pub fn chosen(&self, i: usize) -> LightId {
-        self.chosen[i].0
+        self.chosen[i].light
     }
 }
 
@@ -198,8 +219,8 @@ impl LightSampling {
             chosen.clear();
             let choose = |(i, &u): (usize, &f32)| {
                 let ctx = LazyCell::new(|| at.get(i));
-                let choice = self.sampler.sample_again(&ctx, u, scratch.tops.of(i));
-                choice.map_or((NO_LIGHT, 0.0), |choice| (choice.light, choice.pmf))
+                let choice = self.sampler.sample_with(&ctx, u, scratch.branches.at(i));
+                choice.map_or(ChosenLight::NONE, |SampledLight { light, pmf, .. }| ChosenLight { light, pmf })
             };
             chosen.extend(u[0][..n].iter().enumerate().map(choose));
             self.sample_chosen(&chosen, at.p, [&u[1], &u[2]], scratch, out);
@@ -210,12 +231,11 @@ impl LightSampling {
         self.unite_infinite(0..n, |i| at.get(i), out);
     }
 
-    /// Samples a direction for each of the points `p` to its chosen light, by the random numbers `u`. `chosen` holds
-    /// the light and its probability. Otherwise as [`sample_many`](Self::sample_many), but infinite lights are not
+    /// Samples a direction for each of the points `p` to its chosen light, by the random numbers `u`. Otherwise as [`sample_many`](Self::sample_many), but infinite lights are not
     /// combined.
     pub fn sample_chosen(
         &self,
-        chosen: &[(LightId, f32)],
+        chosen: &[ChosenLight],
         p: &Columns3,
         u: [&Column; 2],
         scratch: &mut Scratch,
@@ -223,7 +243,7 @@ impl LightSampling {
     ) {
         // One light for all points needs no sorting
         let len = padded(chosen.len());
-        let mut lights = chosen.iter().map(|c| c.0).filter(|&light| light != NO_LIGHT);
+        let mut lights = chosen.iter().filter(|c| !c.is_none()).map(|c| c.light);
         if let Some(light) = lights.next()
             && lights.all(|other| other == light)
         {
@@ -239,8 +259,8 @@ impl LightSampling {
         reserve(&mut [u0, u1], len);
         let mut rest = &scratch.order[..];
         while let Some(&first) = rest.first() {
-            let light = chosen[first as usize].0;
-            let count = rest.partition_point(|&i| chosen[i as usize].0 == light);
+            let light = chosen[first as usize].light;
+            let count = rest.partition_point(|&i| chosen[i as usize].light == light);
             let (places, others) = rest.split_at(count);
             rest = others;
             for (k, &i) in places.iter().enumerate() {
@@ -266,7 +286,7 @@ impl LightSampling {
                     continue;
                 }
                 let wi = out.wi.vec3(i);
-                let (le, pdf) = self.infinite_in_direction(&at(i), wi);
+                let LeAndPdf { le, pdf } = self.infinite_in_direction(&at(i), wi);
                 out.li.set_rgb(i, le);
                 out.pdf[i] = pdf;
             }
@@ -278,7 +298,7 @@ impl LightSampling {
         let len = u[0].len();
         match &self.lights[light as usize] {
             Light::Area(area) if area.is_even() && area.sample_many(n, p, u, out) => {}
-            light if len > 0 && light.sample_li_lanes(u, &mut out.lanes(len)) => {
+            light if len > 0 && light.sample_li_columns(u, &mut out.lanes(len)) => {
                 out.is_far[..n].fill(1.0);
                 out.is_delta[..n].fill(false);
             }
@@ -309,35 +329,35 @@ impl LightSampling {
 }
 
 /// Multiplies densities by the probabilities of the choices.
-fn with_choices(chosen: &[(LightId, f32)], out: &mut LightSamples) {
-    for (pdf, &(light, pmf)) in out.pdf.iter_mut().zip(chosen) {
-        *pdf = if light == NO_LIGHT { 0.0 } else { *pdf * pmf };
+fn with_choices(chosen: &[ChosenLight], out: &mut LightSamples) {
+    for (pdf, choice) in out.pdf.iter_mut().zip(chosen) {
+        *pdf = if choice.is_none() { 0.0 } else { *pdf * choice.pmf };
     }
 }
 
 /// Sorts the indices of points by their chosen light, without the points that chose none.
-fn sort_by_light(chosen: &[(LightId, f32)], lights: usize, scratch: &mut Scratch) {
+fn sort_by_light(chosen: &[ChosenLight], lights: usize, scratch: &mut Scratch) {
     let Scratch { order, begins, .. } = scratch;
-    let places = || chosen.iter().enumerate().filter(|(_, c)| c.0 != NO_LIGHT);
+    let lit = || chosen.iter().enumerate().filter(|(_, c)| !c.is_none());
     order.clear();
     if lights > MAX_COUNTED {
-        order.extend(places().map(|(i, _)| i as u32));
-        order.sort_unstable_by_key(|&i| (chosen[i as usize].0, i));
+        order.extend(lit().map(|(i, _)| i as u32));
+        order.sort_unstable_by_key(|&i| (chosen[i as usize].light, i));
         return;
     }
 
     // Counting sort
     begins.clear();
     begins.resize(lights + 1, 0);
-    for (_, &(light, _)) in places() {
-        begins[light as usize + 1] += 1;
+    for (_, choice) in lit() {
+        begins[choice.light as usize + 1] += 1;
     }
     for light in 0..lights {
         begins[light + 1] += begins[light];
     }
     order.resize(begins[lights] as usize, 0);
-    for (i, &(light, _)) in places() {
-        let next = &mut begins[light as usize];
+    for (i, choice) in lit() {
+        let next = &mut begins[choice.light as usize];
         order[*next as usize] = i as u32;
         *next += 1;
     }
@@ -399,7 +419,8 @@ mod tests {
     use super::*;
     use crate::geometry::{Quadric, QuadricKind, Shape, TriangleMesh};
     use crate::lights::{
-        Emission, EnvironmentFilter, EnvironmentMap, EnvironmentMapping, LightSamplerKind, LightSetBuilder,
+        DistantLight, Emission, EnvironmentFilter, EnvironmentMap, EnvironmentMapping, LightSamplerKind,
+        LightSetBuilder, PointLight,
     };
     use lumiris_numbers::math::warp::sample_uniform_sphere;
     use lumiris_numbers::math::{Affine3A, Bounds3};
@@ -429,8 +450,8 @@ mod tests {
         let local_from_group = group_from_local.inverse();
         let sphere = Shape::Quadric(Quadric { kind, group_from_local, local_from_group, flip_normal: false });
         builder.add_area(3, &sphere, &Emission::constant(Rgb::splat(7.0)));
-        builder.add(Light::Point { p: Vec3::new(2.0, 2.0, 2.0), intensity: Rgb::splat(3.0) });
-        builder.add(Light::Distant { wi_world: Vec3::Z, l: Rgb::WHITE });
+        builder.add(Light::Point(PointLight { p: Vec3::new(2.0, 2.0, 2.0), intensity: Rgb::splat(3.0) }));
+        builder.add(Light::Distant(DistantLight { wi: Vec3::Z, l: Rgb::WHITE }));
     }
 
     fn sky(builder: &mut LightSetBuilder) {
@@ -482,7 +503,7 @@ mod tests {
             // The single sample, with all infinite lights
             let (mut li, mut pdf) = (s.li, s.pdf);
             if lights.infinite.contains(&light) && lights.infinite.len() > 1 {
-                (li, pdf) = lights.infinite_in_direction(&ctx, s.wi);
+                LeAndPdf { le: li, pdf } = lights.infinite_in_direction(&ctx, s.wi);
             }
 
             // Both agree up to rounding
@@ -520,7 +541,7 @@ mod tests {
             let mut b = all(stream);
             for i in 0..MAX_COUNTED as u32 {
                 let p = Vec3::new(i as f32 * 0.1, 1.0, 2.0);
-                b.add(Light::Point { p, intensity: Rgb::splat(0.1) });
+                b.add(Light::Point(PointLight { p, intensity: Rgb::splat(0.1) }));
             }
             assert_like_singles(b, kind, stream);
             // One light alone
