@@ -28,7 +28,7 @@ pub fn layers<S: AsRef<str>>(channels: &[S]) -> Vec<Layer> {
     layers
 }
 
-/// Positions of the colour channels of an [`Image`].
+/// Positions of the colour channels of an [`Image`](super::Image).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ColorChannels {
     /// One channel.

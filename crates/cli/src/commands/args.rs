@@ -68,8 +68,8 @@ pub(super) struct SceneArgs {
     /// TMPDIR). Images are bit-identical [default: off]
     #[arg(long, value_name = "SIZE", value_parser = parse_limit)]
     pub texture_memory: Option<MemoryLimit>,
-    /// Folder for textures that later runs read by tiles, at once. Missing ones are added, changed images are noticed,
-    /// and several processes may share it. Images are bit-identical
+    /// Folder that keeps textures in tiles, so that later runs load them at once. Missing ones are added, changed files
+    /// are noticed, and several processes may share it. Images are bit-identical
     #[arg(long, value_name = "FOLDER")]
     pub texture_cache: Option<PathBuf>,
     /// Use a box filter of one pixel instead of the file's pixel filter
@@ -123,8 +123,8 @@ pub(super) struct RenderArgs {
     /// image; .part the input of `lumiris merge` [default: the name in the file, or SCENE.exr]
     #[arg(short, long, value_name = "FILE")]
     pub output: Vec<PathBuf>,
-    /// Frames of an animation, such as 1-48, 1-48:2 or 5,10-20. `####` becomes the frame number in SCENE and in the
-    /// FILEs of --output, --checkpoint and --resume. A glTF scene needs no `####` (see --fps)
+    /// Frames of an animation, such as 1-48, 1-48:2 or 5,10-20. `####` becomes the frame number, with zeros in front, in
+    /// SCENE and in the FILEs of --output, --checkpoint and --resume. A glTF scene needs no `####` (see --fps)
     #[arg(long, value_name = "LIST", value_parser = parse_frames, requires = "output")]
     pub frames: Option<FrameList>,
     /// With --frames and a glTF scene without ####: frames per second; frame n is at the time n/F

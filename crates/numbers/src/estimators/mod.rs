@@ -3,7 +3,7 @@
 //! | module | estimate | bias |
 //! |---|---|---|
 //! | [`mc`] | (1/N) Σ f/p | none |
-//! | [`mis`] | Σᵢ (1/nᵢ) Σⱼ wᵢ f/pᵢ, weights that sum to one | none |
+//! | [`heuristics`] | Σᵢ (1/nᵢ) Σⱼ wᵢ f/pᵢ, weights that sum to one | none |
 //! | [`ris`] | Σ scale·f r over N proposals drawn from M | none |
 //! | [`ocv`] | ȳ − Σ βⱼ c̄ⱼ, β fitted: optimizing control variates | by form: none if β is independent of the samples |
 //! | [`correlated`] | ȳ − λ c̄, one density, one control | O(1/N), or none with λ from other samples |
