@@ -14,8 +14,7 @@
 //! log n.
 
 use super::domain;
-use super::last_vertices::BsdfTechnique;
-use super::path_state::PathState;
+use super::path_state::{BsdfTechnique, PathState};
 use super::vertex_search::{FlightOutcome, TraceStep, VertexSearch};
 use crate::accel::Hit;
 use crate::bsdfs::dielectric::{Select, Transport};

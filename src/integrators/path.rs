@@ -14,10 +14,9 @@
 use super::camera_sample::CameraSample;
 use super::cells::Blocks;
 use super::integrator::{Integrator, Tracer};
-use super::last_vertices::LastVertices;
 use super::light_layers::LayerSums;
 use super::light_paths::{LightImage, LightPilot};
-use super::path_state::PathState;
+use super::path_state::{LastVertices, PathState};
 pub use super::recording::Recording;
 use super::reuse::{self, LambertianVertex, Reuse};
 use super::scatter::{Continuation, Scatter};

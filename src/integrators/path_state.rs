@@ -1,14 +1,15 @@
-//! The state of a path between two vertices.
+//! The state of a path between two vertices, and the MIS weight of an emitter that its segment hits.
 
 use super::domain;
-use super::last_vertices::{BsdfTechnique, LastVertices};
 use super::light_paths::{Chain, Guide};
 use crate::accel::Hit;
+use crate::direct::{Techniques, Vertices};
 use crate::film::{FeatureSet, Features};
-use crate::lights::LightHit;
+use crate::lights::{LightCtx, LightHit};
 use crate::materials::SurfaceBsdf;
 use crate::media::MediumId;
 use crate::scene::{RenderJob, SurfaceInteraction};
+use lumiris_numbers::estimators::heuristics::Technique;
 use lumiris_numbers::math::{Ray, Rgb};
 use lumiris_numbers::samplers::SampleStream;
 
@@ -132,12 +133,56 @@ impl PathState {
     }
 }
 
+/// BSDF sampling at the last vertex, for its MIS weight against light sampling there.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct BsdfTechnique {
+    /// The row of the last vertex; [`Self::NO_ROW`] if no light was sampled there.
+    pub(super) row: u32,
+    /// Density of the direction; `None` for a specular lobe, which no other technique samples.
+    pub(super) pdf: Option<f32>,
+    /// Throughput beyond the first surface; `None` if roulette ends the path there.
+    pub(super) survivor: Option<Rgb>,
+}
+
+impl BsdfTechnique {
+    /// Stands for a point where no light was sampled.
+    pub(super) const NO_ROW: u32 = u32::MAX;
+}
+
+/// The last vertices of the paths of a batch, and the direct-light techniques used there.
+pub(super) struct LastVertices<'a, 'w> {
+    pub(super) vertices: &'a Vertices<'w>,
+    pub(super) techniques: Option<Techniques>,
+}
+
+impl LastVertices<'_, '_> {
+    /// The point at which light was sampled last.
+    #[inline]
+    pub(super) fn ctx(&self, path: &PathState) -> LightCtx {
+        match path.technique {
+            Some(technique) if technique.row != BsdfTechnique::NO_ROW => {
+                self.vertices.surface.lit_points().get(technique.row as usize)
+            }
+            _ => LightCtx::at(path.ray.o),
+        }
+    }
+
+    /// MIS weight of an emitter hit by the BSDF sample of a path; light sampling has the density `p_light`.
+    #[inline]
+    pub(super) fn weight(&self, path: &PathState, p_light: impl FnOnce(&LightCtx) -> f32) -> f32 {
+        let Some(techniques) = &self.techniques else { return 1.0 };
+        path.technique.and_then(|technique| technique.pdf).map_or(1.0, |p| {
+            let light = Technique { n: techniques.light_samples(), p: p_light(&self.ctx(path)) };
+            techniques.heuristic.weight(Technique { n: 1.0, p }, light)
+        })
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::direct::{Estimator, Techniques, Vertices};
+    use crate::direct::Estimator;
     use crate::settings::IntegratorSettings;
-    use lumiris_numbers::estimators::heuristics::Technique;
     use lumiris_numbers::math::Vec3;
 
     fn path(technique: Option<BsdfTechnique>) -> PathState {

@@ -1,8 +1,7 @@
 //! BSDF sampling of the next path segments.
 
 use super::domain;
-use super::last_vertices::BsdfTechnique;
-use super::path_state::PathState;
+use super::path_state::{BsdfTechnique, PathState};
 use super::roulette::survive;
 use crate::bsdfs::Lobe;
 use crate::direct::vertices::BsdfSamples;

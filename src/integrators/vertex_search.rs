@@ -2,10 +2,9 @@
 
 use super::camera_sample::CameraSample;
 use super::domain;
-use super::last_vertices::LastVertices;
 use super::light_layers::LayerSums;
 use super::light_paths::{Chain, Guide};
-use super::path_state::PathState;
+use super::path_state::{LastVertices, PathState};
 use super::recording::Recording;
 use super::statistics::PathStats;
 use crate::accel::{Coherence, Hit, RayBatch};

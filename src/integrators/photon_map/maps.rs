@@ -11,8 +11,8 @@ use super::boundary::{Boundary, Probe};
 use crate::direct::Vertices;
 use crate::integrators::camera_sample::CameraSample;
 use crate::integrators::integrator::Cameras;
-use crate::integrators::last_vertices::LastVertices;
 use crate::integrators::path::BatchVertices;
+use crate::integrators::path_state::LastVertices;
 use crate::integrators::statistics::MapStats;
 use crate::integrators::vertex_search::{TraceStep, VertexSearch};
 use crate::photons::{
