@@ -36,7 +36,7 @@ pub enum Feature {
     /// Participating media.
     Media,
     /// Media that emit.
-    Glow,
+    VolumeEmission,
     /// Surfaces that shadow rays may pass: bounds of media, and mixtures with `interface`.
     Passable,
     /// Surfaces with stochastic alpha.
@@ -73,7 +73,7 @@ pub const TABLE: &[Row] = &[
     (&[F::Media], &TRACED, "does not see through participating media, which this scene has"),
     (&[F::Passable], &TRACED, "does not see through mixtures with `interface`"),
     (&[F::LightGroups], &[CACHE, PHOTONS, OCV, OPTIMAL, CORRELATED, CONTROL], "does not tell lights apart"),
-    (&[F::LightGroups], &[F::Glow], "media emit, and belong to no group"),
+    (&[F::LightGroups], &[F::VolumeEmission], "media emit, and belong to no group"),
     (&[F::Sharing, F::LightPaths], &[DIRECT, CACHE, PHOTONS], "does not follow camera paths from pixel to light"),
     (&[F::Sharing], &[F::Fewer(2)], "paths of one bounce have nothing to share"),
     (&[F::Sharing], &[F::Progressive], "with a progressive estimator, samples depend on earlier ones of their pixel"),
@@ -184,7 +184,7 @@ impl Feature {
             F::Sharing => s.path_reuse.is_some_and(|edge| edge > 1),
             F::TileShare | F::SampleShare => false,
             F::Media => !scene.media.is_empty(),
-            F::Glow => scene.media.is_emissive(),
+            F::VolumeEmission => scene.media.is_emissive(),
             F::Passable => job.shadows_pass(),
             F::Alpha => scene.geometry.geometries.iter().any(|g| g.alpha.is_some()),
             F::MovingObjects => scene.geometry.has_motion(),

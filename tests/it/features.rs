@@ -107,7 +107,7 @@ const ALL: &[Entry] = &[
         s.shapes += r#"AttributeBegin Material "subsurface" "rgb reflectance" [0.8 0.5 0.2] "float mfp" 0.3
             Translate -0.8 0.4 -0.6 Shape "sphere" "float radius" 0.4 AttributeEnd "#;
     }),
-    ("glow", Feature::Glow, |s| {
+    ("volume emission", Feature::VolumeEmission, |s| {
         s.shapes += r#"MakeNamedMedium "glow" "rgb sigma_a" [0.6 0.6 0.6] "rgb sigma_s" [0.5 0.5 0.5] "rgb Le" [0.6 0.4 0.2]
             AttributeBegin MediumInterface "glow" "" Material "interface"
             Translate -0.6 1.4 0 Shape "sphere" "float radius" 0.4 AttributeEnd "#;

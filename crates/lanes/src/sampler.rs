@@ -47,16 +47,23 @@ pub enum Below {
 /// Words of the streams of a chunk.
 type Words = [[u32; CHUNK]; 3];
 
+/// A chunk of at most [`CHUNK`] streams, with zeros behind.
+#[inline]
+fn chunk_of(words: [&[u32]; 3]) -> Words {
+    let mut chunk = [[0; CHUNK]; 3];
+    for (to, from) in chunk.iter_mut().zip(words) {
+        to[..from.len()].copy_from_slice(from);
+    }
+    chunk
+}
+
 /// Replaces all streams by their domains `key`.
 pub fn enter(level: Level, streams: &mut StreamColumns, key: u32) {
     let (kind, len) = (streams.kind(), streams.len());
     let mut words = streams.words_mut();
     for first in (0..len).step_by(CHUNK) {
         let rows = first..len.min(first + CHUNK);
-        let mut chunk = [[0; CHUNK]; 3];
-        for (to, from) in chunk.iter_mut().zip(&words) {
-            to[..rows.len()].copy_from_slice(&from[rows.clone()]);
-        }
+        let mut chunk = chunk_of(words.each_ref().map(|words| &words[rows.clone()]));
         dispatch!(level, _simd => descend(kind, Below::Domain(key), &mut chunk));
         for (to, from) in words.iter_mut().zip(&chunk) {
             to[rows.clone()].copy_from_slice(&from[..rows.len()]);
@@ -76,10 +83,7 @@ pub fn draw<const N: usize>(
     let (kind, words) = (streams.kind(), streams.words());
     for first in rows.clone().step_by(CHUNK) {
         let of_chunk = first..rows.end.min(first + CHUNK);
-        let mut chunk = [[0; CHUNK]; 3];
-        for (to, from) in chunk.iter_mut().zip(words) {
-            to[..of_chunk.len()].copy_from_slice(&from[of_chunk.clone()]);
-        }
+        let mut chunk = chunk_of(words.map(|words| &words[of_chunk.clone()]));
         let mut u = [[0.0; CHUNK]; N];
         draw_chunk(level, kind, below, &mut chunk, &mut u);
         for (out, u) in out.iter_mut().zip(&u) {
@@ -110,12 +114,14 @@ fn draw_chunk<const N: usize>(
 /// Replaces streams of points with blue-noise errors by these points.
 fn blue_noise([a, _, c]: &mut Words) {
     // The samples of a pixel share their entry of the table
-    let mut last = (a[0], c[0] >> 16, BlueNoise::of(a[0], c[0] >> 16));
+    let mut last = [a[0], c[0] >> 16];
+    let mut entry = BlueNoise::of(last[0], last[1]);
     for (a, c) in a.iter_mut().zip(c) {
-        if (*a, *c >> 16) != (last.0, last.1) {
-            last = (*a, *c >> 16, BlueNoise::of(*a, *c >> 16));
+        let pixel = [*a, *c >> 16];
+        if pixel != last {
+            (last, entry) = (pixel, BlueNoise::of(pixel[0], pixel[1]));
         }
-        (*a, *c) = (last.2.seed, *c & 0xffff ^ last.2.rank);
+        (*a, *c) = (entry.seed, *c & 0xffff ^ entry.rank);
     }
 }
 

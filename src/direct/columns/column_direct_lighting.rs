@@ -184,7 +184,7 @@ impl ColumnDirectLighting {
         let at = vertices.surface.lit_points();
         job.lights.sample_many(n, at, &self.samples.u, &mut self.scratch, &mut self.samples.light);
         self.leave_out(draw);
-        self.leave_out_glows(batch, draw);
+        self.leave_out_volume_lights(batch, draw);
 
         // BSDF values and densities of BSDF sampling
         let SampleColumns { light, bsdf: BsdfSamples { f_cos, pdf, .. }, .. } = &mut self.samples;
@@ -208,15 +208,15 @@ impl ColumnDirectLighting {
 
     /// Removes light samples of emitting media if the BSDF sample is not the next path segment. Nearby, no other
     /// technique would sample the emission of media, and the next segment receives it.
-    fn leave_out_glows(&mut self, batch: &Batch<'_, '_>, draw: Draw) {
+    fn leave_out_volume_lights(&mut self, batch: &Batch<'_, '_>, draw: Draw) {
         let Batch { job, techniques, vertices, .. } = *batch;
         if !job.world.scene.media.is_emissive() {
             return;
         }
         for i in 0..draw.rows {
-            let is_glow = job.lights.medium_of(self.light_of(job, i)).is_some();
+            let is_volume_light = job.lights.medium_of(self.light_of(job, i)).is_some();
             let is_by_path = techniques.are_by_path() && !vertices.bsdf(i).bsdf.is_only_evaluated();
-            if is_glow && !is_by_path {
+            if is_volume_light && !is_by_path {
                 self.samples.leave_out(i, true);
             }
         }

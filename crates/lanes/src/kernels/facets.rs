@@ -7,7 +7,6 @@
 //! With L(w) = √(cos²θ + (αx x)² + (αy y)²), which avoids the tangent,
 //! G/(4 |cos θo|) = |cos θi|/(2 (|cos θi| L(wo) + |cos θo| L(wi))) and G1(wo)/(4 |cos θo|) = 1/(2 (|cos θo| + L(wo))).
 
-use super::fresnel::reflect;
 use lumiris_numbers::math::elementary::sin_cos_turn;
 use lumiris_numbers::math::number::Number;
 use lumiris_numbers::math::v3::V3;
@@ -89,11 +88,5 @@ impl<N: Number> Facets<N> {
         let (sin_phi, cos_phi) = sin_cos_turn(u[0]);
         let m = V3 { x: sin * cos_phi, y: sin * sin_phi, z }.plus(h);
         V3 { x: m.x * self.alpha_x, y: m.y * self.alpha_y, z: m.z.greater(w.z.constant(1e-6)) }.unit()
-    }
-
-    /// Reflects `wo` about a sampled visible normal.
-    #[inline(always)]
-    pub fn sample_reflection(self, wo: V3<N>, u: [N; 2]) -> V3<N> {
-        reflect(wo, self.sample_m(wo, u))
     }
 }

@@ -7,11 +7,13 @@ use lumiris_numbers::samplers::{SampleStream, SamplerKind, StreamColumns};
 const KINDS: [SamplerKind; 4] =
     [SamplerKind::Independent, SamplerKind::Stratified, SamplerKind::Sobol, SamplerKind::SobolBlueNoise];
 
-/// Streams of several pixels.
+/// Pairs of streams of a pixel. Neighbouring pairs have the same place in different blocks, or different places in the
+/// same block.
 fn streams(kind: SamplerKind, n: usize) -> StreamColumns {
     let mut columns = StreamColumns::default();
     for i in 0..n as u32 {
-        let stream = SampleStream::new(kind, [i % 91, i / 91], i.wrapping_mul(77), 5).domain(i % 7);
+        let pixel = [i / 8 % 91 + [0, 16, 17, 1][i as usize / 2 % 4], i / 800];
+        let stream = SampleStream::new(kind, pixel, i.wrapping_mul(77), 5).domain(i / 8 % 7);
         columns.extend([stream].iter());
     }
     columns

@@ -98,24 +98,24 @@ impl Net {
         Net { index: all as u16, ..self.domain(key).domain(all >> 16) }
     }
 
-    /// A separate net.
+    /// Coordinates of the point of a separate net.
     #[inline]
-    fn point(&self) -> NetPoint {
-        NetPoint { index: u32::from(self.index), seed: self.key[0], scramble: self.key[1] }
+    fn draw<const N: usize>(&self) -> [f32; N] {
+        coordinates(u32::from(self.index), self.key[0], self.key[1])
     }
 
+    /// Coordinates of the point with blue-noise errors.
     #[inline]
-    fn blue_noise_point(&self) -> NetPoint {
+    fn draw_blue_noise<const N: usize>(&self) -> [f32; N] {
         let BlueNoise { seed, rank } = BlueNoise::of(self.key[0], self.words()[2] >> 16);
-        NetPoint { index: u32::from(self.index) ^ rank, seed, scramble: self.key[1] }
+        coordinates(u32::from(self.index) ^ rank, seed, self.key[1])
     }
 
     /// A number that is independent of all others.
     #[inline]
     fn random(&self) -> f32 {
-        let [x, y] = self.pixel.map(u32::from);
-        let place = u32::from(self.index) | x << 16 | y << 24;
-        unit_f32(pcg4d([self.key[0], self.key[1], place, ROULETTE])[0])
+        let [a, b, place] = self.words();
+        unit_f32(pcg4d([a, b, place, ROULETTE])[0])
     }
 }
 
@@ -150,26 +150,14 @@ impl BlueNoise {
     }
 }
 
-/// A point of an Owen-scrambled Sobol' sequence in four dimensions, with a second Owen scramble.
-#[derive(Clone, Copy, Debug)]
-struct NetPoint {
-    index: u32,
-    /// Seed of the sequence.
-    seed: u32,
-    /// Seed of the second scramble.
-    scramble: u32,
-}
-
-impl NetPoint {
-    /// The first coordinates.
-    #[inline]
-    fn coordinates<const N: usize>(self) -> [f32; N] {
-        let u = shuffled_scrambled_sobol::<N>(self.index, self.seed);
-        std::array::from_fn(|d| {
-            let scramble = rotate_bytes(self.scramble, d as i32);
-            uint_to_float(scramble_and_reverse(u[d].reverse_bits(), scramble))
-        })
-    }
+/// The first coordinates of a point of an Owen-scrambled Sobol' sequence in four dimensions, with a second Owen scramble.
+#[inline]
+fn coordinates<const N: usize>(index: u32, seed: u32, scramble: u32) -> [f32; N] {
+    let u = shuffled_scrambled_sobol::<N>(index, seed);
+    std::array::from_fn(|d| {
+        let scramble = rotate_bytes(scramble, d as i32);
+        uint_to_float(scramble_and_reverse(u[d].reverse_bits(), scramble))
+    })
 }
 
 impl SampleStream {
@@ -222,8 +210,8 @@ impl SampleStream {
                 let h = pcg4d([key[0], key[1], key[2], INDEPENDENT]);
                 std::array::from_fn(|i| unit_f32(h[i]))
             }
-            Kind::Sobol(net) => net.point().coordinates(),
-            Kind::SobolBlueNoise(net) => net.blue_noise_point().coordinates(),
+            Kind::Sobol(net) => net.draw(),
+            Kind::SobolBlueNoise(net) => net.draw_blue_noise(),
         };
         for x in &mut u {
             *x = x.min(ONE_MINUS_EPSILON);
