@@ -39,41 +39,63 @@ impl RayBatch {
 
     /// Removes all rays, but keeps the memory.
     pub fn clear(&mut self) {
-        for v in [&mut self.ox, &mut self.oy, &mut self.oz, &mut self.dx, &mut self.dy, &mut self.dz] {
-            v.clear();
-        }
-        self.t_max.clear();
-        self.time.clear();
+        self.columns_mut().into_iter().for_each(Vec::clear);
     }
 
     /// Appends a ray.
     #[inline]
     pub fn push(&mut self, ray: &Ray) {
-        self.ox.push(ray.o.x);
-        self.oy.push(ray.o.y);
-        self.oz.push(ray.o.z);
-        self.dx.push(ray.d.x);
-        self.dy.push(ray.d.y);
-        self.dz.push(ray.d.z);
-        self.t_max.push(ray.t_max);
-        self.time.push(ray.time);
+        self.columns_mut().into_iter().zip(values(ray)).for_each(|(column, value)| column.push(value));
+    }
+
+    /// Appends infinite rays from `o` at the time 0; `d` are columns of directions.
+    pub fn extend_from(&mut self, o: Vec3, d: [&[f32]; 3]) {
+        let n = self.len() + d[0].len();
+        [&mut self.ox, &mut self.oy, &mut self.oz].into_iter().zip(o.to_array()).for_each(|(c, o)| c.resize(n, o));
+        [&mut self.dx, &mut self.dy, &mut self.dz].into_iter().zip(d).for_each(|(c, d)| c.extend_from_slice(d));
+        self.t_max.resize(n, f32::INFINITY);
+        self.time.resize(n, 0.0);
+    }
+
+    /// Replaces ray `i`.
+    #[inline]
+    pub fn replace(&mut self, i: usize, ray: &Ray) {
+        self.columns_mut().into_iter().zip(values(ray)).for_each(|(column, value)| column[i] = value);
     }
 
     /// Replaces all rays.
     #[inline]
     pub fn set<'r>(&mut self, rays: impl ExactSizeIterator<Item = &'r Ray>) {
         let n = rays.len();
-        let RayBatch { ox, oy, oz, dx, dy, dz, t_max, time } = self;
-        let mut columns = [ox, oy, oz, dx, dy, dz, t_max, time].map(|column| {
+        let mut columns = self.columns_mut().map(|column| {
             column.resize(n, 0.0);
             &mut column[..n]
         });
         for (i, ray) in rays.enumerate().take(n) {
-            let values = [ray.o.x, ray.o.y, ray.o.z, ray.d.x, ray.d.y, ray.d.z, ray.t_max, ray.time];
-            for (column, value) in columns.iter_mut().zip(values) {
-                column[i] = value;
-            }
+            columns.iter_mut().zip(values(ray)).for_each(|(column, value)| column[i] = value);
         }
+    }
+
+    /// Replaces all rays by those of `from`.
+    pub fn copy_from(&mut self, from: &RayBatch) {
+        for (to, from) in self.columns_mut().into_iter().zip(from.columns()) {
+            to.clear();
+            to.extend_from_slice(from);
+        }
+    }
+
+    /// Replaces all rays by the rays `indices` of `from`.
+    pub fn gather(&mut self, from: &RayBatch, indices: &[u32]) {
+        for (to, from) in self.columns_mut().into_iter().zip(from.columns()) {
+            to.clear();
+            to.extend(indices.iter().map(|&i| from[i as usize]));
+        }
+    }
+
+    /// The direction of ray `i`.
+    #[inline]
+    pub fn direction(&self, i: usize) -> Vec3 {
+        Vec3::new(self.dx[i], self.dy[i], self.dz[i])
     }
 
     /// Ray `i`.
@@ -81,11 +103,28 @@ impl RayBatch {
     pub fn get(&self, i: usize) -> Ray {
         Ray {
             o: Vec3::new(self.ox[i], self.oy[i], self.oz[i]),
-            d: Vec3::new(self.dx[i], self.dy[i], self.dz[i]),
+            d: self.direction(i),
             t_max: self.t_max[i],
             time: self.time[i],
         }
     }
+
+    fn columns(&self) -> [&Vec<f32>; 8] {
+        let RayBatch { ox, oy, oz, dx, dy, dz, t_max, time } = self;
+        [ox, oy, oz, dx, dy, dz, t_max, time]
+    }
+
+    #[inline]
+    fn columns_mut(&mut self) -> [&mut Vec<f32>; 8] {
+        let RayBatch { ox, oy, oz, dx, dy, dz, t_max, time } = self;
+        [ox, oy, oz, dx, dy, dz, t_max, time]
+    }
+}
+
+/// The values of a ray, in the order of the columns.
+#[inline]
+fn values(&Ray { o, d, t_max, time }: &Ray) -> [f32; 8] {
+    [o.x, o.y, o.z, d.x, d.y, d.z, t_max, time]
 }
 
 /// The first hit of a ray.

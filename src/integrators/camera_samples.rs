@@ -1,8 +1,7 @@
 //! Camera samples: film positions with their rays and random numbers.
 
-use super::camera_sample::CameraSample;
+use super::camera_sample::{CameraSample, CameraSamples};
 use super::{light_paths, reuse};
-use crate::cameras::CameraRay;
 use crate::direct::Estimator;
 use crate::film::filter::FilterSampler;
 use crate::scene::{PixelSamples, RenderJob, SampleCountMap};
@@ -13,8 +12,8 @@ use lumiris_lanes::level;
 use lumiris_lanes::sampler::{self, Below};
 use lumiris_numbers::estimators::ocv::block_of;
 use lumiris_numbers::math::hash::pcg4d;
-use lumiris_numbers::math::{Ray, Vec2, Vec3};
-use lumiris_numbers::samplers::{SampleStream, SamplerKind, StreamColumns};
+use lumiris_numbers::math::{Vec2, Vec3};
+use lumiris_numbers::samplers::{SampleStream, SamplerKind};
 use std::ops::Range;
 
 /// Random-number domains of a camera sample.
@@ -75,9 +74,7 @@ pub struct PixelSampleRange {
 #[derive(Debug, Default)]
 pub struct Scratch {
     pixels: Vec<PixelSampleRange>,
-    streams: StreamColumns,
     u: [Column; 2],
-    weight: Column,
     d: Columns3,
     spread: Column,
 }
@@ -125,14 +122,15 @@ impl<'a> CameraSampler<'a> {
         }
     }
 
-    /// Appends the samples of some pixels.
+    /// Replaces `out` by the samples of some pixels.
     pub fn samples(
         &self,
         pixels: impl Iterator<Item = PixelSampleRange>,
         seed: u32,
         scratch: &mut Scratch,
-        out: &mut Vec<CameraSample>,
+        out: &mut CameraSamples,
     ) {
+        out.clear();
         // Other cameras make their rays one by one
         let Some((pinhole, o)) = &self.pinhole else {
             for PixelSampleRange { fit, pixel, samples } in pixels {
@@ -141,23 +139,31 @@ impl<'a> CameraSampler<'a> {
             return;
         };
 
-        // Film positions, rays, and the other fields
-        self.draw_numbers(pixels, seed, scratch);
-        self.find_film_positions(scratch);
-        let len = padded(scratch.streams.len());
+        // Film positions, rays, and the other columns
+        self.draw_numbers(pixels, seed, scratch, out);
+        self.find_film_positions(scratch, out);
+        let (n, len) = (out.streams.len(), padded(out.streams.len()));
         let Scratch { u: [x, y], d, spread, .. } = &mut *scratch;
         let mut rays = PinholeRays { d: d.get_mut(len), spread: &mut spread[..len] };
         pinhole.rays(level(), [&x[..len], &y[..len]], &mut rays);
-        self.append(*o, seed, scratch, out);
+        out.spread.extend_from_slice(&spread[..n]);
+        out.width0.resize(n, 0.0);
+        out.rays.extend_from(*o, d.get(n));
+        self.set_pixels(seed, scratch, out);
     }
 
     /// Draws the random numbers of the film positions.
-    fn draw_numbers(&self, pixels: impl Iterator<Item = PixelSampleRange>, seed: u32, scratch: &mut Scratch) {
-        let Scratch { pixels: of_pixels, streams, u: [x, y], weight, d, spread } = scratch;
-        let kind = self.job.settings().sampling.sampler;
+    fn draw_numbers(
+        &self,
+        pixels: impl Iterator<Item = PixelSampleRange>,
+        seed: u32,
+        scratch: &mut Scratch,
+        out: &mut CameraSamples,
+    ) {
+        let Scratch { pixels: of_pixels, u: [x, y], d, spread } = scratch;
+        let (kind, streams) = (self.job.settings().sampling.sampler, &mut out.streams);
         // Streams, and the net points of samplers that are made of nets
         of_pixels.clear();
-        streams.clear();
         for range in pixels {
             streams.push_samples(kind, range.pixel, range.samples.clone(), seed);
             of_pixels.push(range);
@@ -165,61 +171,52 @@ impl<'a> CameraSampler<'a> {
 
         // Two numbers of each
         let (n, len) = (streams.len(), padded(streams.len()));
-        reserve(&mut [x, y, weight, spread], len);
+        reserve(&mut [x, y, spread], len);
         d.reserve(len);
         let numbers = [&mut x[..n], &mut y[..n]];
         sampler::draw(level(), streams, 0..n, Below::Domain(domain::FILM_AND_LENS), numbers);
     }
 
-    /// Turns random numbers into film positions and filter weights.
-    fn find_film_positions(&self, scratch: &mut Scratch) {
-        let Scratch { pixels, u: [x, y], weight, .. } = scratch;
+    /// Turns random numbers into film positions and weights.
+    fn find_film_positions(&self, scratch: &mut Scratch, out: &mut CameraSamples) {
+        let Scratch { pixels, u: [x, y], .. } = scratch;
+        let scale = self.job.world.scene.film.scale;
+        out.weight.resize(out.streams.len(), 0.0);
         let mut first = 0;
         for PixelSampleRange { pixel, samples, .. } in pixels {
             let (of_pixel, center) = (first..first + samples.len(), center(*pixel));
             first = of_pixel.end;
             let positions = x[of_pixel.clone()].iter_mut().zip(&mut y[of_pixel.clone()]);
-            for ((x, y), weight) in positions.zip(&mut weight[of_pixel]) {
+            for ((x, y), weight) in positions.zip(&mut out.weight[of_pixel]) {
                 let filter = self.filter.sample([*x, *y]);
                 let film = center + filter.offset;
-                (*x, *y, *weight) = (film.x, film.y, filter.weight);
+                (*x, *y, *weight) = (film.x, film.y, filter.weight * scale);
             }
         }
     }
 
-    /// Appends the samples whose rays start at `o`. Fills them in place: common fields per pixel, then the fields of
-    /// each sample. Copies of samples would dominate the time.
-    fn append(&self, o: Vec3, seed: u32, scratch: &Scratch, out: &mut Vec<CameraSample>) {
-        let Scratch { pixels, streams, weight, d, spread, .. } = scratch;
-        let scene = &self.job.world.scene;
-        let ray = Ray { o, d: Vec3::ZERO, t_max: f32::INFINITY, time: 0.0 };
-        let ray = CameraRay { ray, spread: 0.0, width0: 0.0, weight: 1.0 };
-        let (mut first, [dx, dy, dz]) = (0, d.get(padded(streams.len())));
-        for &PixelSampleRange { fit, pixel, ref samples } in pixels {
-            let begin = out.len();
-            if samples.is_empty() {
-                continue;
+    /// Sets the columns that belong to pixels, and those that few images need.
+    fn set_pixels(&self, seed: u32, scratch: &Scratch, out: &mut CameraSamples) {
+        for &PixelSampleRange { fit, pixel, ref samples } in &scratch.pixels {
+            let end = out.fit.len() + samples.len();
+            out.fit.resize(end, fit);
+            out.pixel.resize(end, pixel);
+            out.sample_counts.resize(end, self.sample_counts);
+            out.share_group.extend(samples.clone());
+        }
+        if self.are_plain {
+            return;
+        }
+
+        // Streams of direct light, sample counts and share groups of their own
+        let indices = scratch.pixels.iter().flat_map(|range| range.samples.clone());
+        for (i, sample) in indices.enumerate() {
+            let (pixel, stream) = (out.pixel[i], out.streams.get(i));
+            if let Some(direct) = self.direct_stream(pixel, sample, seed) {
+                out.direct.extend([direct].iter());
             }
-            let of_ray = CameraSample::of_ray(ray, 0.0, streams.get(first), self.sample_counts);
-            let common = CameraSample { fit, pixel, ..of_ray };
-            out.resize(begin + samples.len(), common);
-            for ((of_pixel, sample), i) in out[begin..].iter_mut().zip(samples.clone()).zip(first..) {
-                of_pixel.ray.ray.d = Vec3::new(dx[i], dy[i], dz[i]);
-                of_pixel.ray.spread = spread[i];
-                of_pixel.weight = weight[i] * scene.film.scale;
-                of_pixel.stream = streams.get(i);
-                of_pixel.direct = of_pixel.stream;
-                of_pixel.share_group = sample;
-            }
-            first += samples.len();
-            // Fields that few images need
-            if !self.are_plain {
-                for (of_pixel, sample) in out[begin..].iter_mut().zip(samples.clone()) {
-                    of_pixel.direct = self.direct_stream(pixel, sample, seed).unwrap_or(of_pixel.stream);
-                    of_pixel.sample_counts = self.counts(pixel, &of_pixel.stream);
-                    of_pixel.share_group = self.share_group(pixel, sample);
-                }
-            }
+            out.sample_counts[i] = self.counts(pixel, &stream);
+            out.share_group[i] = self.share_group(pixel, sample);
         }
     }
 

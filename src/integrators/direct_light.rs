@@ -38,7 +38,7 @@ impl PathTracer {
 
         // Callbacks: the weight that light paths leave to a light sample, and the sums of light groups
         let VertexSearch { active, layers, guide, recording, .. } = &mut self.search;
-        let path = |row: usize| &active[vertices.path[row] as usize];
+        let path = |row: usize| &active.states[vertices.path[row] as usize];
         let against_light_paths = guide.as_ref().map(|guide| {
             move |&SampleOnLight { row, light, n, wi }: &SampleOnLight| {
                 let chain = path(row).chain;
@@ -82,7 +82,7 @@ impl PathTracer {
         fits: &mut Fits,
         out: &mut [PixelSample],
     ) {
-        let (job, active) = (step.job, &self.search.active);
+        let (job, active) = (step.job, &self.search.active.states);
         // Points in the order of the paths, since fits are sums over the points of a pixel
         let mut rows = vec![u32::MAX; active.len()];
         vertices.path.iter().zip(0..).for_each(|(&path, row)| rows[path as usize] = row);
@@ -90,9 +90,9 @@ impl PathTracer {
         let path = |point: usize| &active[vertices.path[rows[point] as usize] as usize];
         let counts = step.estimator.sample_counts();
         let point = |(point, &row): (usize, &u32)| {
-            let sample = &step.samples[path(point).sample as usize];
-            let counts = if step.vertex == 0 { sample.sample_counts } else { counts };
-            vertices.point(row as usize, counts, [path(point).sample, sample.fit])
+            let sample = path(point).sample;
+            let counts = if step.vertex == 0 { step.samples.sample_counts[sample as usize] } else { counts };
+            vertices.point(row as usize, counts, [sample, step.samples.fit[sample as usize]])
         };
         let points: Vec<ShadingPoint<'_>> = rows.iter().enumerate().map(point).collect();
         self.direct.estimate(job, &step.estimator, &points, fits, &mut self.radiance);

@@ -1,6 +1,6 @@
 //! The interface of integrators.
 
-use super::camera_sample::CameraSample;
+use super::camera_sample::{CameraSample, CameraSamples};
 use super::light_layers::LayerSums;
 use super::statistics::{PathStats, Statistics};
 use crate::direct::Fits;
@@ -30,9 +30,9 @@ pub trait Integrator: Sync {
 
 /// Traces samples in one thread; holds its buffers and counts.
 pub trait Tracer: Send {
-    /// Estimates the radiance of each camera sample; `out[i]` belongs to `samples[i]`. `fits` belong to the pixels of
+    /// Estimates the radiance of each camera sample; `out[i]` belongs to sample `i`. `fits` belong to the pixels of
     /// the samples.
-    fn trace(&mut self, job: &RenderJob, samples: &[CameraSample], fits: &mut Fits, out: &mut Vec<PixelSample>);
+    fn trace(&mut self, job: &RenderJob, samples: &CameraSamples, fits: &mut Fits, out: &mut Vec<PixelSample>);
 
     /// Sums the light of `count` light-group layers from now on, if supported; see [`super::light_layers`].
     fn keep_light_layers(&mut self, _count: usize) {}

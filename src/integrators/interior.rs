@@ -14,7 +14,7 @@
 //! log n.
 
 use super::domain;
-use super::path_state::{BsdfTechnique, PathState};
+use super::path_state::{BsdfTechnique, PathState, TracedPath};
 use super::vertex_search::{FlightOutcome, TraceStep, VertexSearch};
 use crate::accel::Hit;
 use crate::bsdfs::dielectric::{Select, Transport};
@@ -23,7 +23,7 @@ use crate::bsdfs::{Bsdf, Dielectric, Phase};
 use crate::materials::SurfaceBsdf;
 use crate::media::{EmissionLookups, End, Flight, FlightSampler, Medium, Segment, Sides};
 use crate::scene::{RenderJob, SurfaceInteraction};
-use lumiris_numbers::math::{Ray, Rgb, Vec3};
+use lumiris_numbers::math::{Rgb, Vec3};
 
 /// Number of events before roulette by throughput.
 const FREE_EVENTS: u32 = 8;
@@ -45,19 +45,19 @@ impl VertexSearch {
         &mut self,
         at: &TraceStep<'_, '_>,
         medium: &Medium,
-        index: u32,
-        path: &mut PathState,
+        traced: &mut TracedPath<'_>,
         hit: Option<&Hit>,
     ) -> FlightOutcome {
-        let scale = path.ray.d.length();
-        let (o, d) = (path.ray.o, path.ray.d / scale);
+        let TracedPath { state: path, ray, .. } = traced;
+        let scale = ray.d.length();
+        let (o, d) = (ray.o, ray.d / scale);
         let segment = Segment { o, d, length: hit.map_or(f32::INFINITY, |hit| hit.t * scale) };
-        let stream = at.samples[path.sample as usize].stream;
+        let stream = at.samples.streams.get(path.sample as usize);
         let mut numbers = FlightSampler::new(stream.domain(domain::FLIGHT + at.vertex).domain(path.passed));
         let Flight { end, .. } = medium.fly(&segment, path.beta, &mut numbers, || None, EmissionLookups::UNWEIGHTED);
         let (t, weight) = match end {
             End::Through { weight } => {
-                path.weaken(weight);
+                path.beta *= weight;
                 return FlightOutcome::Through;
             }
             End::Scattered { t, weight } => (t, weight),
@@ -65,30 +65,28 @@ impl VertexSearch {
         // After the last vertex, the walk cannot reach another one
         if at.vertex < at.depth
             && path.passed < MAX_EVENTS
-            && let Some(next) = self.scatter_inside(at, path, d, t, weight, medium)
+            && let Some(scattered) = self.scatter_inside(at, path, weight, medium, d)
         {
-            *path = next;
-            self.passing.push(index);
+            (path.width, path.travelled) = (path.width + path.spread * t, path.travelled + t);
+            go_on(traced, o + d * t, scattered);
+            self.passing.push(traced.index);
         }
         FlightOutcome::Ended
     }
 
-    /// Scatters a path in an interior, after the distance `t` in the direction `d` and with the throughput factor
-    /// `weight`.
+    /// Scatters a path of direction `d` in an interior, with the throughput factor `weight` of its flight.
     fn scatter_inside(
         &self,
         at: &TraceStep<'_, '_>,
         path: &PathState,
-        d: Vec3,
-        t: f32,
         weight: Rgb,
         medium: &Medium,
-    ) -> Option<PathState> {
+        d: Vec3,
+    ) -> Option<Scattered> {
         let [u_survival, u0, u1] = self.walk_numbers(at, path);
         let beta = survive_walk(path.beta_beyond_emitter()? * weight, path, u_survival)?;
         let sample = Phase::new(medium.g()).sample(-d, [u0, u1])?;
-        let next = PathState { width: path.width + path.spread * t, travelled: path.travelled + t, ..*path };
-        Some(go_on(next, path.ray.o + d * t, sample.wi, beta))
+        Some(Scattered { wi: sample.wi, beta })
     }
 
     /// The BSDF of a path at a surface; the throughput is divided by the probability of the choice. Returns `None` if
@@ -96,12 +94,12 @@ impl VertexSearch {
     pub(super) fn exit_or_reflect<'w>(
         &mut self,
         at: &TraceStep<'_, '_>,
-        index: u32,
-        path: &mut PathState,
+        traced: &mut TracedPath<'_>,
         interaction: &SurfaceInteraction,
         bsdf: SurfaceBsdf<'w>,
         sides: Sides,
     ) -> Option<SurfaceBsdf<'w>> {
+        let path = &mut *traced.state;
         let Bsdf::Dielectric(interface) = bsdf.bsdf else { return Some(bsdf) };
         let is_boundary = sides.differ() && sides.towards(interaction.surface.n.dot(interaction.wo)) == path.medium;
         if !is_boundary || !self.walks(at.job, path) {
@@ -124,30 +122,31 @@ impl VertexSearch {
             return None;
         }
         let wi = bsdf.frame.to_world(s.wi);
-        let next = PathState {
-            medium: interaction.medium_beyond(at.job, wi, path.medium),
-            width: interaction.width,
-            travelled: path.depth(interaction),
-            ..*path
-        };
-        *path = go_on(next, interaction.origin(wi), wi, beta);
-        self.passing.push(index);
+        path.medium = interaction.medium_beyond(at.job, wi, path.medium);
+        (path.width, path.travelled) = (interaction.width, path.depth(interaction));
+        go_on(traced, interaction.origin(wi), Scattered { wi, beta });
+        self.passing.push(traced.index);
         None
     }
 
     /// Random numbers of the event at the end of a flight.
     fn walk_numbers(&self, at: &TraceStep<'_, '_>, path: &PathState) -> [f32; 3] {
-        let stream = at.samples[path.sample as usize].stream;
+        let stream = at.samples.streams.get(path.sample as usize);
         stream.domain(domain::WALK + at.vertex).domain(path.passed).draw::<3>()
     }
 }
 
-/// Continues a path from `o` in the direction `wi`. No light is sampled at `o`, so emission that the segment hits has
-/// the weight 1.
-fn go_on(path: PathState, o: Vec3, wi: Vec3, beta: Rgb) -> PathState {
-    let technique = BsdfTechnique { row: BsdfTechnique::NO_ROW, pdf: None, survivor: None };
-    let ray = Ray { o, d: wi, ..path.ray };
-    PathState { ray, beta, passed: path.passed + 1, technique: Some(technique), ..path }
+/// A direction after an event of a walk, with the throughput in that direction.
+struct Scattered {
+    wi: Vec3,
+    beta: Rgb,
+}
+
+/// Continues a path from `o`. No light is sampled at `o`, so emission that the segment hits has the weight 1.
+fn go_on(TracedPath { state: path, ray, .. }: &mut TracedPath<'_>, o: Vec3, Scattered { wi, beta }: Scattered) {
+    let technique = BsdfTechnique { row: BsdfTechnique::NO_ROW, pdf: 0.0, survival: 0.0 };
+    (path.beta, path.passed, path.technique) = (beta, path.passed + 1, Some(technique));
+    (ray.o, ray.d) = (o, wi);
 }
 
 /// Probability that the boundary reflects a walk back; `wo` is in the shading frame.
@@ -175,10 +174,8 @@ mod tests {
 
     #[test]
     fn roulette_of_walks_keeps_the_mean_of_the_throughput() {
-        let ray = Ray { o: Vec3::ZERO, d: Vec3::Z, t_max: f32::INFINITY, time: 0.0 };
         let path = |passed| PathState {
             sample: 0,
-            ray,
             beta: Rgb::WHITE,
             eta_scale: 2.0,
             width: 0.0,

@@ -32,7 +32,7 @@ mod scatter;
 mod statistics;
 mod vertex_search;
 
-pub use camera_sample::CameraSample;
+pub use camera_sample::{CameraSample, CameraSamples};
 pub use choice::integrator;
 pub use integrator::{Cameras, Integrator, Tracer};
 pub use irradiance_cache::{CacheIntegrator, IrradianceCache};

@@ -11,12 +11,12 @@
 //!
 //! All integrators use this path loop. [`AtVertices`] is the hook for their own work at vertices.
 
-use super::camera_sample::CameraSample;
+use super::camera_sample::CameraSamples;
 use super::cells::Blocks;
 use super::integrator::{Integrator, Tracer};
 use super::light_layers::LayerSums;
 use super::light_paths::{LightImage, LightPilot};
-use super::path_state::{LastVertices, PathState};
+use super::path_state::{LastVertices, PathState, Paths};
 pub use super::recording::Recording;
 use super::reuse::{self, LambertianVertex, Reuse};
 use super::scatter::{Continuation, Scatter};
@@ -28,7 +28,7 @@ use crate::materials::SurfaceBsdf;
 use crate::photons::PhotonError;
 use crate::scene::RenderJob;
 use crate::settings::{IntegratorSettings, SampleCounts};
-use lumiris_numbers::math::Rgb;
+use lumiris_numbers::math::{Ray, Rgb};
 use lumiris_numbers::samplers::SampleStream;
 use std::sync::Arc;
 use std::time::Instant;
@@ -73,7 +73,7 @@ struct WithLightPaths<'a> {
 }
 
 impl Tracer for WithLightPaths<'_> {
-    fn trace(&mut self, job: &RenderJob, samples: &[CameraSample], fits: &mut Fits, out: &mut Vec<PixelSample>) {
+    fn trace(&mut self, job: &RenderJob, samples: &CameraSamples, fits: &mut Fits, out: &mut Vec<PixelSample>) {
         Tracer::trace(&mut self.paths, job, samples, fits, out);
         self.light.add(samples, out);
     }
@@ -87,13 +87,15 @@ impl Tracer for WithLightPaths<'_> {
 pub(super) struct BatchVertices<'a, 'w> {
     /// Index of the vertices along the paths, from 0.
     pub(super) vertex: u32,
-    pub(super) paths: &'a [PathState],
+    pub(super) paths: &'a Paths,
     pub(super) vertices: &'a Vertices<'w>,
 }
 
 /// A single vertex.
 pub(super) struct PathVertex<'a, 'w> {
     pub(super) path: &'a PathState,
+    /// The ray to the vertex.
+    pub(super) ray: Ray,
     pub(super) point: ShadingPoint<'w>,
     /// Its random numbers.
     pub(super) stream: SampleStream,
@@ -104,9 +106,10 @@ impl<'a, 'w> BatchVertices<'a, 'w> {
     pub(super) fn each(&self) -> impl Iterator<Item = PathVertex<'a, 'w>> {
         let (paths, vertices) = (self.paths, self.vertices);
         (0..vertices.len()).map(move |i| {
-            let path = &paths[vertices.path[i] as usize];
+            let index = vertices.path[i] as usize;
+            let (path, ray) = (&paths.states[index], paths.rays.get(index));
             let point = vertices.point(i, SampleCounts::default(), [path.sample, 0]);
-            PathVertex { path, point, stream: vertices.streams.get(i) }
+            PathVertex { path, ray, point, stream: vertices.streams.get(i) }
         })
     }
 }
@@ -143,7 +146,7 @@ pub const BATCH_PATHS: usize = 1024;
 #[derive(Debug, Default)]
 pub struct PathTracer {
     pub(super) search: VertexSearch,
-    next: Vec<PathState>,
+    next: Paths,
     scatter: Scatter,
     pub(super) radiance: Vec<Rgb>,
     pub(super) direct: PointDirectLighting,
@@ -164,7 +167,7 @@ pub struct PathTracer {
 pub(super) struct ShadeStep<'s> {
     pub(super) job: &'s RenderJob,
     pub(super) settings: &'s IntegratorSettings,
-    pub(super) samples: &'s [CameraSample],
+    pub(super) samples: &'s CameraSamples,
     /// Index along the paths.
     pub(super) vertex: u32,
     pub(super) estimator: Estimator,
@@ -210,7 +213,7 @@ impl PathTracer {
         &mut self,
         job: &RenderJob,
         settings: &IntegratorSettings,
-        samples: &[CameraSample],
+        samples: &CameraSamples,
         fits: &mut Fits,
         out: &mut Vec<PixelSample>,
     ) {
@@ -224,7 +227,7 @@ impl PathTracer {
         job: &RenderJob,
         settings: &IntegratorSettings,
         mut own: Option<&mut AtVertices<'_>>,
-        samples: &[CameraSample],
+        samples: &CameraSamples,
         fits: &mut Fits,
         out: &mut [PixelSample],
     ) {
@@ -266,7 +269,7 @@ impl PathTracer {
             drawn = step.techniques;
         }
         self.resolve_shared(job, samples, out);
-        fits.end_batch(samples.iter().map(|s| (s.fit, s.weight)));
+        fits.end_batch(samples.fit.iter().copied().zip(samples.weight.iter().copied()));
         self.spare = [vertices, left, of_direct, of_next].map(Vertices::emptied);
     }
 
@@ -276,7 +279,7 @@ impl PathTracer {
         job: &'s RenderJob,
         settings: &'s IntegratorSettings,
         vertex: u32,
-        samples: &'s [CameraSample],
+        samples: &'s CameraSamples,
         has_own: bool,
     ) -> ShadeStep<'s> {
         let estimator = Estimator::at_vertex(settings, self.estimator_of.unwrap_or(vertex));
@@ -320,7 +323,7 @@ impl PathTracer {
     }
 
     /// Adds the light of shared paths.
-    fn resolve_shared(&mut self, job: &RenderJob, samples: &[CameraSample], out: &mut [PixelSample]) {
+    fn resolve_shared(&mut self, job: &RenderJob, samples: &CameraSamples, out: &mut [PixelSample]) {
         let Some(reuse) = self.reuse.active() else { return };
         let start = Instant::now();
         self.direct.stats.segments += reuse.resolve(job, samples, out);
@@ -333,7 +336,7 @@ impl PathTracer {
         let start = Instant::now();
         let surface = &vertices.surface;
         for i in vertices.bsdfs.len()..vertices.len() {
-            let path = &mut self.search.active[vertices.path[i] as usize];
+            let path = &mut self.search.active.states[vertices.path[i] as usize];
             let [p, p_error] = [&surface.p, &surface.p_error].map(|column| column.vec3(i));
             let at = LambertianVertex::new(p, p_error, surface.n.vec3(i), surface.ns.vec3(i), surface.wo.vec3(i));
             reuse.add(path, vertex, at, surface.rho.rgb(i), &mut out[path.sample as usize].radiance);
@@ -343,7 +346,7 @@ impl PathTracer {
 }
 
 impl Tracer for PathTracer {
-    fn trace(&mut self, job: &RenderJob, samples: &[CameraSample], fits: &mut Fits, out: &mut Vec<PixelSample>) {
+    fn trace(&mut self, job: &RenderJob, samples: &CameraSamples, fits: &mut Fits, out: &mut Vec<PixelSample>) {
         PathTracer::trace(self, job, &job.settings().integrator, samples, fits, out);
     }
 

@@ -17,7 +17,7 @@
 //! within [cells](super::cells), which are always rendered together. The sample counts of pixels are independent of the
 //! samples, and so are share groups and blocks.
 
-use super::camera_sample::CameraSample;
+use super::camera_sample::CameraSamples;
 use super::cells::Blocks;
 use super::exclusions::{self, Feature};
 use super::path_state::PathState;
@@ -211,7 +211,7 @@ impl Reuse {
     }
 
     /// Distributes the light of the paths of each group to its samples; returns the number of segments.
-    pub(super) fn resolve(&mut self, job: &RenderJob, samples: &[CameraSample], out: &mut [PixelSample]) -> u64 {
+    pub(super) fn resolve(&mut self, job: &RenderJob, samples: &CameraSamples, out: &mut [PixelSample]) -> u64 {
         if self.count == 0 {
             return 0;
         }
@@ -219,10 +219,12 @@ impl Reuse {
         // Sort the samples by group
         let (origin, blocks, edge) = (job.world.scene.film.bounds, self.blocks, self.edge);
         let seed = job.settings().sampling.seed;
-        let pixel = |s: &CameraSample| [s.pixel[0] - origin.x0, s.pixel[1] - origin.y0];
-        let group = |s: &CameraSample| blocks.of(edge, seed, pixel(s), s.share_group, s.is_replica);
+        let group = |[x, y]: [u32; 2], share_group: u32| {
+            blocks.of(edge, seed, [x - origin.x0, y - origin.y0], share_group, samples.are_replicas)
+        };
         self.order.clear();
-        self.order.extend(samples.iter().zip(0_u128..).map(|(s, i)| u128::from(group(s)) << 32 | i));
+        let of_samples = samples.pixel.iter().zip(&samples.share_group).zip(0_u128..);
+        self.order.extend(of_samples.map(|((&pixel, &share), i)| u128::from(group(pixel, share)) << 32 | i));
         self.order.sort_unstable();
 
         // Separate the radiance beyond the second vertices, which is shared

@@ -5,22 +5,25 @@ use crate::settings::IntegratorSettings;
 use lumiris_numbers::math::Rgb;
 use lumiris_numbers::samplers::SampleStream;
 
-/// Russian roulette before bounce `bounce`, for a path that leaves the vertex of `stream` with the throughput `beta`.
-/// The survival probability is the maximum of β · `eta_scale`, so refraction does not count as a loss. Returns the
-/// throughput of a path that survives.
+/// Russian roulette before bounce `bounce`, for a path that leaves a vertex with the throughput `beta`; `stream` has the
+/// numbers of the vertex. The survival probability is the maximum of β · `eta_scale`, so refraction does not count as a
+/// loss. Returns the probability if the path survives, else 0.
 #[inline]
-pub(super) fn survive(
+pub(super) fn survival(
     beta: Rgb,
     eta_scale: f32,
-    stream: &SampleStream,
+    stream: impl FnOnce() -> SampleStream,
     bounce: u32,
     settings: &IntegratorSettings,
-) -> Option<Rgb> {
-    let survival = (beta * eta_scale).map(f32::abs).max_component();
-    if !settings.has_roulette(bounce) || !(survival < 1.0) {
-        return Some(beta);
+) -> f32 {
+    if !settings.has_roulette(bounce) {
+        return 1.0;
     }
-    (stream.draw_random(domain::ROULETTE) < survival).then(|| beta / survival)
+    let survival = (beta * eta_scale).map(f32::abs).max_component();
+    if !(survival < 1.0) {
+        return 1.0;
+    }
+    if stream().draw_random(domain::ROULETTE) < survival { survival } else { 0.0 }
 }
 
 #[cfg(test)]
@@ -37,9 +40,11 @@ mod tests {
         // Refraction does not count as a loss: the survival probability is 0.2·2.25
         let (mut sum, mut count) = (Rgb::BLACK, 0);
         for stream in streams.clone() {
-            assert_eq!(survive(beta, eta_scale, &stream, 2, &settings), Some(beta));
-            let Some(survivor) = survive(beta, eta_scale, &stream, 3, &settings) else { continue };
-            (sum, count) = (sum + survivor, count + 1);
+            assert_eq!(survival(beta, eta_scale, || stream, 2, &settings), 1.0);
+            let survival = survival(beta, eta_scale, || stream, 3, &settings);
+            if survival > 0.0 {
+                (sum, count) = (sum + beta / survival, count + 1);
+            }
         }
         // Five standard deviations of independent numbers
         let (mean, share) = (sum * (1.0 / 4096.0), count as f32 / 4096.0);
@@ -48,6 +53,6 @@ mod tests {
 
         // A throughput above 1 is unchanged
         let bright = Rgb::splat(1.5);
-        assert!(streams.into_iter().all(|stream| survive(bright, 1.0, &stream, 9, &settings) == Some(bright)));
+        assert!(streams.into_iter().all(|stream| survival(bright, 1.0, || stream, 9, &settings) == 1.0));
     }
 }

@@ -1,8 +1,8 @@
 //! BSDF sampling of the next path segments.
 
 use super::domain;
-use super::path_state::{BsdfTechnique, PathState};
-use super::roulette::survive;
+use super::path_state::{BsdfTechnique, PathState, Paths};
+use super::roulette::survival;
 use crate::bsdfs::Lobe;
 use crate::direct::vertices::BsdfSamples;
 use crate::direct::{Techniques, Vertices};
@@ -11,7 +11,7 @@ use lumiris_lanes::columns::{Column, Columns3, padded, reserve};
 use lumiris_lanes::level;
 use lumiris_lanes::sampler::{self, Below};
 use lumiris_lanes::vertex as kernels;
-use lumiris_numbers::math::{Ray, Rgb, Vec3};
+use lumiris_numbers::math::{Rgb, Vec3};
 
 /// Samples the directions of a batch; holds the buffers of one worker.
 #[derive(Debug, Default)]
@@ -19,6 +19,8 @@ pub(super) struct Scatter {
     u: [Column; 3],
     samples: BsdfSamples,
     o: Columns3,
+    /// Rows whose paths continue.
+    rows: Vec<u32>,
 }
 
 /// How paths continue.
@@ -34,28 +36,20 @@ pub(super) struct Continuation<'a> {
 
 /// The direction of the next segment of a path.
 struct Direction {
-    /// Origin of the ray.
-    o: Vec3,
     wi: Vec3,
     /// Factor of the throughput.
     weight: Rgb,
     /// Relative index of refraction.
     eta: f32,
-    /// Density; `None` if no other technique can draw the direction, or the density is unknown.
-    pdf: Option<f32>,
+    /// Density; 0 if no other technique can draw the direction, or the density is unknown.
+    pdf: f32,
     /// The segment is the BSDF sample of direct light as well.
     by_path: bool,
 }
 
 impl Scatter {
     /// Adds the next segments of the paths at the vertices to `next`.
-    pub(super) fn extend(
-        &mut self,
-        how: &Continuation<'_>,
-        vertices: &Vertices<'_>,
-        paths: &[PathState],
-        next: &mut Vec<PathState>,
-    ) {
+    pub(super) fn extend(&mut self, how: &Continuation<'_>, vertices: &Vertices<'_>, paths: &Paths, next: &mut Paths) {
         // Draw all directions in columns
         self.draw(vertices);
         let len = padded(vertices.len());
@@ -65,8 +59,8 @@ impl Scatter {
         self.resample(how, vertices);
 
         // Make segments from the directions with a density
-        let BsdfSamples { wi, f_cos, pdf, lobe, eta } = &self.samples;
-        kernels::origins(level(), &vertices.surface.ends(len), wi.get(len), &mut self.o.get_mut(len));
+        let Scatter { samples: BsdfSamples { wi, f_cos, pdf, lobe, eta }, o, rows, .. } = self;
+        rows.clear();
         for i in (0..vertices.len()).filter(|&i| pdf[i] > 0.0) {
             let is_resampled = i < vertices.bsdfs.len() && vertices.bsdfs[i].bsdf.is_only_evaluated();
             let lobe = Lobe::of_flags(lobe[i] as u8);
@@ -74,15 +68,36 @@ impl Scatter {
                 continue;
             }
             let direction = Direction {
-                o: self.o.vec3(i),
                 wi: wi.vec3(i),
                 weight: f_cos.rgb(i) / pdf[i],
                 eta: eta[i],
-                pdf: (!is_resampled && !lobe.is_specular()).then_some(pdf[i]),
+                pdf: if is_resampled || lobe.is_specular() { 0.0 } else { pdf[i] },
                 by_path: !is_resampled && how.techniques.is_some_and(|techniques| techniques.are_by_path()),
             };
-            next.extend(how.segment(vertices, i, &paths[vertices.path[i] as usize], &direction));
+            let Some(state) = how.segment(vertices, i, &paths.states[vertices.path[i] as usize], &direction) else {
+                continue;
+            };
+            next.states.push(state);
+            rows.push(i as u32);
         }
+
+        // Their rays
+        kernels::origins(level(), &vertices.surface.ends(len), wi.get(len), &mut o.get_mut(len));
+        let ([ox, oy, oz], [dx, dy, dz]) = (o.get(len), wi.get(len));
+        let rays = &mut next.rays;
+        let columns = [
+            (&mut rays.ox, ox),
+            (&mut rays.oy, oy),
+            (&mut rays.oz, oz),
+            (&mut rays.dx, dx),
+            (&mut rays.dy, dy),
+            (&mut rays.dz, dz),
+            (&mut rays.time, &vertices.time),
+        ];
+        for (to, from) in columns {
+            to.extend(rows.iter().map(|&row| from[row as usize]));
+        }
+        rays.t_max.resize(rays.ox.len(), f32::INFINITY);
     }
 
     /// Resamples M proposals at vertices whose BSDFs can only be evaluated.
@@ -123,18 +138,20 @@ impl Continuation<'_> {
         }
 
         // Roulette
-        let survivor = survive(beta, eta_scale, &vertices.streams.get(row), self.vertex + 1, self.settings);
+        let survival = survival(beta, eta_scale, || vertices.streams.get(row), self.vertex + 1, self.settings);
+        if survival == 0.0 && !to.by_path {
+            return None;
+        }
 
         // Density of light paths that could have sampled the same path
         let n = vertices.surface.n.vec3(row);
         let chain = if path.chain.is_caustic() { path.chain } else { path.chain.beyond_first(to.pdf, n.dot(to.wi)) };
         Some(PathState {
-            ray: Ray { o: to.o, d: to.wi, t_max: f32::INFINITY, ..path.ray },
-            beta: if to.by_path { beta } else { survivor? },
+            beta: if to.by_path { beta } else { beta / survival },
             eta_scale,
             passed: 0,
             travelled: 0.0,
-            technique: to.by_path.then_some(BsdfTechnique { row: row as u32, pdf: to.pdf, survivor }),
+            technique: to.by_path.then_some(BsdfTechnique { row: row as u32, pdf: to.pdf, survival }),
             medium: vertices.media(row).towards(n.dot(to.wi)),
             chain,
             ..*path

@@ -1,10 +1,10 @@
 //! Traces paths to their next vertices, and adds the emission on the way.
 
-use super::camera_sample::CameraSample;
+use super::camera_sample::CameraSamples;
 use super::domain;
 use super::light_layers::LayerSums;
 use super::light_paths::{Chain, Guide};
-use super::path_state::{LastVertices, PathState};
+use super::path_state::{LastVertices, PathState, Paths, TracedPath};
 use super::recording::Recording;
 use super::statistics::PathStats;
 use crate::accel::{Coherence, Hit, RayBatch};
@@ -19,7 +19,7 @@ use crate::media::{EmissionLookup, EmissionLookups, End, Flight, FlightSampler, 
 use crate::scene::{RenderJob, SurfaceInteraction};
 use lumiris_lanes::{level, sampler};
 use lumiris_numbers::math::{Rgb, Vec3};
-use lumiris_numbers::samplers::{SampleStream, StreamColumns};
+use lumiris_numbers::samplers::SampleStream;
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -32,7 +32,7 @@ pub(super) struct TraceStep<'a, 'w> {
     /// Index of the vertices along their paths, and the maximum number of vertices.
     pub(super) vertex: u32,
     pub(super) depth: u32,
-    pub(super) samples: &'a [CameraSample],
+    pub(super) samples: &'a CameraSamples,
     /// The last vertices.
     pub(super) left: LastVertices<'a, 'w>,
     /// Receives emission and features.
@@ -52,40 +52,19 @@ pub(super) enum FlightOutcome {
     Ghost(PathState),
 }
 
-/// Random numbers of the camera samples of a batch.
-#[derive(Debug, Default)]
-struct SampleNumbers {
-    streams: StreamColumns,
-    /// Streams of direct light, if they differ.
-    direct: Option<StreamColumns>,
-}
-
-impl SampleNumbers {
-    fn set(&mut self, samples: &[CameraSample]) {
-        self.streams.clear();
-        self.streams.extend(samples.iter().map(|sample| &sample.stream));
-        self.direct = None;
-        if samples.iter().any(|sample| sample.direct != sample.stream) {
-            let direct = self.direct.insert(StreamColumns::default());
-            direct.extend(samples.iter().map(|sample| &sample.direct));
-        }
-    }
-}
-
 /// The active paths of a batch; holds the buffers of one worker.
 #[derive(Debug, Default)]
 pub(super) struct VertexSearch {
-    pub(super) active: Vec<PathState>,
+    pub(super) active: Paths,
     /// Indices of the paths that are traced.
     traced: Vec<u32>,
     /// Indices of the paths that continue in the next trace, without a vertex.
     pub(super) passing: Vec<u32>,
     /// Indices of the paths that hit nothing, and receive light from infinite lights.
     escaped: Vec<u32>,
+    /// Rays of the paths that are traced, if these are not all.
     rays: RayBatch,
     hits: Vec<Option<Hit>>,
-    /// Random numbers of the camera samples.
-    numbers: SampleNumbers,
     /// Camera samples of the vertices, in the order of these vertices.
     sampled: Vec<u32>,
     /// Geometry and distance from the camera of first vertices on plain meshes, in the order of these vertices.
@@ -106,21 +85,22 @@ pub(super) struct VertexSearch {
 
 impl VertexSearch {
     /// Starts paths with the camera rays.
-    pub(super) fn start(&mut self, job: &RenderJob, samples: &[CameraSample], out: &mut Vec<PixelSample>) {
+    pub(super) fn start(&mut self, job: &RenderJob, samples: &CameraSamples, out: &mut Vec<PixelSample>) {
         out.clear();
         out.resize(samples.len(), PixelSample::default());
         self.layers.begin(samples.len());
-        self.numbers.set(samples);
-        self.active.clear();
 
         // One path per camera sample
-        self.active.extend(samples.iter().enumerate().map(|(i, s)| PathState {
-            sample: i as u32,
-            ray: s.ray.ray,
-            beta: Rgb::splat(s.weight),
+        let Paths { states, rays } = &mut self.active;
+        rays.copy_from(&samples.rays);
+        states.clear();
+        let of_samples = (0..).zip(&samples.weight).zip(&samples.width0).zip(&samples.spread);
+        states.extend(of_samples.map(|(((sample, &weight), &width), &spread)| PathState {
+            sample,
+            beta: Rgb::splat(weight),
             eta_scale: 1.0,
-            width: s.ray.width0,
-            spread: s.ray.spread,
+            width,
+            spread,
             passed: 0,
             travelled: 0.0,
             technique: None,
@@ -134,16 +114,16 @@ impl VertexSearch {
     /// Traces the active paths to their next vertices, and adds the emission on the way. `at.vertices` receives the
     /// vertices of the paths that reach a scattering surface or scatter in a medium.
     pub(super) fn find(&mut self, mut at: TraceStep<'_, '_>) {
-        let mut coherence = if at.vertex == 0 { Coherence::Coherent } else { Coherence::Incoherent };
+        let mut is_first = true;
         self.plain.clear();
         self.traced.clear();
         self.traced.extend(0..self.active.len() as u32);
         while !self.traced.is_empty() {
             // Trace, and process each hit
-            self.trace(at.job, at.vertex, coherence);
-            coherence = Coherence::Incoherent;
+            self.trace(at.job, at.vertex, is_first);
+            is_first = false;
             let start = Instant::now();
-            let (mut paths, hits, traced) =
+            let (mut paths, hits, traced): (Paths, _, _) =
                 (std::mem::take(&mut self.active), std::mem::take(&mut self.hits), std::mem::take(&mut self.traced));
             for (&index, hit) in traced.iter().zip(&hits) {
                 self.process_hit(&mut at, &mut paths, index, hit.as_ref());
@@ -169,27 +149,33 @@ impl VertexSearch {
 
     /// Processes a traced path: flight through its medium, emission, and vertex or continuation.
     #[inline]
-    fn process_hit(&mut self, at: &mut TraceStep<'_, '_>, paths: &mut Vec<PathState>, index: u32, hit: Option<&Hit>) {
+    fn process_hit(&mut self, at: &mut TraceStep<'_, '_>, paths: &mut Paths, index: u32, hit: Option<&Hit>) {
         let mut index = index;
 
         // Medium
-        if paths[index as usize].medium.is_some() {
-            match self.sample_flight(at, index, &mut paths[index as usize], hit) {
+        if paths.states[index as usize].medium.is_some() {
+            let mut traced = paths.traced(index);
+            let (outcome, ray) = (self.sample_flight(at, &mut traced, hit), traced.ray);
+            match outcome {
                 FlightOutcome::Through => {}
-                FlightOutcome::Ended => return,
+                FlightOutcome::Ended => return paths.rays.replace(index as usize, &ray),
                 FlightOutcome::Ghost(ghost) => {
                     index = paths.len() as u32;
-                    paths.push(ghost);
+                    paths.push(ghost, &ray);
                 }
             }
         }
 
         // Surface or environment
-        let path = &mut paths[index as usize];
         match hit {
-            Some(hit) if self.add_plain_mesh_hit(at, index, path, hit) => {}
-            Some(hit) => self.process_surface(at, index, path, hit),
-            None if self.adds_emission(at.vertex, path) => self.escaped.push(index),
+            Some(hit) if self.add_plain_mesh_hit(at, paths, index, hit) => {}
+            Some(hit) => {
+                let mut traced = paths.traced(index);
+                self.process_surface(at, &mut traced, hit);
+                let ray = traced.ray;
+                paths.rays.replace(index as usize, &ray);
+            }
+            None if self.adds_emission(at.vertex, &paths.states[index as usize]) => self.escaped.push(index),
             None => {}
         }
     }
@@ -197,21 +183,20 @@ impl VertexSearch {
     /// Sets times and random numbers of the vertices.
     fn set_numbers(&mut self, at: &mut TraceStep<'_, '_>) {
         let Vertices { path, time, streams, direct, .. } = &mut *at.vertices;
-        let VertexSearch { active, sampled, numbers, .. } = self;
+        let VertexSearch { active: Paths { states, rays }, sampled, .. } = self;
         sampled.clear();
-        sampled.extend(path.iter().map(|&path| active[path as usize].sample));
-        time.extend(path.iter().map(|&path| active[path as usize].ray.time));
+        sampled.extend(path.iter().map(|&path| states[path as usize].sample));
+        time.extend(path.iter().map(|&path| rays.time[path as usize]));
 
         // Streams of the vertices, and below them the streams of direct light
         let key = domain::VERTEX + at.vertex;
-        streams.gather(&numbers.streams, sampled);
+        streams.gather(&at.samples.streams, sampled);
         sampler::enter(level(), streams, key);
-        match &numbers.direct {
-            None => direct.copy_from(streams),
-            Some(of_samples) => {
-                direct.gather(of_samples, sampled);
-                sampler::enter(level(), direct, key);
-            }
+        if at.samples.direct.is_empty() {
+            direct.copy_from(streams);
+        } else {
+            direct.gather(&at.samples.direct, sampled);
+            sampler::enter(level(), direct, key);
         }
         sampler::enter(level(), direct, domain::DIRECT);
     }
@@ -221,7 +206,7 @@ impl VertexSearch {
         let Vertices { path, surface, .. } = &*at.vertices;
         for (row, &(object, depth)) in at.vertices.plain_rows().zip(&self.plain) {
             let (z, wo) = (surface.ns.vec3(row), surface.wo.vec3(row));
-            at.out[self.active[path[row] as usize].sample as usize].features = Some(Features {
+            at.out[self.active.states[path[row] as usize].sample as usize].features = Some(Features {
                 albedo: surface.rho.rgb(row),
                 normal: if z.dot(wo) < 0.0 { -z } else { z },
                 depth,
@@ -239,9 +224,10 @@ impl VertexSearch {
     /// Handles the hit of a mesh with a constant Lambertian reflectance, whose points are computed together with
     /// others. Returns false for all other hits.
     #[inline]
-    fn add_plain_mesh_hit(&mut self, at: &mut TraceStep<'_, '_>, index: u32, path: &mut PathState, hit: &Hit) -> bool {
+    fn add_plain_mesh_hit(&mut self, at: &mut TraceStep<'_, '_>, paths: &mut Paths, index: u32, hit: &Hit) -> bool {
         let is_last = at.vertex >= at.depth;
         let Some(rho) = at.job.plain_reflectance(hit) else { return false };
+        let path = &mut paths.states[index as usize];
         if path.medium.is_some() || path.is_ghost || is_last && at.vertex == 0 {
             return false;
         }
@@ -251,7 +237,8 @@ impl VertexSearch {
         let Shape::Mesh(mesh) = &at.job.world.scene.geometry.geometries[hit.geometry as usize].shape else {
             return false;
         };
-        let distance = hit.t * path.ray.d.length();
+        let d = paths.rays.direction(index as usize);
+        let distance = hit.t * d.length();
         if at.vertex == 0 {
             self.plain.push((hit.geometry, path.travelled + distance));
         }
@@ -259,23 +246,24 @@ impl VertexSearch {
 
         // Density of light paths
         path.chain = if self.begins_chain(at.vertex, path) {
-            Chain::at_first(facing_normal(at.job, hit, path.ray.d).dot(path.ray.d), path.width)
+            Chain::at_first(facing_normal(at.job, hit, d).dot(d), path.width)
         } else {
             Chain::NONE
         };
-        at.vertices.push_plain_mesh(index, mesh, hit.primitive, hit.uv, path.ray.d, rho);
+        at.vertices.push_plain_mesh(index, mesh, hit.primitive, hit.uv, d, rho);
         true
     }
 
     /// Handles any other hit, and adds its vertex if the path continues.
     #[inline]
-    fn process_surface(&mut self, at: &mut TraceStep<'_, '_>, index: u32, path: &mut PathState, hit: &Hit) {
-        let interaction = SurfaceInteraction::new(at.job, &path.ray, path.width, path.spread, hit);
-        let (sample, out) = (&at.samples[path.sample as usize], &mut at.out[path.sample as usize]);
+    fn process_surface(&mut self, at: &mut TraceStep<'_, '_>, traced: &mut TracedPath<'_>, hit: &Hit) {
+        let TracedPath { index, state: path, ray } = traced;
+        let interaction = SurfaceInteraction::new(at.job, ray, path.width, path.spread, hit);
+        let out = &mut at.out[path.sample as usize];
 
         // Emission
         if self.adds_emission(at.vertex, path) {
-            let emission = path.emission(at.job, &at.left, &interaction, self.guide.as_deref());
+            let emission = path.emission(ray, at.job, &at.left, &interaction, self.guide.as_deref());
             out.radiance += emission;
             self.layers.add_emission(at.job, path.sample, &interaction.hit, emission);
         }
@@ -284,8 +272,8 @@ impl VertexSearch {
         let Some(mut beta) = path.beta_beyond_emitter() else { return };
         let Some(mut bsdf) = interaction.scatter(at.job) else {
             if path.passed < MAX_PASSED || self.walks(at.job, path) {
-                *path = path.pass(at.job, beta, &interaction);
-                self.passing.push(index);
+                path.pass(ray, at.job, beta, &interaction);
+                self.passing.push(*index);
             }
             return;
         };
@@ -296,7 +284,7 @@ impl VertexSearch {
                 if self.only_reflected {
                     Features { depth: path.depth(&interaction), ..Features::default() }
                 } else {
-                    let stream = sample.stream.domain(domain::VERTEX);
+                    let stream = at.samples.streams.get(path.sample as usize).domain(domain::VERTEX);
                     path.features(at.job, &interaction, &bsdf, self.features, &stream)
                 }
             });
@@ -316,11 +304,12 @@ impl VertexSearch {
         // The vertex, unless the path stays in an interior
         let media = interaction.sides(at.job, path.medium);
         path.beta = beta;
-        let Some(bsdf) = self.exit_or_reflect(at, index, path, &interaction, bsdf, media) else { return };
+        let Some(bsdf) = self.exit_or_reflect(at, traced, &interaction, bsdf, media) else { return };
+        let TracedPath { index, state: path, .. } = traced;
         let SurfaceInteraction { surface, wo, width, .. } = interaction;
         path.chain = self.chain(at, path, &interaction, &bsdf);
         path.width = width;
-        at.vertices.push(VertexData { path: index, p: surface.p, p_error: surface.p_error, wo, bsdf, media });
+        at.vertices.push(VertexData { path: *index, p: surface.p, p_error: surface.p_error, wo, bsdf, media });
     }
 
     /// True if light paths may reach the vertex.
@@ -354,7 +343,7 @@ impl VertexSearch {
     fn wavelength(&self, at: &TraceStep<'_, '_>, path: &PathState) -> WavelengthSample {
         path.wavelength.map_or_else(
             || {
-                let stream = at.samples[path.sample as usize].stream;
+                let stream = at.samples.streams.get(path.sample as usize);
                 sample_wavelength(stream.domain(domain::WAVELENGTH).draw::<1>()[0])
             },
             |lambda| WavelengthSample { lambda, weight: Rgb::WHITE },
@@ -365,28 +354,28 @@ impl VertexSearch {
     fn sample_flight(
         &mut self,
         at: &mut TraceStep<'_, '_>,
-        index: u32,
-        path: &mut PathState,
+        traced: &mut TracedPath<'_>,
         hit: Option<&Hit>,
     ) -> FlightOutcome {
+        let TracedPath { index, state: path, ray } = &mut *traced;
         let Some(id) = path.medium.filter(|_| !path.is_ghost) else { return FlightOutcome::Through };
         let medium = &at.job.world.scene.media.media[id as usize];
         if medium.is_interior() {
-            return self.walk(at, medium, index, path, hit);
+            return self.walk(at, medium, traced, hit);
         }
 
         // Segment and random numbers
-        let scale = path.ray.d.length();
-        let (o, d) = (path.ray.o, path.ray.d / scale);
+        let scale = ray.d.length();
+        let (o, d) = (ray.o, ray.d / scale);
         let segment = Segment { o, d, length: hit.map_or(f32::INFINITY, |hit| hit.t * scale) };
-        let stream = at.samples[path.sample as usize].stream;
+        let stream = at.samples.streams.get(path.sample as usize);
         let mut numbers = FlightSampler::new(stream.domain(domain::FLIGHT + at.vertex).domain(path.passed));
         // Emission lookups with their MIS weight. Where light is sampled as well, no minimum rate of lookups is needed
-        let technique = path.technique.filter(|technique| technique.pdf.is_some());
+        let technique = path.technique.filter(|technique| technique.pdf > 0.0);
         let min_rate = if technique.is_none() { at.job.lights.emission_lookup_rate(id) } else { 0.0 };
         let weight = |lookup: &EmissionLookup| {
             let p = o + d * lookup.t;
-            at.left.weight(path, |ctx| at.job.lights.pdf_volume(ctx, id, lookup, p))
+            at.left.weight(path, ray, |ctx| at.job.lights.pdf_volume(ctx, id, lookup, p))
         };
         let focus = || focus(at.job, &segment, &stream, at.vertex);
         let flight = medium.fly(&segment, path.beta, &mut numbers, focus, EmissionLookups { min_rate, weight });
@@ -397,18 +386,18 @@ impl VertexSearch {
         at.out[path.sample as usize].radiance += path.beta * emitted;
         match end {
             End::Through { weight } => {
-                path.weaken(weight);
+                path.beta *= weight;
                 FlightOutcome::Through
             }
             End::Scattered { t, weight } => {
-                let ghost = PathState { is_ghost: true, ..*path };
+                let ghost = PathState { is_ghost: true, ..**path };
                 if let Some(beta) = path.beta_beyond_emitter().filter(|_| at.vertex < at.depth) {
                     (path.beta, path.width) = (beta * weight, path.width + path.spread * t);
                     path.chain = Chain::NONE;
                     let SurfaceHit { p, p_error, .. } = SurfaceHit::in_space(o + d * t);
                     let bsdf = SurfaceBsdf::in_medium(medium.g(), -d);
                     let media = Sides::both(path.medium);
-                    at.vertices.push(VertexData { path: index, p, p_error, wo: bsdf.frame.z, bsdf, media });
+                    at.vertices.push(VertexData { path: *index, p, p_error, wo: bsdf.frame.z, bsdf, media });
                 }
                 let wants_features = at.vertex == 0 && self.features != FeatureSet::None;
                 if wants_features { FlightOutcome::Ghost(ghost) } else { FlightOutcome::Ended }
@@ -419,36 +408,43 @@ impl VertexSearch {
     /// Adds the radiance of infinite lights along the escaped paths, with the weights of the techniques that drew them.
     fn add_infinite(&mut self, at: &mut TraceStep<'_, '_>) {
         let (lights, layers, left, out) = (&at.job.lights, &mut self.layers, &at.left, &mut *at.out);
-        let (active, escaped) = (&self.active, &self.escaped);
-        let path = |i: usize| &active[escaped[i] as usize];
+        let (Paths { states, rays }, escaped) = (&self.active, &self.escaped);
+        let path = |i: usize| &states[escaped[i] as usize];
+        let ray = |i: usize| rays.get(escaped[i] as usize);
         lights.infinite_in_directions_by(
             escaped.len(),
-            |i| left.ctx(path(i)),
-            |i| path(i).ray.d,
+            |i| left.ctx(path(i), &ray(i)),
+            |i| ray(i).d,
             // No light was sampled at the camera
             |i, ctx, light| if path(i).technique.is_some() { lights.sampler.pmf(ctx, light) } else { 0.0 },
             |i, le, p_light| {
-                let path = path(i);
+                let (path, ray) = (path(i), ray(i));
                 let l = path.beta * le;
-                let weight = if l.is_black() { 1.0 } else { left.weight(path, |_| p_light) };
+                let weight = if l.is_black() { 1.0 } else { left.weight(path, &ray, |_| p_light) };
                 out[path.sample as usize].radiance += l * weight;
                 if layers.are_kept() {
-                    layers.add_infinite(lights, path.sample, left.ctx(path).p, path.ray.d, l * weight);
+                    layers.add_infinite(lights, path.sample, left.ctx(path, &ray).p, ray.d, l * weight);
                 }
             },
         );
     }
 
-    /// Traces the first hits of the paths.
-    fn trace(&mut self, job: &RenderJob, vertex: u32, coherence: Coherence) {
-        self.rays.set(self.traced.iter().map(|&index| &self.active[index as usize].ray));
+    /// Traces the first hits of the paths: of all of them the first time, later of those that passed a surface.
+    fn trace(&mut self, job: &RenderJob, vertex: u32, is_first: bool) {
+        let coherence = if is_first && vertex == 0 { Coherence::Coherent } else { Coherence::Incoherent };
+        let rays = if is_first {
+            &self.active.rays
+        } else {
+            self.rays.gather(&self.active.rays, &self.traced);
+            &self.rays
+        };
         if let Some(r) = &mut self.recording {
             let batches = if coherence == Coherence::Coherent { &mut r.camera } else { &mut r.bounces };
-            batches.push(self.rays.clone());
+            batches.push(rays.clone());
         }
         let start = Instant::now();
-        job.world.accel.intersect(&self.rays, coherence, &mut self.hits);
-        let (count, time) = (self.rays.len() as u64, start.elapsed());
+        job.world.accel.intersect(rays, coherence, &mut self.hits);
+        let (count, time) = (rays.len() as u64, start.elapsed());
         if vertex == 0 {
             self.stats.camera_rays += count;
             self.stats.camera_time += time;

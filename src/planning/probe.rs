@@ -3,7 +3,7 @@
 use crate::direct::Fits;
 use crate::film::accumulator::RadianceAccumulator;
 use crate::film::{FeatureSet, PixelSample};
-use crate::integrators::CameraSample;
+use crate::integrators::CameraSamples;
 use crate::integrators::camera_samples::{CameraSampler, PixelSampleRange, Scratch};
 use crate::integrators::cells::Blocks;
 use crate::integrators::exclusions::{self, Feature};
@@ -42,7 +42,7 @@ pub(super) struct Probe<'a> {
     job: &'a RenderJob,
     camera: CameraSampler<'a>,
     tracer: PathTracer,
-    samples: Vec<CameraSample>,
+    samples: CameraSamples,
     scratch: Scratch,
     results: Vec<PixelSample>,
 }
@@ -56,7 +56,14 @@ impl<'a> Probe<'a> {
             tracer.weigh_against_light_paths(job, pilot, *per_sample);
         }
         let camera = CameraSampler::new(job, 0);
-        Probe { job, camera, tracer, samples: Vec::new(), scratch: Scratch::default(), results: Vec::new() }
+        Probe {
+            job,
+            camera,
+            tracer,
+            samples: CameraSamples::default(),
+            scratch: Scratch::default(),
+            results: Vec::new(),
+        }
     }
 
     /// Traces samples of some pixels with the random numbers of a seed. `add` receives them with the index of their
@@ -74,10 +81,9 @@ impl<'a> Probe<'a> {
         let sample_counts = settings.sample_counts();
         for (part, pixels) in pixels.chunks(size).enumerate() {
             // Draw the camera samples
-            self.samples.clear();
             let of_pixels = pixels.iter().map(|&pixel| PixelSampleRange { fit: 0, pixel, samples: samples.clone() });
             self.camera.samples(of_pixels, seed, &mut self.scratch, &mut self.samples);
-            self.samples.iter_mut().for_each(|sample| sample.sample_counts = sample_counts);
+            self.samples.sample_counts.fill(sample_counts);
 
             // Trace them
             self.tracer.trace(self.job, settings, &self.samples, &mut Fits::default(), &mut self.results);

@@ -8,7 +8,7 @@ use super::constants::{PILOT_PROPOSALS, PILOT_RADIUS, RIS_PILOT_SPP};
 use super::preparation::Preparation;
 use crate::direct::Fits;
 use crate::film::PixelBounds;
-use crate::integrators::CameraSample;
+use crate::integrators::CameraSamples;
 use crate::integrators::PathTracer;
 use crate::integrators::camera_samples::CameraSampler;
 use crate::scene::{RenderJob, SampleCountMap};
@@ -91,13 +91,13 @@ fn pilot_row(job: &RenderJob, row: &PixelBounds) -> Vec<MomentsEstimate> {
 
     let camera = CameraSampler::new(job, 0);
     let mut tracer = PathTracer::default();
-    let (mut samples, mut out) = (Vec::<CameraSample>::new(), Vec::new());
+    let (mut samples, mut out) = (CameraSamples::default(), Vec::new());
     let mut sums = vec![MomentsEstimate::new(); row.area()];
     for (pixel, sum) in sums.iter_mut().enumerate() {
         samples.clear();
         let at = [row.x0 + pixel as u32, row.y0];
         samples.extend((0..RIS_PILOT_SPP).map(|s| camera.sample_of_seed(at, s, PILOT_SEED)));
-        samples.iter_mut().for_each(|s| s.sample_counts = all);
+        samples.sample_counts.fill(all);
         tracer.outcomes = Some(Vec::new());
         tracer.trace(job, &settings, &samples, &mut Fits::default(), &mut out);
         let outcomes = tracer.outcomes.take().unwrap_or_default();

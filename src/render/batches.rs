@@ -3,7 +3,7 @@
 use super::render_settings::RenderSettings;
 use super::run::Run;
 use crate::film::PixelBounds;
-use crate::integrators::CameraSample;
+use crate::integrators::CameraSamples;
 use crate::integrators::camera_samples;
 use crate::integrators::path::BATCH_PATHS;
 use crate::scene::RenderJob;
@@ -64,20 +64,20 @@ impl<'a> Batches<'a> {
     }
 
     /// Draws the camera samples of a batch. Their fits are numbered from 0.
-    pub fn camera_samples(&mut self, batch: usize, out: &mut Vec<CameraSample>) {
+    pub fn camera_samples(&mut self, batch: usize, out: &mut CameraSamples) {
         let (tile, pixels) = &self.parts[batch];
         self.run.camera_samples(tile, pixels.clone(), &self.samples, &mut self.scratch, out);
-        out.iter_mut().for_each(|sample| sample.fit -= pixels.start as u32);
+        out.fit.iter_mut().for_each(|fit| *fit -= pixels.start as u32);
     }
 }
 
 /// Batches of a rendering with this tile size, with about `rays` camera samples in total.
-pub fn camera_batches(job: &RenderJob, tile_size: u32, rays: usize) -> Vec<Vec<CameraSample>> {
+pub fn camera_batches(job: &RenderJob, tile_size: u32, rays: usize) -> Vec<CameraSamples> {
     let settings = RenderSettings { tile_size, spp: job.settings().sampling.spp, ..RenderSettings::default() };
     let mut batches = Batches::new(job, &settings, rays);
     let count = batches.count();
     let samples = |batch| {
-        let mut out = Vec::new();
+        let mut out = CameraSamples::default();
         batches.camera_samples(batch, &mut out);
         out
     };

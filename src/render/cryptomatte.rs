@@ -9,8 +9,9 @@
 //! largest coverage, two in each group of four channels.
 
 use super::render_settings::RenderSettings;
-use crate::accel::{Coherence, Hit, RayBatch};
+use crate::accel::{Coherence, Hit};
 use crate::film::{Film, PixelBounds};
+use crate::integrators::CameraSamples;
 use crate::integrators::camera_samples::{CameraSampler, PixelSampleRange, Scratch};
 use crate::integrators::path::BATCH_PATHS;
 use crate::planning::preparation::{ThreadError, thread_pool};
@@ -247,30 +248,25 @@ impl Tracer<'_> {
             let begins = (0..count).step_by(BATCH_PATHS);
             begins.map(move |begin| (index, first + begin..first + count.min(begin + BATCH_PATHS as u32)))
         });
-        let (mut scratch, mut samples) = (Scratch::default(), Vec::new());
-        let (mut rays, mut hits) = (RayBatch::default(), Vec::new());
+        let (mut scratch, mut batch, mut samples) = (Scratch::default(), Vec::new(), CameraSamples::default());
+        let mut hits = Vec::new();
 
         // Batches of ranges, the last one shorter
         let mut next = ranges.next();
         while next.is_some() {
-            samples.clear();
-            while let Some((index, range)) = next.take_if(|(_, r)| samples.len() + r.len() <= BATCH_PATHS) {
-                let pixel = tile.pixel_at(index);
-                self.camera.samples(
-                    std::iter::once(PixelSampleRange { fit: index, pixel, samples: range }),
-                    seed,
-                    &mut scratch,
-                    &mut samples,
-                );
+            let mut paths = 0;
+            while let Some((index, samples)) = next.take_if(|(_, r)| paths + r.len() <= BATCH_PATHS) {
+                paths += samples.len();
+                batch.push(PixelSampleRange { fit: index, pixel: tile.pixel_at(index), samples });
                 next = ranges.next();
             }
-            rays.set(samples.iter().map(|s| &s.ray.ray));
-            self.job.world.accel.intersect(&rays, Coherence::Coherent, &mut hits);
-            for (sample, hit) in samples.iter().zip(&hits) {
+            self.camera.samples(batch.drain(..), seed, &mut scratch, &mut samples);
+            self.job.world.accel.intersect(&samples.rays, Coherence::Coherent, &mut hits);
+            for ((&weight, &fit), hit) in samples.weight.iter().zip(&samples.fit).zip(&hits) {
                 let Some(hit) = hit else { continue };
-                let weight = sample.weight / (scene.film.scale * count(sample.fit) as f32);
+                let weight = weight / (scene.film.scale * count(fit) as f32);
                 for (pixels, kind) in pixels.iter_mut().zip(self.kinds) {
-                    add(&mut pixels[sample.fit as usize], kind.key(scene, hit), weight);
+                    add(&mut pixels[fit as usize], kind.key(scene, hit), weight);
                 }
             }
         }

@@ -9,7 +9,7 @@
 
 use super::tiles::batches;
 use crate::film::{FeatureSet, PixelSample};
-use crate::integrators::CameraSample;
+use crate::integrators::CameraSamples;
 use crate::integrators::camera_samples::{CameraSampler, PixelSampleRange, Scratch};
 use crate::integrators::light_layers::{LayerSum, LayerSums};
 use crate::integrators::{PathStats, PathTracer, Tracer};
@@ -27,7 +27,7 @@ const SEED: u32 = 0x6c_6f_6f_6b;
 #[derive(Default)]
 pub(super) struct EmissionRays {
     tracer: PathTracer,
-    samples: Vec<CameraSample>,
+    samples: CameraSamples,
     results: Vec<PixelSample>,
     scratch: Scratch,
 }
@@ -64,7 +64,7 @@ impl EmissionRays {
     pub(super) fn replace(
         &mut self,
         camera: &CameraSampler<'_>,
-        samples: &[CameraSample],
+        samples: &CameraSamples,
         seed: u32,
         pixels: impl Iterator<Item = PixelSampleRange>,
         out: &mut [PixelSample],
@@ -81,11 +81,11 @@ impl EmissionRays {
         let split = split_samples(of_pixels, pixels);
         for part in batches(0..split.len() as u32, |i| split[i as usize].rays as usize) {
             let part = &split[part.start as usize..part.end as usize];
-            self.samples.clear();
             let others =
                 part.iter().map(|split| PixelSampleRange { fit: 0, pixel: split.pixel, samples: split.others() });
             camera.samples(others, seed, &mut self.scratch, &mut self.samples);
-            self.samples.extend(part.iter().map(|split| samples[split.of_batch]));
+            self.samples.extend(part.iter().map(|split| samples.get(split.of_batch)));
+            self.samples.are_replicas = samples.are_replicas;
             self.tracer.trace(job, &settings, &self.samples, &mut Default::default(), &mut self.results);
 
             // Replace the emission in the results

@@ -6,7 +6,7 @@ use super::worker::AnyWorker;
 use crate::direct::{Estimator, Fits};
 use crate::film::PixelBounds;
 use crate::film::replicas::ReplicaAccumulator;
-use crate::integrators::CameraSample;
+use crate::integrators::CameraSamples;
 use crate::integrators::PathStats;
 use crate::integrators::camera_samples::{self, PixelSampleRange};
 use crate::integrators::cells::{self, REPLICA_CELL};
@@ -118,9 +118,8 @@ impl Run<'_> {
             };
             // Draw the camera samples
             let start = Instant::now();
-            worker.samples.clear();
             self.camera.samples(replicas.clone().map(range), seed, &mut worker.scratch, &mut worker.samples);
-            worker.samples.iter_mut().for_each(|sample| sample.is_replica = true);
+            worker.samples.are_replicas = true;
             worker.times.camera_samples += start.elapsed();
 
             // Trace them and add the results
@@ -139,9 +138,8 @@ impl Run<'_> {
         pixels: Range<usize>,
         pass: &Range<u32>,
         scratch: &mut camera_samples::Scratch,
-        out: &mut Vec<CameraSample>,
+        out: &mut CameraSamples,
     ) {
-        out.clear();
         self.camera.samples(self.ranges(tile, pixels, pass), self.job.settings().sampling.seed, scratch, out);
     }
 

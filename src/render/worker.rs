@@ -7,7 +7,7 @@ use crate::direct::Fits;
 use crate::film::accumulator::PixelAccumulator;
 use crate::film::layers::{LayerSample, LayerScratch};
 use crate::film::{FeatureSet, PixelBounds, PixelSample};
-use crate::integrators::CameraSample;
+use crate::integrators::CameraSamples;
 use crate::integrators::camera_samples::{CameraSampler, PixelSampleRange, Scratch};
 use crate::integrators::{Integrator, PathStats, Tracer};
 use crate::scene::FilmSettings;
@@ -17,7 +17,7 @@ use std::time::Instant;
 /// Buffers of one thread.
 pub(super) struct Worker<T> {
     pub(super) tracer: T,
-    pub(super) samples: Vec<CameraSample>,
+    pub(super) samples: CameraSamples,
     pub(super) scratch: Scratch,
     pub(super) results: Vec<PixelSample>,
     /// Sums of the traced pixels, while samples are added to them.

@@ -3,8 +3,8 @@
 use lumiris::direct::Fits;
 use lumiris::film::PixelSample;
 use lumiris::import::{LoadOptions, load};
-use lumiris::integrators::CameraSample;
 use lumiris::integrators::PathTracer;
+use lumiris::integrators::{CameraSample, CameraSamples};
 use lumiris::scene::{AccelKind, RenderJob};
 use lumiris::settings::{EstimatorKind, IntegratorKind};
 use lumiris_numbers::math::Vec2;
@@ -26,7 +26,7 @@ fn job(scene: &str, kind: IntegratorKind, estimator: EstimatorKind, samples: u32
     loaded.job(AccelKind::Embree, None).unwrap()
 }
 
-fn camera_samples(job: &RenderJob) -> Vec<CameraSample> {
+fn camera_samples(job: &RenderJob) -> CameraSamples {
     // One camera sample through the centre of each pixel
     let pixels = (0..RESOLUTION[1]).flat_map(|y| (0..RESOLUTION[0]).map(move |x| [x, y]));
     let sample = |pixel: [u32; 2]| {
@@ -40,7 +40,7 @@ fn camera_samples(job: &RenderJob) -> Vec<CameraSample> {
 }
 
 /// Traces in batches, or by the stages of direct light, which list the contributions of samples.
-fn traced(job: &RenderJob, samples: &[CameraSample], side_by_side: bool) -> Vec<PixelSample> {
+fn traced(job: &RenderJob, samples: &CameraSamples, side_by_side: bool) -> Vec<PixelSample> {
     let mut out = Vec::new();
     let mut tracer = PathTracer::default();
     tracer.outcomes = (!side_by_side).then(Vec::new);
@@ -62,7 +62,7 @@ fn assert_same_radiance_of(job: &RenderJob, scene: &str, part: f64) {
     let samples = camera_samples(job);
     let (a, b) = (traced(job, &samples, true), traced(job, &samples, false));
     let i = &job.settings().integrator;
-    let what = format!("{scene} {:?} {:?} {}", i.kind, i.estimator, samples[0].sample_counts.samples);
+    let what = format!("{scene} {:?} {:?} {}", i.kind, i.estimator, samples.sample_counts[0].samples);
     let mut lit = 0;
     let mut different = 0;
     for (a, b) in a.iter().zip(&b) {

@@ -12,7 +12,7 @@ use lumiris::film::PixelSample;
 use lumiris::film::accumulator::PixelAccumulator;
 use lumiris::film::packed::PackedSums;
 use lumiris::geometry::AlphaSource;
-use lumiris::integrators::CameraSample;
+use lumiris::integrators::CameraSamples;
 use lumiris::integrators::path::Recording;
 use lumiris::integrators::{PathStats, PathTracer, Tracer};
 use lumiris::render::RenderSettings;
@@ -205,7 +205,7 @@ struct Frame<'a> {
     job: &'a RenderJob,
     batches: Batches<'a>,
     tracer: PathTracer,
-    samples: Vec<CameraSample>,
+    samples: CameraSamples,
     results: Vec<PixelSample>,
     /// Packed sums of a batch, and scratch memory for packing.
     packed: (PackedSums, Vec<u8>),

@@ -10,7 +10,7 @@ use lumiris::accel::embree::{EmbreeAccel, EmbreeError};
 use lumiris::accel::{Accel, Coherence, RayBatch};
 use lumiris::direct::{Estimator, Fits};
 use lumiris::geometry::AlphaSource;
-use lumiris::integrators::CameraSample;
+use lumiris::integrators::CameraSamples;
 use lumiris::integrators::path::Recording;
 use lumiris::integrators::{PathStats, PathTracer, Tracer};
 use lumiris::render::BATCH_PATHS;
@@ -118,7 +118,7 @@ pub struct Stage {
 /// in memory three times.
 pub fn measure(mut job: RenderJob, settings: &BenchSettings) -> Result<Report, EmbreeError> {
     let batches = camera_batches(&job, settings.tile_size, settings.rays);
-    let camera_rays = batches.iter().map(Vec::len).sum();
+    let camera_rays = batches.iter().map(CameraSamples::len).sum();
     let mut report = Report {
         camera_rays,
         build_seconds: None,
@@ -154,7 +154,7 @@ pub fn measure(mut job: RenderJob, settings: &BenchSettings) -> Result<Report, E
     Ok(report)
 }
 
-fn record(job: &RenderJob, batches: &[Vec<CameraSample>]) -> Recording {
+fn record(job: &RenderJob, batches: &[CameraSamples]) -> Recording {
     let mut tracer = PathTracer::default();
     tracer.record();
     let (mut fits, mut out) = (Fits::default(), Vec::new());
@@ -165,11 +165,11 @@ fn record(job: &RenderJob, batches: &[Vec<CameraSample>]) -> Recording {
 }
 
 /// Renders the batches several times, and returns the times of the stages.
-fn stages(job: &RenderJob, batches: &[Vec<CameraSample>], runs: u32) -> (Vec<Stage>, Option<Proposals>) {
+fn stages(job: &RenderJob, batches: &[CameraSamples], runs: u32) -> (Vec<Stage>, Option<Proposals>) {
     // Run, once without measuring
     let mut tracer = PathTracer::default();
     let mut out = Vec::new();
-    let fits = batches.iter().flatten().map(|s| s.fit + 1).max().unwrap_or(0) as usize;
+    let fits = batches.iter().flat_map(|samples| &samples.fit).map(|fit| fit + 1).max().unwrap_or(0) as usize;
     let mut fits = Estimator::at_vertex(&job.settings().integrator, 0).fits(job, fits);
     let mut one_run = || {
         let start = Instant::now();

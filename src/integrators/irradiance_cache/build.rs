@@ -17,7 +17,7 @@ use super::octree::Octree;
 use super::record::{Range, Record};
 use crate::direct::{Fits, ShadingPoint};
 use crate::film::PixelBounds;
-use crate::integrators::camera_sample::CameraSample;
+use crate::integrators::camera_sample::{CameraSample, CameraSamples};
 use crate::integrators::integrator::{Cameras, Tracer};
 use crate::integrators::path::{AtVertices, PathTracer, PathVertex, Shading};
 use crate::integrators::statistics::{BuildStats, PathStats};
@@ -135,7 +135,7 @@ fn ask(
     let parts: Vec<(Vec<RecordRequest>, PathStats)> = pixels
         .par_chunks(CHUNK)
         .map_init(PathTracer::default, |paths, pixels| {
-            let samples: Vec<CameraSample> = pixels.iter().map(|&pixel| camera(pixel)).collect();
+            let samples: CameraSamples = pixels.iter().map(|&pixel| camera(pixel)).collect();
             (ask_chunk(job, cache, pixels, &samples, paths), paths.take_stats())
         })
         .collect();
@@ -148,14 +148,14 @@ fn ask_chunk(
     job: &RenderJob,
     cache: &IrradianceCache,
     pixels: &[[u32; 2]],
-    samples: &[CameraSample],
+    samples: &CameraSamples,
     paths: &mut PathTracer,
 ) -> Vec<RecordRequest> {
     let (mut wanted, mut out) = (Vec::new(), Vec::new());
     let mut ask = |vertex: u32, v: &PathVertex<'_, '_>| {
         let (path, point) = (v.path, &v.point);
         let sample = path.sample as usize;
-        let min = WORTHWHILE * samples[sample].weight.abs();
+        let min = WORTHWHILE * samples.weight[sample].abs();
         let is_worthwhile = !(path.beta.map(f32::abs).max_component() < min);
         let sides = unserved_sides(cache, point).into_iter().flatten().filter(|_| is_worthwhile);
         wanted.extend(sides.map(|(side, ns)| RecordRequest {
@@ -163,7 +163,7 @@ fn ask_chunk(
             p_error: point.p_error,
             n: point.bsdf.n,
             ns,
-            time: path.ray.time,
+            time: v.ray.time,
             pixel_width: pixel_width(path.width, point.p),
             spread: path.spread,
             pixel: pixels[sample],

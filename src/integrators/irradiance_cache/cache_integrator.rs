@@ -5,7 +5,7 @@ use super::cache::IrradianceCache;
 use crate::bsdfs::Lambertian;
 use crate::direct::Fits;
 use crate::film::{FeatureSet, PixelSample};
-use crate::integrators::camera_sample::CameraSample;
+use crate::integrators::camera_sample::CameraSamples;
 use crate::integrators::diffuse;
 use crate::integrators::integrator::{Cameras, Integrator, Tracer};
 use crate::integrators::path::{AtVertices, PathTracer, PathVertex};
@@ -54,7 +54,7 @@ struct CacheTracer<'c> {
 }
 
 impl Tracer for CacheTracer<'_> {
-    fn trace(&mut self, job: &RenderJob, samples: &[CameraSample], fits: &mut Fits, out: &mut Vec<PixelSample>) {
+    fn trace(&mut self, job: &RenderJob, samples: &CameraSamples, fits: &mut Fits, out: &mut Vec<PixelSample>) {
         let includes_direct = self.cache.settings().cached == Cached::All;
         let mut look_up = |v: &PathVertex<'_, '_>, part: &Lambertian<'_>| {
             let known = reflected(self.cache, v, part);

@@ -15,7 +15,7 @@ use crate::bsdfs::{Bsdf, Diffuse};
 use crate::cameras::CameraRay;
 use crate::direct::{Estimator, Fits, PointDirectLighting, ShadingPoint};
 use crate::film::PixelSample;
-use crate::integrators::camera_sample::CameraSample;
+use crate::integrators::camera_sample::{CameraSample, CameraSamples};
 use crate::integrators::integrator::Tracer;
 use crate::integrators::path::PathTracer;
 use crate::integrators::statistics::PathStats;
@@ -70,7 +70,7 @@ pub struct RecordRequest {
 pub struct Gatherer {
     paths: PathTracer,
     direct: PointDirectLighting,
-    samples: Vec<CameraSample>,
+    samples: CameraSamples,
     results: Vec<PixelSample>,
     radiance: Vec<Rgb>,
     rays: RayBatch,
@@ -117,7 +117,7 @@ impl Gatherer {
                 let o = offset_origin(w.p, w.p_error, w.n, d);
                 let ray = Ray { o, d, t_max: f32::INFINITY, time: w.time };
                 let ray = CameraRay { ray, spread: w.spread, width0: w.pixel_width, weight: 1.0 };
-                self.samples.push(CameraSample::of_ray(ray, 1.0, stream, sample_counts));
+                self.samples.push(&CameraSample::of_ray(ray, 1.0, stream, sample_counts));
             }
         }
         self.paths.search.only_reflected = true;

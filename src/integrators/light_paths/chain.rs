@@ -21,11 +21,13 @@ impl Chain {
     }
 
     /// Beyond the first vertex, in a direction with the density `pdf` (1/sr) and the cosine `cos` to the geometric
-    /// normal. `pdf` is `None` if no other technique can sample the direction.
+    /// normal. `pdf` is 0 if no other technique can sample the direction.
     #[inline]
     #[must_use]
-    pub(in crate::integrators) fn beyond_first(self, pdf: Option<f32>, cos: f32) -> Self {
-        let Some(pdf) = pdf.filter(|_| self.is_open()) else { return Chain::NONE };
+    pub(in crate::integrators) fn beyond_first(self, pdf: f32, cos: f32) -> Self {
+        if !self.is_open() || pdf == 0.0 {
+            return Chain::NONE;
+        }
         Chain { density: self.density * projected(pdf, cos), ..self }.checked()
     }
 
@@ -75,7 +77,7 @@ fn projected(pdf: f32, cos: f32) -> f32 {
 /// `cos_camera` and the pixel width `width`. The next direction has the density `pdf` (1/sr) and the cosine `cos`.
 #[inline]
 pub(super) fn camera_density(cos_camera: f32, width: f32, pdf: f32, cos: f32) -> f32 {
-    Chain::at_first(cos_camera, width).beyond_first(Some(pdf), cos).density
+    Chain::at_first(cos_camera, width).beyond_first(pdf, cos).density
 }
 
 /// Weight of a light path by the balance heuristic [Veach 1997, §9.2.2]; 0 if either density is 0.
@@ -91,7 +93,7 @@ mod tests {
     #[test]
     fn both_weights_are_one_together_whatever_the_densities() {
         for (light, width) in [(0.0, 1.0), (1e-9, 0.01), (3.0, 0.2), (1e30, 1e-3), (f32::INFINITY, 1.0)] {
-            let chain = Chain::at_first(-0.5, width).beyond_first(Some(0.3), -0.7).bundled();
+            let chain = Chain::at_first(-0.5, width).beyond_first(0.3, -0.7).bundled();
             assert!(chain.is_caustic());
             let weight = light_weight(light, camera_density(0.5, width, 0.3, 0.7));
             assert!((chain.camera_weight(light) + weight - 1.0).abs() < 1e-6, "{light} {width}");
@@ -102,13 +104,8 @@ mod tests {
     fn what_light_paths_cannot_find_is_left_to_camera_paths() {
         let first = Chain::at_first(1.0, 1.0);
         assert!(first.is_open() && !first.is_caustic() && first.bundled().is_caustic());
-        for none in [
-            Chain::NONE,
-            Chain::at_first(1.0, 0.0),
-            first.beyond_first(None, 1.0),
-            first.beyond_first(Some(1.0), 0.0),
-            first.beyond_first(Some(0.0), 1.0),
-        ] {
+        for none in [Chain::NONE, Chain::at_first(1.0, 0.0), first.beyond_first(1.0, 0.0), first.beyond_first(0.0, 1.0)]
+        {
             assert!(!none.is_open() && !none.bundled().is_caustic() && none.camera_weight(5.0) == 1.0, "{none:?}");
         }
         assert_eq!(light_weight(5.0, camera_density(1.0, 1.0, 1.0, 0.0)), 0.0);

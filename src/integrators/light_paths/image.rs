@@ -5,7 +5,7 @@ use super::per_sample::per_sample;
 use super::pilot::LightPilot;
 use super::trace::{CameraConnection, PathBatch, Scene, batches, trace};
 use crate::film::{PixelBounds, PixelSample};
-use crate::integrators::camera_sample::CameraSample;
+use crate::integrators::camera_sample::CameraSamples;
 use crate::integrators::statistics::LightPathStats;
 use crate::scene::{PixelSamples, RenderJob};
 use lumiris_numbers::math::Rgb;
@@ -101,8 +101,8 @@ impl LightImage {
     }
 
     /// Adds the contributions of light paths to camera samples.
-    pub(in crate::integrators) fn add(&self, samples: &[CameraSample], out: &mut [PixelSample]) {
-        for (&CameraSample { pixel: [x, y], share_group, is_replica, .. }, out) in samples.iter().zip(out) {
+    pub(in crate::integrators) fn add(&self, samples: &CameraSamples, out: &mut [PixelSample]) {
+        for ((&[x, y], &share_group), out) in samples.pixel.iter().zip(&samples.share_group).zip(out) {
             let index = self.bounds.index_of([x, y]);
             if self.has_entries[index / 64] >> (index % 64) & 1 == 0 {
                 continue;
@@ -118,7 +118,7 @@ impl LightImage {
             // A replica also gets a signed contribution, from which the variance is estimated
             let light = own.map(|entry| entry.value).sum::<Rgb>();
             out.radiance += light;
-            if is_replica {
+            if samples.are_replicas {
                 out.offset = light * sign(step) * SQRT_2;
             }
         }

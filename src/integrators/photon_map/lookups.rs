@@ -82,7 +82,7 @@ impl Lookups {
                 vertex,
                 point,
                 p_error: v.point.p_error,
-                time: path.ray.time,
+                time: v.ray.time,
                 stream: v.stream,
                 width: path.width,
                 spread: path.spread,
@@ -106,7 +106,7 @@ impl Lookups {
             let Some(part) = point.bsdf.lambertian(point.wo) else { return Shading::default() };
             let first = self.pending.len();
             let ReflectedPhotons { radiance, reach } = reflected(maps, &v, &part, &mut self.scratch, &mut self.pending);
-            let is_near = point.p.distance(path.ray.o) < reach;
+            let is_near = point.p.distance(v.ray.o) < reach;
             if !is_near {
                 out[path.sample as usize].radiance += path.beta * radiance;
                 return Shading::default();
@@ -163,7 +163,7 @@ fn wait(
 ) {
     if !e.is_black() {
         let path = v.path;
-        let probe = Probe { point, radius, time: path.ray.time, stream: v.stream.domain(key) };
+        let probe = Probe { point, radius, time: v.ray.time, stream: v.stream.domain(key) };
         pending.push(Pending { owner: path.sample, radiance: path.beta * albedo * e * FRAC_1_PI, probe });
     }
 }

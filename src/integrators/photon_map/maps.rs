@@ -9,7 +9,7 @@
 
 use super::boundary::{Boundary, Probe};
 use crate::direct::Vertices;
-use crate::integrators::camera_sample::CameraSample;
+use crate::integrators::camera_sample::CameraSamples;
 use crate::integrators::integrator::Cameras;
 use crate::integrators::path::BatchVertices;
 use crate::integrators::path_state::LastVertices;
@@ -315,7 +315,7 @@ pub fn visible_points(job: &RenderJob, cameras: Cameras<'_>) -> Vec<GatherPoint>
     let b = job.world.scene.film.bounds;
     let stride = (b.area() / PROBES).max(1);
     let pixels = (0..b.area() as u32).step_by(stride).map(|i| b.pixel_at(i));
-    let samples: Vec<CameraSample> = pixels.map(|pixel| cameras(pixel, 0)).collect();
+    let samples: CameraSamples = pixels.map(|pixel| cameras(pixel, 0)).collect();
 
     // Trace to the first vertices
     let (mut search, mut results) = (VertexSearch::default(), Vec::new());

@@ -6,7 +6,7 @@ use super::maps::{self, MapMaker, PhotonMaps};
 use crate::cameras::CameraRay;
 use crate::direct::{Estimator, Fits};
 use crate::film::{FeatureSet, PixelSample};
-use crate::integrators::camera_sample::CameraSample;
+use crate::integrators::camera_sample::{CameraSample, CameraSamples};
 use crate::integrators::diffuse;
 use crate::integrators::integrator::{Cameras, Integrator, Tracer};
 use crate::integrators::path::{AtVertices, PathTracer};
@@ -59,7 +59,7 @@ impl Integrator for PhotonMapIntegrator<'_> {
             paths: PathTracer::new(features),
             gather: PathTracer::default(),
             lookups: Lookups::default(),
-            samples: Vec::new(),
+            samples: CameraSamples::default(),
             results: Vec::new(),
         })
     }
@@ -81,12 +81,12 @@ struct PhotonMapTracer<'m> {
     gather: PathTracer,
     lookups: Lookups,
     /// Gather rays, and their radiance.
-    samples: Vec<CameraSample>,
+    samples: CameraSamples,
     results: Vec<PixelSample>,
 }
 
 impl Tracer for PhotonMapTracer<'_> {
-    fn trace(&mut self, job: &RenderJob, samples: &[CameraSample], fits: &mut Fits, out: &mut Vec<PixelSample>) {
+    fn trace(&mut self, job: &RenderJob, samples: &CameraSamples, fits: &mut Fits, out: &mut Vec<PixelSample>) {
         let settings = &job.settings().integrator;
         let (maps, lookups) = (self.maps, &mut self.lookups);
         lookups.requests.clear();
@@ -145,7 +145,7 @@ impl PhotonMapTracer<'_> {
                 let o = offset_origin(request.point.p, request.p_error, request.point.n, d);
                 let ray = Ray { o, d, t_max: f32::INFINITY, time: request.time };
                 let ray = CameraRay { ray, spread: request.spread, width0: request.width, weight: 1.0 };
-                self.samples.push(CameraSample::of_ray(ray, weight, stream, sample_counts));
+                self.samples.push(&CameraSample::of_ray(ray, weight, stream, sample_counts));
             }
         }
     }
