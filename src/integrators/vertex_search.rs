@@ -126,7 +126,10 @@ impl VertexSearch {
             let (mut paths, hits, traced): (Paths, _, _) =
                 (std::mem::take(&mut self.active), std::mem::take(&mut self.hits), std::mem::take(&mut self.traced));
             for (&index, hit) in traced.iter().zip(&hits) {
-                self.process_hit(&mut at, &mut paths, index, hit.as_ref());
+                let is_done = hit.is_some_and(|hit| self.add_plain_mesh_hit(&mut at, &mut paths, index, &hit));
+                if !is_done {
+                    self.process_hit(&mut at, &mut paths, index, hit.as_ref());
+                }
             }
             (self.active, self.hits, self.traced) = (paths, hits, traced);
 
@@ -148,7 +151,6 @@ impl VertexSearch {
     }
 
     /// Processes a traced path: flight through its medium, emission, and vertex or continuation.
-    #[inline]
     fn process_hit(&mut self, at: &mut TraceStep<'_, '_>, paths: &mut Paths, index: u32, hit: Option<&Hit>) {
         let mut index = index;
 
@@ -168,7 +170,6 @@ impl VertexSearch {
 
         // Surface or environment
         match hit {
-            Some(hit) if self.add_plain_mesh_hit(at, paths, index, hit) => {}
             Some(hit) => {
                 let mut traced = paths.traced(index);
                 self.process_surface(at, &mut traced, hit);
@@ -223,7 +224,7 @@ impl VertexSearch {
 
     /// Handles the hit of a mesh with a constant Lambertian reflectance, whose points are computed together with
     /// others. Returns false for all other hits.
-    #[inline]
+    #[inline(always)]
     fn add_plain_mesh_hit(&mut self, at: &mut TraceStep<'_, '_>, paths: &mut Paths, index: u32, hit: &Hit) -> bool {
         let is_last = at.vertex >= at.depth;
         let Some(rho) = at.job.plain_reflectance(hit) else { return false };

@@ -123,7 +123,7 @@ impl<'w> Vertices<'w> {
 
     /// Adds the hit of a ray of direction `d` on a mesh in world space with the constant reflectance `rho`. `uv` are
     /// the weights of the second and the third corner of `triangle`.
-    #[inline]
+    #[inline(always)]
     pub fn push_plain_mesh(&mut self, path: u32, mesh: &TriangleMesh, triangle: u32, uv: [f32; 2], d: Vec3, rho: Rgb) {
         let (block, k) = (self.plain.len() / LANES, self.plain.len() % LANES);
         if block == self.plain_hits.len() {

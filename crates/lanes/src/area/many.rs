@@ -91,12 +91,13 @@ fn spherical_place<S: Simd>(
     let simd = u0.token();
     let seen = SphericalSetup::from_points(rectangle, [widened(from.x), widened(from.y), widened(from.z)]);
     let (s, t) = seen.sample(widened(u0), widened(u1));
-    let density = f64x8::splat(simd, 1.0) / seen.solid_angle;
-    let density = narrowed(seen.is_accurate(rectangle).select(density, f64x8::splat(simd, 0.0)));
+    // Infinity where the solid angle is inaccurate
+    let solid_angle = seen.is_accurate(rectangle).select(seen.solid_angle, f64x8::splat(simd, f64::INFINITY));
+    let density = F::splat(simd, 1.0) / narrowed(solid_angle);
     let d = Vec3s::splat(simd, center).minus(from);
     let is_near = (d.dot(d) * (MAX_EXTENT * MAX_EXTENT)).simd_le(F::splat(simd, rectangle.size.length_squared()));
     let is_spherical = is_near & density.simd_gt(F::splat(simd, 0.0));
-    (narrowed(s), narrowed(t), density, is_spherical)
+    (s, t, density, is_spherical)
 }
 
 /// Samples a direction from each of the points `from` to a triangle, given by its corners, unit normal and area,

@@ -1,6 +1,7 @@
 //! Spherical rectangles [Ureña, Fajardo and King 2013] from many points at once; see `lights::kinds::area::rectangle`.
 
 use super::shapes::Rectangle;
+use crate::lane::{F, narrowed, widened};
 use fearless_simd::{Simd, f64x8, mask64x8, prelude::*};
 use lumiris_numbers::math::DVec3;
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, FRAC_PI_8, PI, TAU};
@@ -30,10 +31,13 @@ impl<S: Simd> SphericalSetup<S> {
     #[inline(always)]
     fn new(x: [f64x8<S>; 2], y: [f64x8<S>; 2], z0: f64x8<S>, g23: (f64x8<S>, f64x8<S>), solid_angle: f64x8<S>) -> Self {
         let z2 = z0 * z0;
-        let scale = f64x8::splat(z0.token(), 1.0) / (g23.0 * g23.0 + g23.1 * g23.1).sqrt();
-        let (below, above) = (y[0] * y[0] + z2, y[1] * y[1] + z2);
-        let b = [-y[0] / below.sqrt(), y[1] / above.sqrt()];
-        SphericalSetup { x, y, z0, solid_angle, rotation: (g23.0 * scale, -(g23.1 * scale)), b, k: z2 / below }
+        // One division serves all: |g2·g3| = (x0² + z0²)·√(y0² + z0²)·√(y1² + z0²)
+        let side = x[0] * x[0] + z2;
+        let (below, above) = ((y[0] * y[0] + z2).sqrt(), (y[1] * y[1] + z2).sqrt());
+        let scale = f64x8::splat(z0.token(), 1.0) / (side * below * above);
+        let (by_below, by_above) = (scale * side * above, scale * side * below);
+        let (b, k) = ([-y[0] * by_below, y[1] * by_above], z2 * by_below * by_below);
+        SphericalSetup { x, y, z0, solid_angle, rotation: (g23.0 * scale, -(g23.1 * scale)), b, k }
     }
 
     /// The setup for the points `from`.
@@ -56,17 +60,17 @@ impl<S: Simd> SphericalSetup<S> {
 
     /// Distances from the corner along the edges.
     #[inline(always)]
-    pub(super) fn sample(&self, u0: f64x8<S>, u1: f64x8<S>) -> (f64x8<S>, f64x8<S>) {
+    pub(super) fn sample(&self, u0: f64x8<S>, u1: f64x8<S>) -> (F<S>, F<S>) {
         let simd = u0.token();
-        let one = f64x8::splat(simd, 1.0);
+        let (one, least) = (f64x8::splat(simd, 1.0), F::splat(simd, f32::MIN_POSITIVE));
         // cos and sin of u·S − (g2 + g3)
         let (sin_us, cos_us) = sin_cos_turns_f64(u0 * (self.solid_angle * (1.0 / TAU)));
         let cos = cos_us * self.rotation.0 - sin_us * self.rotation.1;
         let sin = cos_us * self.rotation.1 + sin_us * self.rotation.0;
-        // With fu = f/sin, x = −z0·sgn(fu)/√(fu² + b0² − 1)
+        // With fu = f/sin, x = −z0·sgn(fu)/√(fu² + b0² − 1). Differences are in f64, roots and quotients in f32
         let f = cos * self.b[0] - self.b[1];
-        let under_root = (f * f - sin * sin * self.k).max(1e-300);
-        let x = sin * (-self.z0).copysign(f) / under_root.sqrt();
+        let under_root = narrowed(f * f - sin * sin * self.k).max(least);
+        let x = widened(narrowed(sin * (-self.z0).copysign(f)) / under_root.sqrt());
         let x = x.max(self.x[0]).min(self.x[1]);
 
         let d2 = x * x + self.z0 * self.z0;
@@ -74,9 +78,9 @@ impl<S: Simd> SphericalSetup<S> {
         let scale = one / (r0 * r1);
         let (h0, h1) = (r1 * scale * self.y[0], r0 * scale * self.y[1]);
         let h = h0 + u1 * (h1 - h0);
-        let y = h * (d2 / (one - h * h).max(1e-300)).sqrt();
-        let y = y.max(self.y[0]).min(self.y[1]);
-        (x - self.x[0], y - self.y[0])
+        let slope = (narrowed(d2) / narrowed(one - h * h).max(least)).sqrt();
+        let y = (h * widened(slope)).max(self.y[0]).min(self.y[1]);
+        (narrowed(x - self.x[0]), narrowed(y - self.y[0]))
     }
 
     /// True unless the rectangle is edge-on, or so small that its angles lose precision.
