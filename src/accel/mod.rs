@@ -1,6 +1,6 @@
 //! Ray tracing: one interface, and two implementations that check each other.
 //!
-//! * `ray_tracer`: the interface
+//! * `ray_tracer`: the interface, and the order of hits at the same parameter ([`Hit::precedes`])
 //! * [`embree`]: the fast tracer
 //! * [`bvh`]: the pure-Rust reference
 //! * [`alpha`]: alpha masks of both

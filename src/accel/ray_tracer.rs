@@ -146,6 +146,14 @@ pub struct Hit {
 impl Hit {
     /// `instance` of hits in the root group.
     pub const NO_INSTANCE: u32 = crate::geometry::NO_INSTANCE;
+
+    /// True if this is the first of two hits of a ray: by t, and for equal t by (instance, geometry, primitive). Applied
+    /// by both tracers, so that coincident surfaces do not depend on the order of traversal.
+    #[inline]
+    pub fn precedes(&self, other: &Hit) -> bool {
+        let key = |h: &Hit| (h.instance, h.geometry, h.primitive);
+        self.t < other.t || (self.t == other.t && key(self) < key(other))
+    }
 }
 
 /// Coherence of neighbouring rays in a batch, as a hint to the tracer. It never changes a result.

@@ -3,7 +3,7 @@
 use super::lens_system::LensSystem;
 use lumiris_lanes::camera::Pinhole;
 use lumiris_numbers::math::sphere_map::{equal_area_square_to_sphere, lat_long_to_sphere, wrap_equal_area_square};
-use lumiris_numbers::math::transform::placement_at;
+use lumiris_numbers::math::transform::transform_at;
 use lumiris_numbers::math::warp::sample_uniform_disk_concentric;
 use lumiris_numbers::math::{Affine3A, Ray, Vec2, Vec3};
 use std::f32::consts::PI;
@@ -118,7 +118,7 @@ impl CameraBase {
     /// The ray of a point and a direction given in camera space.
     #[inline]
     fn ray(&self, o: Vec3, d: Vec3, time: f32) -> Ray {
-        let world_from_camera = placement_at(&self.world_from_camera, time);
+        let world_from_camera = transform_at(&self.world_from_camera, time);
         let d = world_from_camera.transform_vector3(d).normalize();
         Ray { o: world_from_camera.transform_point3(o), d, t_max: f32::INFINITY, time }
     }
@@ -157,7 +157,7 @@ impl CameraBase {
     /// Distance between the parallel rays of neighbouring pixels, in world units.
     #[inline]
     fn parallel_width(&self, window: &[f32; 4], time: f32) -> f32 {
-        let m = placement_at(&self.world_from_camera, time).matrix3;
+        let m = transform_at(&self.world_from_camera, time).matrix3;
         let scale = m.x_axis.cross(m.y_axis).length();
         (self.pixel_area(window) * scale).sqrt()
     }
@@ -307,7 +307,7 @@ impl Camera {
     pub fn pixel_width(&self, p: Vec3, time: f32) -> f32 {
         // Distance and direction from the camera
         let base = self.base();
-        let world_from_camera = placement_at(&base.world_from_camera, time);
+        let world_from_camera = transform_at(&base.world_from_camera, time);
         let d = p - world_from_camera.transform_point3(Vec3::ZERO);
         let distance = d.length();
         if !(distance > 0.0) {
@@ -340,7 +340,7 @@ impl Camera {
     /// or beyond its edges. `None` for points behind the camera, and for cameras that are not perspective.
     pub fn project(&self, p: Vec3, u_lens: [f32; 2], time: f32) -> Option<Projection> {
         let Camera::Perspective { base, screen_window, tan_half_fov, lens } = self else { return None };
-        let world_from_camera = placement_at(&base.world_from_camera, time);
+        let world_from_camera = transform_at(&base.world_from_camera, time);
         let on_lens = if lens.radius > 0.0 { sample_uniform_disk_concentric(u_lens) * lens.radius } else { Vec2::ZERO };
         let on_lens = on_lens.extend(0.0);
         let d = world_from_camera.inverse().transform_point3(p) - on_lens;

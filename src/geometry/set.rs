@@ -5,7 +5,7 @@
 
 use super::hit::SurfaceHit;
 use super::shape::Shape;
-use lumiris_numbers::math::transform::placement_at;
+use lumiris_numbers::math::transform::transform_at;
 use lumiris_numbers::math::{Affine3A, Bounds3, Ray, Vec3};
 use rayon::prelude::*;
 
@@ -61,7 +61,7 @@ pub struct Instance {
 impl Instance {
     /// Transform at `time` in 0..=1.
     pub fn world_from_group_at(&self, time: f32) -> Affine3A {
-        placement_at(&self.world_from_group, time)
+        transform_at(&self.world_from_group, time)
     }
 
     /// The inverse transform; `None` if the instance moves.

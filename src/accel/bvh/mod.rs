@@ -5,8 +5,8 @@
 //! (`tree`), and traversed one ray at a time (`walk`). Triangles are watertight; quadrics and bilinear patches use the
 //! exact intersections of [`crate::geometry`].
 //!
-//! Results do not depend on the traversal order: among hits with equal t, the smallest (instance, geometry, primitive)
-//! wins. Primitives and instances with NaN or infinite coordinates are excluded.
+//! Results do not depend on the traversal order: [`Hit::precedes`](super::Hit::precedes) decides among hits with equal
+//! t. Primitives and instances with NaN or infinite coordinates are excluded.
 
 mod build;
 mod hierarchy;

@@ -45,9 +45,8 @@ impl Query for Closest {
 
     #[inline]
     fn wants(&self, hit: &Hit) -> bool {
-        let key = |h: &Hit| (h.instance, h.geometry, h.primitive);
-        // The end of the ray is open. Among hits at the same t, the smallest key wins
-        hit.t < self.limit || self.best.as_ref().is_some_and(|best| hit.t == best.t && key(hit) < key(best))
+        // The end of the ray is open
+        self.best.as_ref().map_or(hit.t < self.limit, |best| hit.precedes(best))
     }
 
     #[inline]

@@ -8,12 +8,12 @@
 //! 1. (t, u, v) of a hit are computed from the vertices by the same function as in [`crate::accel::bvh`], in the space
 //!    of the group. Both tracers, and processors with different vector units, give the same bits for the same triangle.
 //! 2. If the parameters reported by Embree differ by less than 2⁻¹², the hit with the smallest exact parameter is
-//!    taken. Among equal ones it is the smallest (instance, geometry, primitive), as in [`crate::accel::bvh`]. A filter
-//!    receives every hit that Embree considers the nearest so far, and sets the end of the ray slightly beyond it. In
-//!    packets it only notes which rays have such a tie. These few rays are traced again as single rays, whose filter
-//!    compares exact hits. Without this, the traversal order would decide. Packets with the coherence flag then gave
-//!    other triangles than single rays for 10 % of the rays at vertices of a closed mesh, for 0.2 % at edges, and for
-//!    13 % of camera rays on coplanar triangles.
+//!    taken. [`Hit::precedes`](crate::accel::Hit::precedes) decides among equal ones, as in [`crate::accel::bvh`]. A
+//!    filter receives every hit that Embree considers the nearest so far, and sets the end of the ray slightly beyond
+//!    it. In packets it only notes which rays have such a tie. These few rays are traced again as single rays, whose
+//!    filter compares exact hits. Without this, the traversal order would decide. Packets with the coherence flag then
+//!    gave other triangles than single rays for 10 % of the rays at vertices of a closed mesh, for 0.2 % at edges, and
+//!    for 13 % of camera rays on coplanar triangles.
 //! 3. Packets are used for first hits of coherent rays and for occlusion. For other first hits Embree 3.13 traces the
 //!    rays of a packet one by one anyway.
 //! 4. Scenes with moving instances are traced by single rays. In packets, Embree interpolates and inverts their

@@ -1,4 +1,5 @@
-//! Conversion of Embree's ids to ids of the scene, and of Embree's hits to exact hits.
+//! Conversion of Embree's ids to ids of the scene, and of Embree's hits to exact hits. `query` refines single hits,
+//! `exact_hits` blocks of them, and `context` the hits of a tie.
 
 use crate::accel::Hit;
 use crate::geometry::triangle::{RayPrecomputed, intersect_triangle};
@@ -48,12 +49,10 @@ pub(super) struct SceneIds {
 }
 
 impl Refined {
-    /// True if this is a hit that precedes `other`: by t, and for equal t by (instance, geometry, primitive), as in the
-    /// Rust tracer.
+    /// True if this is a hit and [precedes](Hit::precedes) `other`.
     pub(super) fn precedes(&self, other: &Refined) -> bool {
-        let key = |h: &Hit| (h.instance, h.geometry, h.primitive);
         match (self, other) {
-            (Refined::Hit(a), Refined::Hit(b)) => a.t < b.t || (a.t == b.t && key(a) < key(b)),
+            (Refined::Hit(a), Refined::Hit(b)) => a.precedes(b),
             (Refined::Hit(_), Refined::Behind | Refined::Beyond) => true,
             (Refined::Behind | Refined::Beyond, _) => false,
         }

@@ -28,7 +28,7 @@ pub fn lerp_affine(a: &Affine3A, b: &Affine3A, t: f32) -> Affine3A {
 
 /// The transform at `time` in 0..=1, linear between `samples` at equidistant times. There must be at least one sample.
 #[inline]
-pub fn placement_at(samples: &[Affine3A], time: f32) -> Affine3A {
+pub fn transform_at(samples: &[Affine3A], time: f32) -> Affine3A {
     match segment_at(samples.len(), time) {
         Some((i, t)) => lerp_affine(&samples[i], &samples[i + 1], t),
         None => samples[0],
@@ -85,9 +85,9 @@ mod tests {
         let single = |made: &[DAffine3]| -> Vec<Affine3A> { made.iter().map(DAffine3::as_affine3a).collect() };
         let made = compose_placements(&moves(1), &moves(4));
         assert_eq!(made.len(), 5);
-        assert_eq!(placement_at(&single(&made), 0.375).translation.x, 0.75);
+        assert_eq!(transform_at(&single(&made), 0.375).translation.x, 0.75);
         let made = compose_placements(&[turned], &moves(2));
-        assert!((placement_at(&single(&made), 0.5).transform_point3(Vec3::ZERO) - Vec3::Y * 0.5).length() < 1e-6);
+        assert!((transform_at(&single(&made), 0.5).transform_point3(Vec3::ZERO) - Vec3::Y * 0.5).length() < 1e-6);
         assert_eq!(compose_placements(&[turned], &[turned]).len(), 1);
     }
 
