@@ -1,6 +1,6 @@
 //! T1 by BSDF sampling, one sample at a time: a direction, and the emitter in that direction.
 
-use super::candidates::{Candidate, Drawn, SampleAllocation};
+use super::candidates::{Candidate, SampleAllocation, SampledBy};
 use super::point::{LightPoint, ShadingPoint};
 use crate::accel::Hit;
 use crate::lights::{LightCtx, LightHit, LightId};
@@ -56,7 +56,7 @@ pub(super) fn bsdf_candidate(
     let light = light.filter(|_| !f.is_black())?;
     Some(Candidate {
         point: pending.point,
-        drawn: if pending.specular { Drawn::DeltaBsdf } else { Drawn::Bsdf },
+        sampled_by: if pending.specular { SampledBy::DeltaBsdf } else { SampledBy::Bsdf },
         f,
         li: emitter.li,
         light,

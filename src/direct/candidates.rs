@@ -10,7 +10,7 @@ use lumiris_numbers::samplers::SampleStream;
 
 /// The technique that sampled a candidate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Drawn {
+pub enum SampledBy {
     /// Light sampling.
     Light,
     /// Light sampling of a delta light.
@@ -21,12 +21,12 @@ pub enum Drawn {
     DeltaBsdf,
 }
 
-impl Drawn {
+impl SampledBy {
     /// True if no other technique can sample the direction.
     pub fn is_delta(self) -> bool {
         match self {
-            Drawn::DeltaLight | Drawn::DeltaBsdf => true,
-            Drawn::Light | Drawn::Bsdf => false,
+            SampledBy::DeltaLight | SampledBy::DeltaBsdf => true,
+            SampledBy::Light | SampledBy::Bsdf => false,
         }
     }
 }
@@ -37,7 +37,7 @@ pub struct Candidate {
     /// Index of the shading point.
     pub point: u32,
     /// Technique.
-    pub drawn: Drawn,
+    pub sampled_by: SampledBy,
     /// Unshadowed integrand f_s·|cos θ|·L.
     pub f: Rgb,
     /// The radiance L in `f`.
@@ -64,9 +64,9 @@ impl Candidate {
     /// The factor 1/(n·p) of f in the estimate by the candidate's own technique.
     #[inline]
     pub fn own_factor(&self) -> f32 {
-        match self.drawn {
-            Drawn::Light | Drawn::DeltaLight => mc::weight(self.n_light, self.p_light),
-            Drawn::Bsdf | Drawn::DeltaBsdf => mc::weight(self.n_bsdf, self.p_bsdf),
+        match self.sampled_by {
+            SampledBy::Light | SampledBy::DeltaLight => mc::factor(self.n_light, self.p_light),
+            SampledBy::Bsdf | SampledBy::DeltaBsdf => mc::factor(self.n_bsdf, self.p_bsdf),
         }
     }
 
@@ -75,10 +75,10 @@ impl Candidate {
     pub fn factor(&self, heuristic: Heuristic) -> f32 {
         let light = Technique { n: self.n_light, p: self.p_light };
         let bsdf = Technique { n: self.n_bsdf, p: self.p_bsdf };
-        match self.drawn {
-            Drawn::DeltaLight | Drawn::DeltaBsdf => self.own_factor(),
-            Drawn::Light => heuristic.factor(light, bsdf),
-            Drawn::Bsdf => heuristic.factor(bsdf, light),
+        match self.sampled_by {
+            SampledBy::DeltaLight | SampledBy::DeltaBsdf => self.own_factor(),
+            SampledBy::Light => heuristic.factor(light, bsdf),
+            SampledBy::Bsdf => heuristic.factor(bsdf, light),
         }
     }
 }
@@ -141,21 +141,34 @@ mod tests {
     use super::*;
     use lumiris_numbers::math::Vec3;
 
-    fn candidate(drawn: Drawn) -> Candidate {
+    fn candidate(sampled_by: SampledBy) -> Candidate {
         let segment = Ray { o: Vec3::ZERO, d: Vec3::Z, t_max: 1.0, time: 0.0 };
         let (f, li, light) = (Rgb::WHITE, Rgb::WHITE, 0);
         let (p_light, p_bsdf, n_light, n_bsdf) = (0.5, 2.0, 3.0, 1.0);
-        Candidate { point: 0, drawn, f, li, light, p_light, p_bsdf, n_light, n_bsdf, p_lobe: 0.0, group: 0, segment }
+        Candidate {
+            point: 0,
+            sampled_by,
+            f,
+            li,
+            light,
+            p_light,
+            p_bsdf,
+            n_light,
+            n_bsdf,
+            p_lobe: 0.0,
+            group: 0,
+            segment,
+        }
     }
 
     #[test]
     fn mis_weights_of_both_techniques_sum_to_one_and_delta_samples_have_the_weight_one() {
         for heuristic in [Heuristic::Balance, Heuristic::Power] {
             // A factor is w/(n·p)
-            let [light, bsdf] = [Drawn::Light, Drawn::Bsdf].map(|drawn| candidate(drawn).factor(heuristic));
+            let [light, bsdf] = [SampledBy::Light, SampledBy::Bsdf].map(|by| candidate(by).factor(heuristic));
             assert!((light * 3.0 * 0.5 + bsdf * 1.0 * 2.0 - 1.0).abs() < 1e-6, "{heuristic:?}");
-            assert!((candidate(Drawn::DeltaLight).factor(heuristic) - 1.0 / 1.5).abs() < 1e-6);
-            assert!((candidate(Drawn::DeltaBsdf).factor(heuristic) - 1.0 / 2.0).abs() < 1e-6);
+            assert!((candidate(SampledBy::DeltaLight).factor(heuristic) - 1.0 / 1.5).abs() < 1e-6);
+            assert!((candidate(SampledBy::DeltaBsdf).factor(heuristic) - 1.0 / 2.0).abs() < 1e-6);
         }
     }
 }

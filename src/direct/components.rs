@@ -1,7 +1,7 @@
 //! Common code of `ocv` and `optimal-mis`: samples of a mixture of densities, the component densities of each sample,
 //! and the sums of the normal equations.
 
-use super::candidates::{Candidates, Drawn, SampleAllocation};
+use super::candidates::{Candidates, SampleAllocation, SampledBy};
 use super::mixture::{Mixture, draw_groups};
 use super::point::ShadingPoint;
 use super::shadow_segments::Segments;
@@ -82,7 +82,7 @@ impl Components {
         self.hidden.clear();
         self.hidden_of.clear();
         for (i, (c, &is_free)) in candidates.records.iter().zip(&self.is_free).enumerate() {
-            if !is_free && c.drawn == Drawn::Light && c.p_bsdf > 0.0 && job.world.emitters_hide() {
+            if !is_free && c.sampled_by == SampledBy::Light && c.p_bsdf > 0.0 && job.world.emitters_hide() {
                 self.hidden.push(&c.segment);
                 self.hidden_of.push(i as u32);
             }

@@ -6,7 +6,7 @@ pub(super) const LIGHT: u32 = 0;
 pub(super) const BSDF: u32 = 1;
 /// Choice of the technique of a single sample.
 pub(super) const TECHNIQUE: u32 = 2;
-/// Allocation of samples to light groups.
+/// Allocation of samples to mixture groups.
 pub(super) const GROUPS: u32 = 3;
 /// Delta lights, where they are sampled separately.
 pub(super) const DELTA: u32 = 4;
@@ -18,7 +18,7 @@ pub(super) const COUNTS: u32 = 6;
 pub(super) const RESAMPLE: u32 = 8;
 /// Bounds of strata of proposals.
 pub(super) const STRATA: u32 = 9;
-/// Light group g uses the domain `GROUP + g`.
+/// Mixture group g uses the domain `GROUP + g`.
 pub(super) const GROUP: u32 = 16;
 /// Contributing light number k uses the domain `CONTRIBUTING + k`.
 pub(super) const CONTRIBUTING: u32 = 64;

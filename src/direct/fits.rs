@@ -17,13 +17,13 @@ pub struct Fits {
     solver: Solver,
     sums: Vec<f32>,
     beta: Vec<f32>,
-    controls: Controls,
+    controls: PixelControls,
 }
 
 /// Sums over all estimates of a pixel: values by channel, and control variates, whose expectation is 0. Both have the
 /// weights of film samples.
 #[derive(Clone, Debug, Default)]
-struct Controls {
+struct PixelControls {
     components: usize,
     /// The sums, except while samples are being added.
     packed: PackedRows,
@@ -33,7 +33,7 @@ struct Controls {
     batch: Vec<f32>,
 }
 
-impl Controls {
+impl PixelControls {
     fn row(&self, index: usize) -> std::ops::Range<usize> {
         let len = 3 + self.components;
         index * len..(index + 1) * len
@@ -58,13 +58,13 @@ impl Fits {
     /// `count` fits without samples.
     pub(super) fn new(equations: NormalEquations, solver: Solver, count: usize) -> Self {
         let [sums, beta] = [equations.len(), equations.coefficients()].map(|len| vec![0.0; count * len]);
-        Fits { equations, solver, sums, beta, controls: Controls::default() }
+        Fits { equations, solver, sums, beta, controls: PixelControls::default() }
     }
 
     /// Empty sums of values and of `components` control variates for `count` pixels.
     pub fn of_pixels(components: usize, count: usize) -> Self {
         let packed = PackedRows::new(count, 3 + components);
-        let controls = Controls { components, packed, ..Controls::default() };
+        let controls = PixelControls { components, packed, ..PixelControls::default() };
         Fits { controls, ..Fits::default() }
     }
 
@@ -125,7 +125,7 @@ impl Fits {
 
     /// Packs the sums until samples are added again; `scratch` is a shared buffer.
     pub fn pack(&mut self, scratch: &mut Vec<u8>) {
-        let Controls { packed, sums, batch, .. } = &mut self.controls;
+        let PixelControls { packed, sums, batch, .. } = &mut self.controls;
         if !sums.is_empty() {
             packed.set(sums, scratch);
         }

@@ -1,6 +1,6 @@
 //! T1 by light sampling, one sample at a time.
 
-use super::candidates::{Candidate, Drawn, SampleAllocation};
+use super::candidates::{Candidate, SampleAllocation, SampledBy};
 use super::domain;
 use super::point::ShadingPoint;
 use crate::lights::{LeAndPdf, LightCtx, LightId, LightSample};
@@ -68,11 +68,11 @@ pub(super) fn unshadowed_candidate(
     }
 
     // A technique without samples has no weight
-    let drawn = if sample.is_delta { Drawn::DeltaLight } else { Drawn::Light };
+    let sampled_by = if sample.is_delta { SampledBy::DeltaLight } else { SampledBy::Light };
     let p_bsdf = if sample.is_delta || allocation.n_bsdf == 0.0 { 0.0 } else { point.bsdf.pdf(point.wo, sample.wi) };
     Some(Candidate {
         point: index,
-        drawn,
+        sampled_by,
         f,
         li: sample.li,
         light,

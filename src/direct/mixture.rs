@@ -15,7 +15,7 @@ use super::domain;
 use super::light_samples::light_candidate;
 use super::point::ShadingPoint;
 use crate::bsdfs::MAX_LOBES;
-use crate::lights::groups::MAX_GROUPS;
+use crate::lights::mixture_groups::MAX_GROUPS;
 use crate::lights::{LightId, LightSample};
 use crate::scene::RenderJob;
 use lumiris_numbers::estimators::ocv::MAX_COMPONENTS;
@@ -91,7 +91,7 @@ impl Mixture {
         if self.lobes == MAX_LOBES && pdf > 0.0 { point.bsdf.pdf_first_lobe(point.wo, wi, pdf) } else { pdf }
     }
 
-    /// The component of a light group.
+    /// The component of a group of lights.
     #[inline]
     pub fn component(&self, group: usize) -> usize {
         self.lobes + group
@@ -142,7 +142,7 @@ impl Mixture {
     }
 }
 
-/// Draws the light samples of a point separately for each light group. A group gets N times its probability, rounded by
+/// Draws the light samples of a point separately for each group of lights. A group gets N times its probability, rounded by
 /// one random number for all groups. Returns the mixture at the point.
 pub(super) fn draw_groups(
     job: &RenderJob,
@@ -182,10 +182,10 @@ pub(super) fn draw_groups(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::direct::candidates::Drawn;
+    use crate::direct::candidates::SampledBy;
     use lumiris_numbers::math::{Ray, Rgb};
 
-    /// Two lobes, and two light groups with 3 light samples.
+    /// Two lobes, and two groups of lights with 3 light samples.
     fn mixture() -> Mixture {
         let mut integrals = [0.0; MAX_COMPONENTS];
         integrals[..4].copy_from_slice(&[0.25, 0.75, 0.5, 0.5]);
@@ -199,7 +199,7 @@ mod tests {
         assert_eq!([mixture.lobe(0.2), mixture.lobe(0.3), mixture.component(1)], [0, 1, 3]);
         let candidate = |p_light, p_bsdf, p_lobe| Candidate {
             point: 0,
-            drawn: Drawn::Light,
+            sampled_by: SampledBy::Light,
             f: Rgb::WHITE,
             li: Rgb::WHITE,
             light: 0,

@@ -1,7 +1,7 @@
 //! A point at which direct light is estimated, and the rays that leave it.
 
 use crate::bsdfs::LobeWidth;
-use crate::lights::{GlossyLobe, LightCtx, LightSample, LightSampling};
+use crate::lights::{GlossyLobe, JobLights, LightCtx, LightSample};
 use crate::materials::SurfaceBsdf;
 use crate::media::{MediumId, Sides};
 use crate::settings::SampleCounts;
@@ -47,7 +47,7 @@ pub struct ShadingPoint<'a> {
 
 /// The glossy lobe reflected to `wo`, if the light sampler uses it.
 #[inline]
-pub fn lobe_for_lights(lights: &LightSampling, bsdf: &SurfaceBsdf<'_>, wo: Vec3) -> GlossyLobe {
+pub fn lobe_for_lights(lights: &JobLights, bsdf: &SurfaceBsdf<'_>, wo: Vec3) -> GlossyLobe {
     if !lights.sampler.needs_lobes() {
         return GlossyLobe::NONE;
     }

@@ -10,7 +10,7 @@
 //! * **T2, trace**: shadow segments in packets.
 //! * **resolve**: the sum of the unoccluded contributions, or another combination by the estimator.
 
-use super::estimators::{Batch, Estimator};
+use super::estimators::{Estimator, PointBatch};
 use super::fits::Fits;
 use super::point::ShadingPoint;
 use super::shadow_segments::SegmentOutcome;
@@ -23,7 +23,7 @@ use std::time::Instant;
 /// Estimates direct light; holds the buffers of one worker.
 #[derive(Debug, Default)]
 pub struct PointDirectLighting {
-    batch: Batch,
+    batch: PointBatch,
     /// Counts and times so far.
     pub stats: DirectStats,
 }

@@ -40,10 +40,10 @@ pub struct ProposalColumns {
     f_cos: [Vec<f32>; 3],
     p_bsdf: Vec<f32>,
     /// Target density of each proposal (unnormalised).
-    pub p_hat: Vec<f32>,
+    pub q_hat: Vec<f32>,
     /// Factor r of f in the estimate over all proposals; 1/(M·p) for a single technique.
     pub r: Vec<f32>,
-    /// Resampling weight p_hat·r of each proposal.
+    /// Resampling weight q_hat·r of each proposal.
     pub weight: Vec<f32>,
     /// V̂ of each proposal, for targets with learned visibility.
     pub visibility: Vec<f32>,
@@ -131,7 +131,7 @@ impl ProposalColumns {
             let len = len.next_power_of_two().max(LANES);
             self.p.reserve(len);
             self.samples.reserve(len);
-            let scalars = [&mut self.p_bsdf, &mut self.p_hat, &mut self.r, &mut self.weight, &mut self.visibility];
+            let scalars = [&mut self.p_bsdf, &mut self.q_hat, &mut self.r, &mut self.weight, &mut self.visibility];
             scalars.into_iter().chain(&mut self.u).chain(&mut self.f_cos).for_each(|array| array.resize(len, 0.0));
         }
     }
@@ -163,19 +163,19 @@ impl ProposalColumns {
         let contributing = job.lights.contributing_lights(&ctx);
         for (i, c) in (bsdf_start..end).zip(bsdf_samples) {
             let cos = || point.bsdf.cos(c.segment.d.normalize());
-            self.p_hat[i] = match techniques.target {
+            self.q_hat[i] = match techniques.target {
                 Target::Fgl => c.f.luminance(),
                 Target::Visibility | Target::VisibilityControl => {
                     self.visibility[i] = job.lights.visibility(&ctx, &contributing, c.light);
                     c.f.luminance() * factor(techniques.target, self.visibility[i])
                 }
                 // The cosine of a delta sample is part of its weight
-                Target::Gv | Target::Gvl if c.drawn.is_delta() => c.f.luminance(),
+                Target::Gv | Target::Gvl if c.sampled_by.is_delta() => c.f.luminance(),
                 Target::Gv => cos(),
                 Target::Gvl => cos() * c.li.luminance(),
             };
             self.r[i] = c.factor(techniques.heuristic);
-            self.weight[i] = weight(self.p_hat[i], self.r[i]);
+            self.weight[i] = weight(self.q_hat[i], self.r[i]);
         }
     }
 
@@ -259,7 +259,7 @@ impl ProposalColumns {
             heuristic: techniques.heuristic,
         };
         let mut out = ris_weights::Weights {
-            q_hat: &mut self.p_hat[start..end],
+            q_hat: &mut self.q_hat[start..end],
             r: &mut self.r[start..end],
             w: &mut self.weight[start..end],
         };
@@ -293,8 +293,8 @@ impl ProposalColumns {
             // The cosine alone
             Target::Gv => {
                 for i in start..end {
-                    self.p_hat[i] = self.f_cos[0][i];
-                    self.weight[i] = weight(self.p_hat[i], self.r[i]);
+                    self.q_hat[i] = self.f_cos[0][i];
+                    self.weight[i] = weight(self.q_hat[i], self.r[i]);
                 }
             }
             Target::Visibility | Target::VisibilityControl => {
@@ -309,7 +309,7 @@ impl ProposalColumns {
                         (last, factor_of_last) = (light, factor(target, visibility));
                     }
                     self.visibility[i] = visibility;
-                    self.p_hat[i] *= factor_of_last;
+                    self.q_hat[i] *= factor_of_last;
                     self.weight[i] *= factor_of_last;
                 }
             }

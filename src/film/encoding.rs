@@ -6,7 +6,7 @@
 
 use super::accumulator::{PixelAccumulator, RadianceAccumulator};
 use super::fixed_sums::{FixedSum, SquareSum, UnitSum};
-use super::layers::PixelLight;
+use super::light_layers::PixelLight;
 use super::replicas::ReplicaAccumulator;
 
 /// Appends numbers to a byte vector.

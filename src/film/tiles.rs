@@ -3,7 +3,7 @@
 use super::accumulator::PixelAccumulator;
 use super::fixed_sums::FixedSum;
 use super::image_noise;
-use super::layers::{LightSums, PackedLayers};
+use super::light_layers::{LightSums, PackedLayers};
 use super::packed::PackedSums;
 use super::pixel::PixelSums;
 use super::pixel_bounds::PixelBounds;

@@ -6,7 +6,7 @@
 
 use super::exclusions::{self, Feature};
 use crate::accel::Hit;
-use crate::lights::{LightId, LightSampling};
+use crate::lights::{JobLights, LightId};
 use crate::scene::RenderJob;
 use lumiris_numbers::math::{Rgb, Vec3};
 
@@ -101,7 +101,7 @@ impl LayerSums {
 
     /// Adds the contribution `value` of a light to a sample, at the point `p`. `wi` is the unit direction to the light.
     #[inline]
-    pub(super) fn add(&mut self, lights: &LightSampling, sample: u32, light: LightId, p: Vec3, wi: Vec3, value: Rgb) {
+    pub(super) fn add(&mut self, lights: &JobLights, sample: u32, light: LightId, p: Vec3, wi: Vec3, value: Rgb) {
         if !self.are_kept() || value.is_black() {
             return;
         }
@@ -124,7 +124,7 @@ impl LayerSums {
 
     /// Adds the sum of all infinite lights at `p` from the direction `wi`, divided among their layers.
     #[inline]
-    pub(super) fn add_infinite(&mut self, lights: &LightSampling, sample: u32, p: Vec3, wi: Vec3, value: Rgb) {
+    pub(super) fn add_infinite(&mut self, lights: &JobLights, sample: u32, p: Vec3, wi: Vec3, value: Rgb) {
         if !self.are_kept() || value.is_black() {
             return;
         }

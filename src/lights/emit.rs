@@ -35,7 +35,7 @@ impl Light {
             Light::Point(light) => light.sample_le(u_direction),
             Light::Spot(light) => light.sample_le(u_direction),
             Light::Image(light) => light.sample_le(u_direction),
-            Light::Distant(light) => from_infinity(scene, u_position, light.wi, light.l),
+            Light::Distant(light) => from_infinity(scene, u_position, light.wi, light.irradiance),
             Light::Area(area) => area.sample_le(u_position, u_direction),
             Light::InfiniteConstant { l } => {
                 from_infinity(scene, u_position, sample_uniform_sphere(u_direction), *l / pdf_uniform_sphere())

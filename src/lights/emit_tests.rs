@@ -94,7 +94,7 @@ fn lights() -> Vec<(&'static str, Light)> {
         ("spot wider than a half-space", spot(-0.6, 0.1)),
         ("goniometric", picture(ImageMapping::Sphere, [6, 6])),
         ("projection", picture(ImageMapping::Plane { half: [0.9, 0.6] }, [6, 4])),
-        ("distant", Light::Distant(DistantLight { wi: Vec3::new(0.3, -0.4, 0.7).normalize(), l })),
+        ("distant", Light::Distant(DistantLight { wi: Vec3::new(0.3, -0.4, 0.7).normalize(), irradiance: l })),
         ("triangle", area(&triangle, &both)),
         ("triangle of three colours", area(&colored, &Emission { has_vertex_colors: true, ..both.clone() })),
         ("rectangle", area(&down, &one)),
@@ -134,7 +134,7 @@ fn the_mean_power_of_every_light_is_its_flux() {
             power.add(s.map_or(0.0, |s| f64::from(s.power.luminance())));
         }
         // Areas of curved surfaces and integrals of images are sums over cells, hence the tolerance.
-        power.assert_mean(f64::from(light.phi(SCENE.radius)), 1e-5, 3e-4);
+        power.assert_mean(f64::from(light.power_luminance(SCENE.radius)), 1e-5, 3e-4);
     }
 }
 
@@ -261,7 +261,7 @@ fn surfaces_emit_by_area_and_cosine_on_both_sides() {
 #[test]
 fn light_from_infinity_comes_through_a_disk_that_covers_the_scene() {
     let wi = Vec3::new(0.3, -0.4, 0.7).normalize();
-    let samples = emitted(&Light::Distant(DistantLight { wi, l: Rgb::WHITE }), 8);
+    let samples = emitted(&Light::Distant(DistantLight { wi, irradiance: Rgb::WHITE }), 8);
     let frame = Frame::from_z(wi);
     assert_uniform(samples.iter().map(|s| {
         let p = frame.to_local((s.p - SCENE.center) / SCENE.radius);
@@ -347,7 +347,7 @@ fn what_emits_nothing_sends_no_photons() {
     for light in [
         Light::Point(PointLight { p: Vec3::ZERO, intensity: Rgb::BLACK }),
         closed(Rgb::WHITE),
-        Light::Distant(DistantLight { wi: Vec3::Z, l: Rgb::BLACK }),
+        Light::Distant(DistantLight { wi: Vec3::Z, irradiance: Rgb::BLACK }),
         area(&Shape::Bilinear(bent_patch()), &black),
         area(&Shape::Mesh(line), &Emission::constant(Rgb::WHITE)),
         Light::InfiniteConstant { l: Rgb::BLACK },

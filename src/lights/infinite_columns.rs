@@ -17,7 +17,14 @@ impl Light {
             Light::InfiniteImage { map, world_from_light, scale } => {
                 map.lanes(*world_from_light, *scale).sample(level, u, out);
             }
-            _ => return false,
+            Light::InfiniteConstant { .. }
+            | Light::Point(_)
+            | Light::Spot(_)
+            | Light::Image(_)
+            | Light::Distant(_)
+            | Light::Area(_)
+            | Light::Portal(_)
+            | Light::Volume(_) => return false,
         }
         true
     }

@@ -192,7 +192,7 @@ mod tests {
     use super::*;
     use crate::geometry::{Quadric, QuadricKind, Shape, TriangleMesh};
     use crate::lights::{
-        DistantLight, Emission, EmissionImage, LightCtx, LightHit, LightSamplerKind, LightSampling, LightSetBuilder,
+        DistantLight, Emission, EmissionImage, JobLights, LightCtx, LightHit, LightSamplerKind, LightSetBuilder,
     };
     use lumiris_numbers::math::warp::sample_uniform_sphere;
     use lumiris_numbers::math::{Affine3A, Bounds3, Vec2};
@@ -250,7 +250,7 @@ mod tests {
     /// often E was positive.
     fn assert_integrates(set: &Arc<LightSet>, stream: &mut Pcg32) -> u32 {
         let known = Irradiances::new(set, |_| false);
-        let sampling = LightSampling::new(Arc::clone(set), LightSamplerKind::Tree, 1);
+        let sampling = JobLights::new(Arc::clone(set), LightSamplerKind::Tree, 1);
         let mut lit = 0;
         for _ in 0..POINTS {
             let [p, n] = [2.0, 1.0].map(|r| sample_uniform_sphere(stream.random::<[f32; 2]>()) * r);
@@ -298,7 +298,7 @@ mod tests {
         assert_eq!(assert_integrates(&set(&[sphere(Vec3::ZERO, 3.0, true)], &emission), &mut stream), 0);
         let mut builder = LightSetBuilder::default();
         builder.add(Light::InfiniteConstant { l: Rgb::splat(0.5) });
-        builder.add(Light::Distant(DistantLight { wi: Vec3::Z, l: Rgb::WHITE }));
+        builder.add(Light::Distant(DistantLight { wi: Vec3::Z, irradiance: Rgb::WHITE }));
         let environment = Arc::new(builder.build(&Bounds3::EMPTY));
         assert_eq!(assert_integrates(&environment, &mut stream), POINTS);
     }

@@ -1,4 +1,5 @@
-//! Light groups: sets of lights with their own layer in the image.
+//! Light groups: sets of lights with their own layer in the image. `integrators/light_layers.rs` adds the samples of a
+//! layer, and `film/light_layers.rs` packs its sums.
 
 use super::light_sample::LightId;
 use std::collections::HashMap;

@@ -186,20 +186,20 @@ impl Light {
 
     /// Luminance of the emitted power. For an infinite light: the power that reaches a disk of the scene's radius from
     /// all directions, or that passes through its portal. 0 for media, which emit no photons.
-    pub fn phi(&self, scene_radius: f32) -> f32 {
+    pub fn power_luminance(&self, scene_radius: f32) -> f32 {
         let disk = PI * scene_radius * scene_radius;
-        let phi = match self {
-            Light::Point(light) => light.phi(),
-            Light::Spot(light) => light.phi(),
-            Light::Image(light) => light.phi(),
-            Light::Distant(light) => light.l.luminance() * disk,
-            Light::Area(area) => area.phi(),
+        let power = match self {
+            Light::Point(light) => light.power_luminance(),
+            Light::Spot(light) => light.power_luminance(),
+            Light::Image(light) => light.power_luminance(),
+            Light::Distant(light) => light.irradiance.luminance() * disk,
+            Light::Area(area) => area.power_luminance(),
             Light::InfiniteConstant { l } => 4.0 * PI * l.luminance() * disk,
             Light::InfiniteImage { map, scale, .. } => map.luminance_integral() * *scale * disk,
-            Light::Portal(light) => light.phi(),
+            Light::Portal(light) => light.power_luminance(),
             Light::Volume(_) => 0.0,
         };
-        if phi.is_finite() { phi.max(0.0) } else { 0.0 }
+        if power.is_finite() { power.max(0.0) } else { 0.0 }
     }
 
     /// True for infinite lights, which are not in the light tree.

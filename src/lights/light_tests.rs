@@ -372,16 +372,17 @@ fn powers_are_those_of_lambertian_emitters() {
     let full = QuadricKind::Sphere { radius: 2.0, z_min: -2.0, z_max: 2.0, phi_max: std::f32::consts::TAU };
     let sphere = Shape::Quadric(quadric(full, Affine3A::from_scale(Vec3::splat(0.5))));
     let constant = |two_sided| Emission { two_sided, ..Emission::constant(Rgb::splat(3.0)) };
-    let phi = |shape: &Shape, two_sided| f64::from(area_lights_of(shape, &constant(two_sided)).lights[0].phi());
-    assert!((phi(&sphere, false) / (3.0 * PI * 4.0 * PI) - 1.0).abs() < 1e-5);
+    let power =
+        |shape: &Shape, two_sided| f64::from(area_lights_of(shape, &constant(two_sided)).lights[0].power_luminance());
+    assert!((power(&sphere, false) / (3.0 * PI * 4.0 * PI) - 1.0).abs() < 1e-5);
     let rectangle = rectangle_mesh(Vec3::ZERO, Vec3::X * 2.0, Vec3::Y * 3.0);
-    assert!((phi(&rectangle, true) / (3.0 * PI * 6.0 * 2.0) - 1.0).abs() < 1e-5);
+    assert!((power(&rectangle, true) / (3.0 * PI * 6.0 * 2.0) - 1.0).abs() < 1e-5);
     // The area of an ellipsoid of semi-axes 2, 1, 1 (prolate): 2π(1 + 2/e·asin e), e² = 3/4.
     let ellipsoid = Shape::Quadric(quadric(full, Affine3A::from_scale(Vec3::new(1.0, 0.5, 0.5))));
     let e = 0.75_f64.sqrt();
-    assert!((phi(&ellipsoid, false) / (3.0 * PI * 2.0 * PI * (1.0 + 2.0 / e * e.asin())) - 1.0).abs() < 1e-3);
+    assert!((power(&ellipsoid, false) / (3.0 * PI * 2.0 * PI * (1.0 + 2.0 / e * e.asin())) - 1.0).abs() < 1e-3);
     let env = Light::InfiniteConstant { l: Rgb::WHITE };
-    assert!((f64::from(env.phi(2.0)) / (4.0 * PI * 4.0 * PI) - 1.0).abs() < 1e-5);
+    assert!((f64::from(env.power_luminance(2.0)) / (4.0 * PI * 4.0 * PI) - 1.0).abs() < 1e-5);
 }
 
 #[test]
@@ -457,7 +458,11 @@ fn vertex_colours_are_a_factor_of_radiance_power_and_importance() {
         assert!((expected - point.radiance).map(f32::abs).max_component() < 1e-5, "{:?}", point.radiance);
     }
     let mean = Rgb::new(2.0 / 3.0, 2.0 / 3.0, 2.0);
-    assert!((light.phi() - std::f32::consts::PI * mean.luminance()).abs() < 1e-5, "{}", light.phi());
+    assert!(
+        (light.power_luminance() - std::f32::consts::PI * mean.luminance()).abs() < 1e-5,
+        "{}",
+        light.power_luminance()
+    );
     assert!((light.bounds().intensity - 0.5 * mean.luminance()).abs() < 1e-5);
     assert_eq!(of(&mesh, &plain)[0].mean_radiance(), Rgb::splat(2.0));
 
@@ -475,7 +480,7 @@ fn vertex_colours_are_a_factor_of_radiance_power_and_importance() {
 
 #[test]
 fn delta_and_infinite_lights_are_consistent() {
-    let distant = Light::Distant(DistantLight { wi: Vec3::Y, l: Rgb::splat(2.0) });
+    let distant = Light::Distant(DistantLight { wi: Vec3::Y, irradiance: Rgb::splat(2.0) });
     let s = distant.sample_li(&LightCtx::at(Vec3::ONE), [0.1, 0.2]).unwrap();
     assert!(s.is_delta && s.pdf == 1.0 && s.wi == Vec3::Y && s.t == f32::INFINITY && s.li == Rgb::splat(2.0));
     assert_eq!(distant.pdf_li(&LightCtx::at(Vec3::ONE), Vec3::Y, &LightHit::INFINITE), 0.0);

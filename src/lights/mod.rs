@@ -23,10 +23,10 @@ mod emit_tests;
 mod light_tests;
 
 pub use bounds::LightBounds;
-pub use choice::groups::{self, LightGroups};
+pub use choice::job_lights::JobLights;
 pub use choice::light_sampler::{LightChoice, LightSampler, LightSamplerKind};
+pub use choice::mixture_groups::{self, MixtureGroups};
 pub use choice::sample_columns;
-pub use choice::sampling::LightSampling;
 pub use choice::set::{LightSet, LightSetBuilder};
 pub use infinite_columns::LightLanes;
 pub use irradiance::Irradiances;

@@ -19,7 +19,7 @@ pub struct LightDistribution {
 impl LightDistribution {
     /// `floor`: a in 0..1. `None` if no light has emission.
     pub fn new(lights: &LightSet, floor: f32) -> Option<Self> {
-        Self::by_weights(lights, floor, |light| lights.lights[light as usize].phi(lights.scene_radius))
+        Self::by_weights(lights, floor, |light| lights.lights[light as usize].power_luminance(lights.scene_radius))
     }
 
     /// The same with weights instead of powers; `None` if the weights of all lights with emission are 0.

@@ -11,7 +11,7 @@ use super::rendering::{Progress, Rendering};
 use super::tiles::{Tile, Tiles, add_records, bounds_of_tiles, film, replica_choice};
 use super::worker::Workers;
 use crate::direct::Estimator;
-use crate::film::layers::PackedLayers;
+use crate::film::light_layers::PackedLayers;
 use crate::film::packed::PackedSums;
 use crate::film::replicas::ReplicaChoice;
 use crate::film::{FeatureSet, Film, FilmTile, PixelBounds};

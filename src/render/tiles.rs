@@ -5,7 +5,7 @@ use super::render_settings::RenderSettings;
 use super::tile_share::TileShare;
 use crate::direct::{Estimator, Fits};
 use crate::film::accumulator::PixelAccumulator;
-use crate::film::layers::PackedLayers;
+use crate::film::light_layers::PackedLayers;
 use crate::film::packed::PackedSums;
 use crate::film::replicas::{ReplicaAccumulator, ReplicaChoice};
 use crate::film::{Film, FilmTile, PixelBounds};

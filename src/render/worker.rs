@@ -5,7 +5,7 @@ use super::phases::WorkerTimes;
 use super::tiles::Tile;
 use crate::direct::Fits;
 use crate::film::accumulator::PixelAccumulator;
-use crate::film::layers::{LayerSample, LayerScratch};
+use crate::film::light_layers::{LayerSample, LayerScratch};
 use crate::film::{FeatureSet, PixelBounds, PixelSample};
 use crate::integrators::CameraSamples;
 use crate::integrators::camera_samples::{CameraSampler, PixelSampleRange, Scratch};

@@ -7,7 +7,7 @@ use super::world::World;
 use crate::accel::Hit;
 use crate::bsdfs::MAX_LOBES;
 use crate::geometry::{GeometryId, Shape};
-use crate::lights::{Irradiances, LightChoice, LightSampling};
+use crate::lights::{Irradiances, JobLights, LightChoice};
 use crate::settings::{IntegratorSettings, Settings};
 use lumiris_numbers::math::Rgb;
 use std::sync::Arc;
@@ -18,7 +18,7 @@ pub struct RenderJob {
     pub world: World,
     settings: Settings,
     /// The lights, with the light sampler and the visibility cache.
-    pub lights: LightSampling,
+    pub lights: JobLights,
     /// Irradiances of lights in closed form.
     pub irradiances: Irradiances,
     /// Sample counts of each pixel, if they vary between pixels.
@@ -51,7 +51,7 @@ impl RenderJob {
 
         // Lights
         let choice = light_choice(i, shadows_pass);
-        let lights = LightSampling::new(Arc::clone(&scene.lights), choice, max_groups(i, lobes));
+        let lights = JobLights::new(Arc::clone(&scene.lights), choice, max_groups(i, lobes));
         RenderJob {
             world,
             settings,
@@ -72,7 +72,7 @@ impl RenderJob {
         self.settings = settings;
         self.lobes = self.world.scene.materials.lobes(i.bsdf_density);
         let choice = light_choice(i, self.shadows_pass);
-        self.lights = LightSampling::new(Arc::clone(&self.world.scene.lights), choice, max_groups(i, self.lobes));
+        self.lights = JobLights::new(Arc::clone(&self.world.scene.lights), choice, max_groups(i, self.lobes));
         self.sample_count_map = None;
         self.pixel_samples = None;
     }
@@ -133,7 +133,7 @@ impl RenderJob {
         self.lobes == MAX_LOBES
     }
 
-    /// Number of control variates over pixels: one per light group, and one for the first of two lobes. The last lobe
+    /// Number of control variates over pixels: one per mixture group, and one for the first of two lobes. The last lobe
     /// is linearly dependent on these.
     pub fn controls(&self) -> usize {
         self.lights.groups.len() + usize::from(self.has_two_lobes())
@@ -154,7 +154,7 @@ fn light_choice(settings: &IntegratorSettings, shadows_pass: bool) -> LightChoic
     LightChoice { volumes: choice.volumes && shadows_pass, ..choice }
 }
 
-/// Maximum number of light groups: the components of a mixture without `lobes`.
+/// Maximum number of mixture groups: the components of a mixture without `lobes`.
 fn max_groups(settings: &IntegratorSettings, lobes: usize) -> usize {
     settings.ocv.max_components().saturating_sub(lobes).max(1)
 }

@@ -145,7 +145,7 @@ impl IntegratorSettings {
 
     /// True if lights are chosen by a light tree, with infinite lights beside it.
     pub fn has_light_tree(&self) -> bool {
-        matches!(self.light_sampler, LightSamplerKind::Tree | LightSamplerKind::Photons)
+        matches!(self.light_sampler, LightSamplerKind::Tree | LightSamplerKind::VisibilityCache)
     }
 
     /// True if samples are drawn and weighted as in `mis`.
@@ -168,7 +168,7 @@ impl IntegratorSettings {
 
     /// True if direct light uses the visibility cache.
     pub fn uses_visibility_cache(&self) -> bool {
-        self.light_sampler == LightSamplerKind::Photons
+        self.light_sampler == LightSamplerKind::VisibilityCache
             || self.estimator == EstimatorKind::Contributing
             || self.estimator == EstimatorKind::Ris && self.ris.target.uses_visibility_cache()
     }

@@ -131,7 +131,7 @@ fn images_with_photons_that_tell_of_lights_are_the_same_for_any_number_of_thread
             job.change(|s| s.integrator.ris.proposals = Proposals::Fixed(16));
             job.change(|s| s.integrator.ris.target = Target::Visibility);
             job.change(|s| s.integrator.photons.visibility_photons = Some(20_000));
-            job.change(|s| s.integrator.light_sampler = LightSamplerKind::Photons);
+            job.change(|s| s.integrator.light_sampler = LightSamplerKind::VisibilityCache);
             prepare(&mut job, &Preparation::on(Some(threads))).unwrap();
             assert!(job.lights.visibility_cache().is_some());
             film(&job, RenderSettings { threads: Some(threads), ..RenderSettings::default() })

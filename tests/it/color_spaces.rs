@@ -16,7 +16,7 @@ fn loaded(head: &str, world: &str) -> Result<Loaded, String> {
 /// The radiance of the only light.
 fn light(world: &str) -> Rgb {
     match loaded("", world).unwrap().scene.lights.lights[0] {
-        Light::InfiniteConstant { l } | Light::Distant(DistantLight { l, .. }) => l,
+        Light::InfiniteConstant { l } | Light::Distant(DistantLight { irradiance: l, .. }) => l,
         ref other => panic!("{other:?}"),
     }
 }

@@ -175,7 +175,7 @@ fn a_right_visibility_cache_lowers_the_variance() {
     // Light selection, resampling, and contributing lights
     ratio(
         &|s| {
-            s.light_sampler = LightSamplerKind::Photons;
+            s.light_sampler = LightSamplerKind::VisibilityCache;
             s.samples = Some(4);
         },
         1.5,

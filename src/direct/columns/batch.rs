@@ -7,7 +7,7 @@ use crate::scene::RenderJob;
 
 /// A sample of each vertex.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Draw {
+pub(super) struct Round {
     /// True for light sampling, false for BSDF sampling.
     pub(super) by_light: bool,
     /// Index among the samples of the technique.
@@ -20,7 +20,7 @@ pub(super) struct Draw {
 
 /// Common input of all steps.
 #[derive(Clone, Copy)]
-pub(super) struct Batch<'a, 'w> {
+pub(super) struct VertexBatch<'a, 'w> {
     pub(super) job: &'a RenderJob,
     pub(super) techniques: &'a Techniques,
     pub(super) vertices: &'a Vertices<'w>,
@@ -28,11 +28,11 @@ pub(super) struct Batch<'a, 'w> {
     pub(super) usual: SampleAllocation,
 }
 
-impl Batch<'_, '_> {
+impl VertexBatch<'_, '_> {
     /// Sample `index` of a technique. The first `unusual` rows may have a different allocation.
-    pub(super) fn draw(&self, by_light: bool, index: u32, unusual: usize) -> Draw {
+    pub(super) fn round(&self, by_light: bool, index: u32, unusual: usize) -> Round {
         let usual = if by_light { self.usual.light_draws } else { self.usual.bsdf_draws };
         let is_usual = index < usual;
-        Draw { by_light, index, rows: if is_usual { self.vertices.len() } else { unusual }, is_usual }
+        Round { by_light, index, rows: if is_usual { self.vertices.len() } else { unusual }, is_usual }
     }
 }

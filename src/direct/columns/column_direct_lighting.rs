@@ -1,7 +1,7 @@
 //! The steps of direct light in columns, sample by sample.
 
-use super::batch::{Batch, Draw};
-use super::controls::Controls;
+use super::batch::{Round, VertexBatch};
+use super::control_columns::ControlColumns;
 use super::emitters::EmitterRays;
 use super::samples::{SampleColumns, Traced};
 use super::sinks::{SampleOnLight, Sinks, VisibleSample, WeightAgainstLightPaths};
@@ -28,14 +28,14 @@ use std::time::Instant;
 /// Estimates direct light at vertices in columns; holds the buffers of one worker.
 #[derive(Debug, Default)]
 pub struct ColumnDirectLighting {
-    /// Allocations of the first rows, which may differ from [`Batch::usual`].
+    /// Allocations of the first rows, which may differ from [`VertexBatch::usual`].
     allocations: Vec<SampleAllocation>,
     samples: SampleColumns,
     scratch: Scratch,
     traced: Traced,
     crossing: Crossing,
     emitter_rays: EmitterRays,
-    controls: Controls,
+    controls: ControlColumns,
     /// Direct light so far.
     radiance: Columns3,
 }
@@ -67,33 +67,33 @@ impl ColumnDirectLighting {
 
         // Allocations
         let start = Instant::now();
-        let batch = Batch { job, techniques, vertices, usual: techniques.usual() };
+        let batch = VertexBatch { job, techniques, vertices, usual: techniques.usual() };
         let [light, bsdf] = self.begin(&batch, stats);
         stats.select += start.elapsed();
 
         // Light samples
         for index in 0..light {
             let start = Instant::now();
-            let draw = batch.draw(true, index, self.allocations.len());
-            self.sample_lights(&batch, draw, sinks.against_light_paths);
-            let proposed = self.trace(&batch, draw, sinks, stats, start);
+            let round = batch.round(true, index, self.allocations.len());
+            self.sample_lights(&batch, round, sinks.against_light_paths);
+            let proposed = self.trace(&batch, round, sinks, stats, start);
             stats.t1_light += proposed - start;
-            self.add_controls(&batch, draw);
+            self.add_controls(&batch, round);
         }
 
         // BSDF samples
         for index in 0..bsdf {
             let start = Instant::now();
-            let draw = batch.draw(false, index, self.allocations.len());
-            stats.emitter_rays += self.sample_bsdfs(&batch, draw);
-            self.trace(&batch, draw, sinks, stats, start);
-            self.add_controls(&batch, draw);
+            let round = batch.round(false, index, self.allocations.len());
+            stats.emitter_rays += self.sample_bsdfs(&batch, round);
+            self.trace(&batch, round, sinks, stats, start);
+            self.add_controls(&batch, round);
         }
     }
 
     /// Begins a batch with black radiance. Returns the maximum number of samples of each technique.
-    fn begin(&mut self, batch: &Batch<'_, '_>, stats: &mut DirectStats) -> [u32; 2] {
-        let Batch { job, techniques, vertices, usual } = *batch;
+    fn begin(&mut self, batch: &VertexBatch<'_, '_>, stats: &mut DirectStats) -> [u32; 2] {
+        let VertexBatch { job, techniques, vertices, usual } = *batch;
         let (n, len) = (vertices.len(), padded(vertices.len()));
         self.samples.reserve(len);
         self.radiance.reserve(len);
@@ -126,13 +126,13 @@ impl ColumnDirectLighting {
 
     /// Adds the last sample of each vertex to its control variates, if they are enabled. Rows with a different
     /// allocation have no control variates.
-    fn add_controls(&mut self, batch: &Batch<'_, '_>, draw: Draw) {
-        if !batch.techniques.has_controls || !draw.is_usual {
+    fn add_controls(&mut self, batch: &VertexBatch<'_, '_>, round: Round) {
+        if !batch.techniques.has_controls || !round.is_usual {
             return;
         }
         let n = [batch.usual.n_light, batch.usual.n_bsdf];
         let ColumnDirectLighting { controls, samples, traced, scratch, emitter_rays, .. } = self;
-        if draw.by_light {
+        if round.by_light {
             controls.add_light_samples(batch.job, n, samples, traced, scratch, batch.vertices);
         } else {
             controls.add_bsdf_samples(batch.job, n, samples, emitter_rays, batch.vertices);
@@ -140,16 +140,16 @@ impl ColumnDirectLighting {
     }
 
     /// Draws the random numbers of a sample of each vertex.
-    fn draw(&mut self, batch: &Batch<'_, '_>, draw: Draw) {
-        let of = |a: &SampleAllocation| if draw.by_light { a.light_draws } else { a.bsdf_draws };
-        let key = if draw.by_light { domain::LIGHT } else { domain::BSDF };
+    fn draw(&mut self, batch: &VertexBatch<'_, '_>, round: Round) {
+        let of = |a: &SampleAllocation| if round.by_light { a.light_draws } else { a.bsdf_draws };
+        let key = if round.by_light { domain::LIGHT } else { domain::BSDF };
         let count = |row: usize| of(self.allocations.get(row).unwrap_or(&batch.usual)).max(1);
 
         // Rows with the same number of samples together
         let mut first = 0;
-        while first < draw.rows {
-            let end = (first + 1..draw.rows).find(|&row| count(row) != count(first)).unwrap_or(draw.rows);
-            let below = Below::Split { key, count: count(first), index: draw.index };
+        while first < round.rows {
+            let end = (first + 1..round.rows).find(|&row| count(row) != count(first)).unwrap_or(round.rows);
+            let below = Below::Split { key, count: count(first), index: round.index };
             let numbers = self.samples.u.each_mut().map(|u| &mut u[first..end]);
             sampler::draw(level(), &batch.vertices.direct, first..end, below, numbers);
             first = end;
@@ -157,11 +157,11 @@ impl ColumnDirectLighting {
     }
 
     /// Removes the sample at rows with fewer samples.
-    fn leave_out(&mut self, draw: Draw) {
+    fn leave_out(&mut self, round: Round) {
         for (i, allocation) in self.allocations.iter().enumerate() {
-            let draws = if draw.by_light { allocation.light_draws } else { allocation.bsdf_draws };
-            if draws <= draw.index {
-                self.samples.leave_out(i, draw.by_light);
+            let draws = if round.by_light { allocation.light_draws } else { allocation.bsdf_draws };
+            if draws <= round.index {
+                self.samples.leave_out(i, round.by_light);
             }
         }
     }
@@ -174,46 +174,46 @@ impl ColumnDirectLighting {
     /// Draws a light sample of each vertex, with its contribution.
     fn sample_lights(
         &mut self,
-        batch: &Batch<'_, '_>,
-        draw: Draw,
+        batch: &VertexBatch<'_, '_>,
+        round: Round,
         against_light_paths: Option<&WeightAgainstLightPaths<'_>>,
     ) {
-        let Batch { job, techniques, vertices, .. } = *batch;
-        let n = draw.rows;
-        self.draw(batch, draw);
+        let VertexBatch { job, techniques, vertices, .. } = *batch;
+        let n = round.rows;
+        self.draw(batch, round);
         let at = vertices.surface.lit_points();
-        job.lights.sample_many(n, at, &self.samples.u, &mut self.scratch, &mut self.samples.light);
-        self.leave_out(draw);
-        self.leave_out_volume_lights(batch, draw);
+        job.lights.sample_many(n, at, &self.samples.u, &mut self.scratch, &mut self.samples.incident);
+        self.leave_out(round);
+        self.leave_out_volume_lights(batch, round);
 
         // BSDF values and densities of BSDF sampling
-        let SampleColumns { light, bsdf: BsdfSamples { f_cos, pdf, .. }, .. } = &mut self.samples;
-        vertices.evaluate(n, &light.wi, f_cos, pdf);
+        let SampleColumns { incident, bsdf: BsdfSamples { f_cos, pdf, .. }, .. } = &mut self.samples;
+        vertices.evaluate(n, &incident.wi, f_cos, pdf);
         if let Some(weight) = against_light_paths {
-            for row in (0..vertices.bsdfs.len()).filter(|&row| self.samples.light.is_far[row] == 0.0) {
-                let (n, wi) = (self.samples.light.n.vec3(row), self.samples.light.wi.vec3(row));
+            for row in (0..vertices.bsdfs.len()).filter(|&row| self.samples.incident.is_far[row] == 0.0) {
+                let (n, wi) = (self.samples.incident.n.vec3(row), self.samples.incident.wi.vec3(row));
                 let end = || SampleOnLight { row, light: self.light_of(job, row), n, wi };
-                let weight = if self.samples.light.pdf[row] > 0.0 { weight(&end()) } else { 1.0 };
+                let weight = if self.samples.incident.pdf[row] > 0.0 { weight(&end()) } else { 1.0 };
                 self.samples.bsdf.f_cos.set_rgb(row, self.samples.bsdf.f_cos.rgb(row) * weight);
             }
         }
         if techniques.is_light_alone() {
             self.samples.bsdf.pdf[..n].fill(0.0);
         }
-        for (p, is_delta) in self.samples.bsdf.pdf[..n].iter_mut().zip(&self.samples.light.is_delta) {
+        for (p, is_delta) in self.samples.bsdf.pdf[..n].iter_mut().zip(&self.samples.incident.is_delta) {
             *p = if *is_delta { 0.0 } else { *p };
         }
-        self.weigh(batch, draw);
+        self.weigh(batch, round);
     }
 
     /// Removes light samples of emitting media if the BSDF sample is not the next path segment. Nearby, no other
     /// technique would sample the emission of media, and the next segment receives it.
-    fn leave_out_volume_lights(&mut self, batch: &Batch<'_, '_>, draw: Draw) {
-        let Batch { job, techniques, vertices, .. } = *batch;
+    fn leave_out_volume_lights(&mut self, batch: &VertexBatch<'_, '_>, round: Round) {
+        let VertexBatch { job, techniques, vertices, .. } = *batch;
         if !job.world.scene.media.is_emissive() {
             return;
         }
-        for i in 0..draw.rows {
+        for i in 0..round.rows {
             let is_volume_light = job.lights.medium_of(self.light_of(job, i)).is_some();
             let is_by_path = techniques.are_by_path() && !vertices.bsdf(i).bsdf.is_only_evaluated();
             if is_volume_light && !is_by_path {
@@ -223,45 +223,45 @@ impl ColumnDirectLighting {
     }
 
     /// Draws a BSDF sample of each vertex with its emitter and contribution. Returns the number of emitter rays.
-    fn sample_bsdfs(&mut self, batch: &Batch<'_, '_>, draw: Draw) -> u64 {
-        let Batch { job, techniques, vertices, .. } = *batch;
-        let n = draw.rows;
-        self.draw(batch, draw);
+    fn sample_bsdfs(&mut self, batch: &VertexBatch<'_, '_>, round: Round) -> u64 {
+        let VertexBatch { job, techniques, vertices, .. } = *batch;
+        let n = round.rows;
+        self.draw(batch, round);
 
         // Directions
-        let SampleColumns { u, light, bsdf, .. } = &mut self.samples;
+        let SampleColumns { u, incident, bsdf, .. } = &mut self.samples;
         vertices.sample(n, u, bsdf);
-        std::mem::swap(&mut light.wi, &mut bsdf.wi);
+        std::mem::swap(&mut incident.wi, &mut bsdf.wi);
         let is_alone = techniques.is_light_alone();
         for i in 0..n {
-            light.is_delta[i] = Lobe::of_flags(bsdf.lobe[i] as u8).is_specular();
-            let is_drawn = (light.is_delta[i] || !is_alone) && !bsdf.f_cos.rgb(i).is_black();
+            incident.is_delta[i] = Lobe::of_flags(bsdf.lobe[i] as u8).is_specular();
+            let is_drawn = (incident.is_delta[i] || !is_alone) && !bsdf.f_cos.rgb(i).is_black();
             bsdf.pdf[i] = if is_drawn { bsdf.pdf[i] } else { 0.0 };
         }
-        self.leave_out(draw);
+        self.leave_out(round);
 
         // Emitters
         self.samples.make_origins(&vertices.surface, padded(n));
         let count = self.emitter_rays.find(job, vertices, n, &mut self.samples);
-        self.weigh(batch, draw);
+        self.weigh(batch, round);
         count
     }
 
     /// Computes the contributions of the samples of one technique.
-    fn weigh(&mut self, batch: &Batch<'_, '_>, Draw { by_light, rows, .. }: Draw) {
-        let (len, Batch { techniques, usual, .. }) = (padded(rows), *batch);
-        let SampleColumns { light, bsdf: BsdfSamples { f_cos, pdf: p_bsdf, .. }, c, .. } = &mut self.samples;
+    fn weigh(&mut self, batch: &VertexBatch<'_, '_>, Round { by_light, rows, .. }: Round) {
+        let (len, VertexBatch { techniques, usual, .. }) = (padded(rows), *batch);
+        let SampleColumns { incident, bsdf: BsdfSamples { f_cos, pdf: p_bsdf, .. }, c, .. } = &mut self.samples;
         let by = |a: &SampleAllocation| if by_light { [a.n_light, a.n_bsdf] } else { [a.n_bsdf, a.n_light] };
         let [p, p_other] =
-            if by_light { [&light.pdf[..len], &p_bsdf[..len]] } else { [&p_bsdf[..len], &light.pdf[..len]] };
+            if by_light { [&incident.pdf[..len], &p_bsdf[..len]] } else { [&p_bsdf[..len], &incident.pdf[..len]] };
         let [n, n_other] = by(&usual);
-        let (values, li, heuristic) = (f_cos.get(len), light.li.get(len), techniques.heuristic);
+        let (values, li, heuristic) = (f_cos.get(len), incident.li.get(len), techniques.heuristic);
         let samples = kernels::Samples { f_cos: values, li, p, p_other, n, n_other, heuristic };
         kernels::weigh(level(), &samples, &mut c.get_mut(len));
         for (i, allocation) in self.allocations.iter().enumerate().filter(|(_, a)| **a != usual) {
             let [n, n_other] = by(allocation);
             let factor = heuristic.factor(Technique { n, p: p[i] }, Technique { n: n_other, p: p_other[i] });
-            let value = f_cos.rgb(i) * light.li.rgb(i) * factor;
+            let value = f_cos.rgb(i) * incident.li.rgb(i) * factor;
             c.set_rgb(i, if p[i] > 0.0 && value.is_finite() { value } else { Rgb::BLACK });
         }
     }
@@ -270,24 +270,24 @@ impl ColumnDirectLighting {
     /// sampling. Returns the start time of tracing.
     fn trace(
         &mut self,
-        batch: &Batch<'_, '_>,
-        draw: Draw,
+        batch: &VertexBatch<'_, '_>,
+        round: Round,
         sinks: &mut Sinks<'_>,
         stats: &mut DirectStats,
         start: Instant,
     ) -> Instant {
-        let Batch { job, techniques, vertices, .. } = *batch;
+        let VertexBatch { job, techniques, vertices, .. } = *batch;
         // Control variates of a light sample need its occlusion by emitters, even if its weight is 0
-        let hides = draw.by_light && techniques.has_controls && job.world.emitters_hide();
+        let hides = round.by_light && techniques.has_controls && job.world.emitters_hide();
         let is_traced = |samples: &SampleColumns, i: usize| {
             !samples.c.rgb(i).is_black() || hides && samples.bsdf.pdf[i] > 0.0 && samples.has_integrand(i, true)
         };
-        let (n, len) = (draw.rows, padded(draw.rows));
+        let (n, len) = (round.rows, padded(round.rows));
         self.samples.make_segments(&vertices.surface, len);
         let rows = (0..n as u32).filter(|&i| is_traced(&self.samples, i as usize));
         self.traced.gather(rows, &self.samples, len, &vertices.time);
         let proposed = Instant::now();
-        self.occlude(batch, draw, stats);
+        self.occlude(batch, round, stats);
         let traced_at = Instant::now();
 
         let ColumnDirectLighting { samples, traced, radiance, .. } = &mut *self;
@@ -296,8 +296,8 @@ impl ColumnDirectLighting {
         }
         if let Some(visible) = &mut sinks.visible {
             for row in self.traced.visible() {
-                let light = if draw.by_light { Some(self.light_of(job, row)) } else { self.emitter_rays.lights[row] };
-                let (wi, contribution) = (self.samples.light.wi.vec3(row), self.samples.c.rgb(row));
+                let light = if round.by_light { Some(self.light_of(job, row)) } else { self.emitter_rays.lights[row] };
+                let (wi, contribution) = (self.samples.incident.wi.vec3(row), self.samples.c.rgb(row));
                 visible(&VisibleSample { row, light, wi, contribution });
             }
         }
@@ -313,8 +313,8 @@ impl ColumnDirectLighting {
     /// Determines the occlusion of the segments. Contributions of segments that may pass surfaces or media are
     /// multiplied by an estimate of the transmittance. Without passable surfaces, segments that begin in empty space
     /// stay there.
-    fn occlude(&mut self, batch: &Batch<'_, '_>, draw: Draw, stats: &mut DirectStats) {
-        let Batch { job, vertices, .. } = *batch;
+    fn occlude(&mut self, batch: &VertexBatch<'_, '_>, round: Round, stats: &mut DirectStats) {
+        let VertexBatch { job, vertices, .. } = *batch;
         let Traced { rows, rays, occluded, crossing, some_rays, some_occluded } = &mut self.traced;
 
         // Segments that may pass surfaces or media
@@ -340,12 +340,12 @@ impl ColumnDirectLighting {
         // Transmittance
         some_rays.clear();
         crossing.iter().for_each(|&k| some_rays.push(&rays.get(k as usize)));
-        self.cross(batch, draw, stats);
+        self.cross(batch, round, stats);
     }
 
     /// Estimates the transmittance of segments that may pass surfaces or media.
-    fn cross(&mut self, batch: &Batch<'_, '_>, draw: Draw, stats: &mut DirectStats) {
-        let Batch { job, vertices, .. } = *batch;
+    fn cross(&mut self, batch: &VertexBatch<'_, '_>, round: Round, stats: &mut DirectStats) {
+        let VertexBatch { job, vertices, .. } = *batch;
         let mut crossing = std::mem::take(&mut self.crossing);
 
         // Light, medium and random numbers of each segment
@@ -353,10 +353,10 @@ impl ColumnDirectLighting {
         let departure = |k: usize, d: Vec3| {
             let i = row(&self.traced, k);
             let lights_before = self.allocations.get(i).unwrap_or(&batch.usual).light_draws;
-            let (light, index) = if draw.by_light {
-                (self.light_of(job, i), draw.index)
+            let (light, index) = if round.by_light {
+                (self.light_of(job, i), round.index)
             } else {
-                (self.emitter_rays.lights[i].unwrap_or(NO_LIGHT), lights_before + draw.index)
+                (self.emitter_rays.lights[i].unwrap_or(NO_LIGHT), lights_before + round.index)
             };
             let medium = vertices.media(i).towards(vertices.surface.n.vec3(i).dot(d));
             Departure { light, medium, stream: vertices.direct.get(i).domain(domain::TRANSMITTANCE + index) }

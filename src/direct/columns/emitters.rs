@@ -55,18 +55,18 @@ impl EmitterRays {
             };
             lights[i] = hit.light;
             let pmf = |ctx: &_, light| job.lights.sampler.pmf(ctx, light);
-            match emitter_at(job, &at.get(i), samples.light.wi.vec3(i), &hit, time[i], pmf) {
-                Some(emitter) => set_emitter(&mut samples.light, i, &emitter),
+            match emitter_at(job, &at.get(i), samples.incident.wi.vec3(i), &hit, time[i], pmf) {
+                Some(emitter) => set_emitter(&mut samples.incident, i, &emitter),
                 None => samples.bsdf.pdf[i] = 0.0,
             }
         };
         let ray = |samples: &SampleColumns, i: usize| {
-            let (o, d) = (samples.o.vec3(i), samples.light.wi.vec3(i));
+            let (o, d) = (samples.o.vec3(i), samples.incident.wi.vec3(i));
             Ray { o, d, t_max: f32::INFINITY, time: time[i] }
         };
 
         // A few emitters are intersected in lanes, many by the ray tracer
-        let (o, d) = (samples.o.get(len), samples.light.wi.get(len));
+        let (o, d) = (samples.o.get(len), samples.incident.wi.get(len));
         if let Some(hit) = job.world.intersect_few_emitters(o, d, scratch) {
             for i in rows.iter().map(|&i| i as usize) {
                 let hit = hit(i, &ray(samples, i));
@@ -86,7 +86,7 @@ impl EmitterRays {
     /// Sets the infinite lights of the rays that hit nothing.
     fn add_infinite(&self, job: &RenderJob, vertices: &Vertices<'_>, samples: &mut SampleColumns) {
         let (far, at) = (&self.far, vertices.surface.lit_points());
-        let SampleColumns { light: LightSamples { wi, li, pdf, is_far, is_delta, .. }, bsdf, .. } = samples;
+        let SampleColumns { incident: LightSamples { wi, li, pdf, is_far, is_delta, .. }, bsdf, .. } = samples;
         let p_bsdf = &mut bsdf.pdf;
         let directions = wi;
         job.lights.infinite_in_directions(

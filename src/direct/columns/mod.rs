@@ -11,12 +11,12 @@
 //! samples are drawn here. Samples beyond the allocation of most rows are made for the first rows only.
 //!
 //! Reading order: [`techniques`] (number of samples), [`batch`] (vertices, and the sample being drawn), [`samples`]
-//! (columns), [`emitters`] (emitters hit by BSDF samples), [`controls`] (control variates of `ocv`), [`sinks`]
+//! (columns), [`emitters`] (emitters hit by BSDF samples), [`control_columns`] (control variates of `ocv`), [`sinks`]
 //! (callbacks), [`column_direct_lighting`] (the steps).
 
 mod batch;
 mod column_direct_lighting;
-mod controls;
+mod control_columns;
 mod emitters;
 mod samples;
 mod sinks;

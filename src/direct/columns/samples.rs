@@ -11,8 +11,9 @@ use lumiris_lanes::vertex::{self as kernels, Ends, Rays};
 #[derive(Debug, Default)]
 pub(super) struct SampleColumns {
     pub(super) u: [Column; 3],
-    /// Directions with incident radiance and the density of light sampling.
-    pub(super) light: LightSamples,
+    /// Incident light: the directions of either technique, with their radiance, the density of light sampling, and the
+    /// points on the lights.
+    pub(super) incident: LightSamples,
     /// Values of the BSDF, and the density of BSDF sampling. The density of a technique is 0 if there is no sample. The
     /// density of the other technique is 0 if only this one can sample the direction.
     pub(super) bsdf: BsdfSamples,
@@ -27,8 +28,8 @@ pub(super) struct SampleColumns {
 impl SampleColumns {
     /// Extends the columns to at least `len`.
     pub(super) fn reserve(&mut self, len: usize) {
-        let SampleColumns { u: [u0, u1, u2], light, bsdf, c, o, d, t_max } = self;
-        light.reserve(len);
+        let SampleColumns { u: [u0, u1, u2], incident, bsdf, c, o, d, t_max } = self;
+        incident.reserve(len);
         bsdf.reserve(len);
         [c, o, d].into_iter().for_each(|c| c.reserve(len));
         reserve(&mut [u0, u1, u2, t_max], len);
@@ -38,28 +39,28 @@ impl SampleColumns {
     /// selects the density of light sampling or of BSDF sampling.
     #[inline]
     pub(super) fn has_integrand(&self, i: usize, by_light: bool) -> bool {
-        let p = if by_light { self.light.pdf[i] } else { self.bsdf.pdf[i] };
-        (p > 0.0) & !(self.bsdf.f_cos.rgb(i) * self.light.li.rgb(i)).is_black()
+        let p = if by_light { self.incident.pdf[i] } else { self.bsdf.pdf[i] };
+        (p > 0.0) & !(self.bsdf.f_cos.rgb(i) * self.incident.li.rgb(i)).is_black()
     }
 
     /// Removes the light sample or the BSDF sample of a vertex.
     #[inline]
     pub(super) fn leave_out(&mut self, i: usize, by_light: bool) {
-        let p = if by_light { &mut self.light.pdf } else { &mut self.bsdf.pdf };
+        let p = if by_light { &mut self.incident.pdf } else { &mut self.bsdf.pdf };
         p[i] = 0.0;
     }
 
     /// Computes the ray origins at the first `len` vertices, in the directions of the samples.
     pub(super) fn make_origins(&mut self, from: &Surface, len: usize) {
-        kernels::origins(level(), &from.ends(len), self.light.wi.get(len), &mut self.o.get_mut(len));
+        kernels::origins(level(), &from.ends(len), self.incident.wi.get(len), &mut self.o.get_mut(len));
     }
 
     /// Computes the segments from the first `len` vertices to the ends of the samples.
     pub(super) fn make_segments(&mut self, from: &Surface, len: usize) {
-        let SampleColumns { light, o, d, t_max, .. } = self;
-        let to = Ends { p: light.p.get(len), p_error: light.p_error.get(len), n: light.n.get(len) };
+        let SampleColumns { incident, o, d, t_max, .. } = self;
+        let to = Ends { p: incident.p.get(len), p_error: incident.p_error.get(len), n: incident.n.get(len) };
         let mut rays = Rays { o: o.get_mut(len), d: d.get_mut(len), t_max: &mut t_max[..len] };
-        kernels::segments(level(), &from.ends(len), light.wi.get(len), &to, &light.is_far[..len], &mut rays);
+        kernels::segments(level(), &from.ends(len), incident.wi.get(len), &to, &incident.is_far[..len], &mut rays);
     }
 }
 

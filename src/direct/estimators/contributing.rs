@@ -32,7 +32,7 @@ use crate::direct::point::ShadingPoint;
 use crate::direct::t1::T1;
 use crate::lights::learned_visibility::{ExpectedContribution, NoncontributingLight};
 use crate::lights::visibility_cache::ContributingLights;
-use crate::lights::{LeAndPdf, LearnedVisibility, LightCtx, LightId, LightSampling, PhotonCount, SampledLight};
+use crate::lights::{JobLights, LeAndPdf, LearnedVisibility, LightCtx, LightId, PhotonCount, SampledLight};
 use crate::scene::RenderJob;
 use lumiris_numbers::estimators::heuristics::Heuristic;
 use lumiris_numbers::math::cumulative;
@@ -62,7 +62,16 @@ impl Contributing {
     fn bsdf_samples_at(&self, bsdf: &Bsdf<'_>) -> u32 {
         match bsdf {
             Bsdf::Diffuse(_) | Bsdf::DiffuseTransmission(_) | Bsdf::Evaluated(_) => 0,
-            _ => self.bsdf_samples,
+            Bsdf::CoatedDiffuse(_)
+            | Bsdf::Conductor(_)
+            | Bsdf::Dielectric(_)
+            | Bsdf::Exit(_)
+            | Bsdf::ThinDielectric(_)
+            | Bsdf::Layered(_)
+            | Bsdf::Phase(_)
+            | Bsdf::Hair(_)
+            | Bsdf::Measured(_)
+            | Bsdf::Principled(_) => self.bsdf_samples,
         }
     }
 
@@ -78,17 +87,19 @@ impl Contributing {
         }
     }
 
-    pub(super) fn propose(&self, t1: &mut T1<'_>, buffers: &mut Buffers) {
+    pub(super) fn propose(&self, t1: &mut T1<'_>, buffers: &mut ContributingBuffers) {
         buffers.rates.clear();
         buffers.singles.clear();
         let job = t1.job;
-        let mut draws = Draws { estimator: *self, job, buffers, of_points: Vec::new() };
+        let mut samples = BatchSamples { estimator: *self, job, buffers, of_points: Vec::new() };
         let allocate = |point: &ShadingPoint<'_>| self.allocation(point);
-        t1.draw_lights(allocate, |_, index, point, allocation, records| draws.draw(index, point, allocation, records));
-        let Draws { buffers, of_points, .. } = draws;
-        let drawn_at = |point: u32| of_points.get(point as usize).and_then(Option::as_ref);
+        t1.draw_lights(allocate, |_, index, point, allocation, records| {
+            samples.draw(index, point, allocation, records)
+        });
+        let BatchSamples { buffers, of_points, .. } = samples;
+        let samples_at = |point: u32| of_points.get(point as usize).and_then(Option::as_ref);
         t1.draw_bsdf(allocate, &mut [], |point, ctx, light| {
-            drawn_at(point).map_or(0.0, |drawn| drawn.rate(&job.lights, buffers, ctx, light))
+            samples_at(point).map_or(0.0, |samples| samples.rate(&job.lights, buffers, ctx, light))
         });
     }
 
@@ -103,7 +114,7 @@ impl Contributing {
 
 /// Buffers kept from batch to batch.
 #[derive(Debug, Default)]
-pub(super) struct Buffers {
+pub(super) struct ContributingBuffers {
     /// Weights of the contributing lights of a point.
     weights: Vec<f32>,
     /// Expected sample counts of contributing lights, point by point.
@@ -113,24 +124,24 @@ pub(super) struct Buffers {
 }
 
 /// The light samples of a batch.
-struct Draws<'a, 'b> {
+struct BatchSamples<'a, 'b> {
     estimator: Contributing,
     job: &'a RenderJob,
-    buffers: &'b mut Buffers,
-    /// Description of the draws at each point with BSDF samples; empty if there is none.
-    of_points: Vec<Option<Drawn<'a>>>,
+    buffers: &'b mut ContributingBuffers,
+    /// The samples at each point with BSDF samples; empty if there is none.
+    of_points: Vec<Option<PointSamples<'a>>>,
 }
 
-/// Description of the light samples drawn at a point.
+/// The light samples drawn at a point.
 #[derive(Clone, Debug)]
-struct Drawn<'a> {
+struct PointSamples<'a> {
     /// 𝓛_con with photon counts.
     contributing: ContributingLights<'a>,
     /// Samples on 𝓛_con (S_con).
     n: u32,
-    /// Range of their rates in [`Buffers::rates`]; empty if lights are chosen by photon counts.
+    /// Range of their rates in [`ContributingBuffers::rates`]; empty if lights are chosen by photon counts.
     rates: Range<usize>,
-    /// Range in [`Buffers::singles`].
+    /// Range in [`ContributingBuffers::singles`].
     singles: Range<usize>,
     others: Others,
 }
@@ -145,10 +156,10 @@ enum Others {
     BySampler { n: u32 },
 }
 
-impl Drawn<'_> {
+impl PointSamples<'_> {
     /// Expected number of samples of a light.
     #[inline]
-    fn rate(&self, lights: &LightSampling, buffers: &Buffers, ctx: &LightCtx, light: LightId) -> f32 {
+    fn rate(&self, lights: &JobLights, buffers: &ContributingBuffers, ctx: &LightCtx, light: LightId) -> f32 {
         let n = match self.others {
             Others::BySampler { n } => return n as f32 * lights.sampler.pmf(ctx, light),
             Others::Noncontributing { n, .. } => n as f32,
@@ -162,7 +173,7 @@ impl Drawn<'_> {
         };
         let noncontributing =
             learned.noncontributing_light(ctx, &self.contributing, &buffers.singles[self.singles.clone()], light);
-        let pmf = noncontributing.choice.pmf;
+        let pmf = noncontributing.sampled.pmf;
         if pmf > 0.0 && noncontributing.expected.importance > 0.0 {
             n * pmf * survival(&noncontributing, scale)
         } else {
@@ -182,12 +193,12 @@ impl Drawn<'_> {
 #[inline]
 fn survival(noncontributing: &NoncontributingLight, scale: f32) -> f32 {
     let ExpectedContribution { importance, visibility } = noncontributing.expected;
-    (importance * visibility.sqrt() / noncontributing.choice.pmf * scale).min(1.0)
+    (importance * visibility.sqrt() / noncontributing.sampled.pmf * scale).min(1.0)
 }
 
 /// A point with its lights.
 struct At<'a, 'p> {
-    lights: &'a LightSampling,
+    lights: &'a JobLights,
     learned: &'a LearnedVisibility,
     index: u32,
     point: &'p ShadingPoint<'p>,
@@ -202,14 +213,14 @@ impl At<'_, '_> {
         light: LightId,
         rate: f32,
         u: [f32; 2],
-        drawn: &Drawn<'_>,
-        buffers: &Buffers,
+        samples: &PointSamples<'_>,
+        buffers: &ContributingBuffers,
     ) -> Option<Candidate> {
         let mut sample = self.lights.lights[light as usize].sample_li(&self.ctx, u)?;
         sample.pdf *= rate;
         if self.n_bsdf > 0.0 && self.overlaps(light) {
             // Infinite lights overlap: all of them contribute to a direction
-            let rate = |ctx: &LightCtx, light| drawn.rate(self.lights, buffers, ctx, light);
+            let rate = |ctx: &LightCtx, light| samples.rate(self.lights, buffers, ctx, light);
             LeAndPdf { le: sample.li, pdf: sample.pdf } =
                 self.lights.infinite_in_direction_by(&self.ctx, sample.wi, rate);
         }
@@ -251,7 +262,7 @@ fn systematic(weights: &[f32], scale: f32, offset: f32) -> impl Iterator<Item = 
     })
 }
 
-impl Draws<'_, '_> {
+impl BatchSamples<'_, '_> {
     /// Draws the light samples of a point. Returns the number of samples.
     fn draw(
         &mut self,
@@ -265,8 +276,8 @@ impl Draws<'_, '_> {
             return 0;
         }
         let n_bsdf = if self.estimator.bsdf_samples > 0 { allocation.n_bsdf } else { 0.0 };
-        let Buffers { rates, singles, .. } = &*self.buffers;
-        let mut drawn = Drawn {
+        let ContributingBuffers { rates, singles, .. } = &*self.buffers;
+        let mut samples = PointSamples {
             contributing: ContributingLights::default(),
             n,
             rates: rates.len()..rates.len(),
@@ -278,8 +289,8 @@ impl Draws<'_, '_> {
         let by_cache = lights.learned_visibility().and_then(|learned| {
             let ctx = point.light_ctx();
             let at = At { lights, learned, index, point, ctx, n_bsdf };
-            drawn.contributing = lights.contributing_lights(&ctx);
-            self.draw_by_cache(&at, [n, n_non], &mut drawn, records)
+            samples.contributing = lights.contributing_lights(&ctx);
+            self.draw_by_cache(&at, [n, n_non], &mut samples, records)
         });
         let count = by_cache.unwrap_or_else(|| {
             let allocation = SampleAllocation { n_bsdf, ..SampleAllocation::fixed(n + n_non, 0) };
@@ -289,10 +300,10 @@ impl Draws<'_, '_> {
         // BSDF samples need the expected sample counts of the lights
         if n_bsdf > 0.0 {
             self.of_points.resize(index as usize, None);
-            self.of_points.push(Some(drawn));
+            self.of_points.push(Some(samples));
         } else {
-            self.buffers.rates.truncate(drawn.rates.start);
-            self.buffers.singles.truncate(drawn.singles.start);
+            self.buffers.rates.truncate(samples.rates.start);
+            self.buffers.singles.truncate(samples.singles.start);
         }
         count
     }
@@ -303,32 +314,32 @@ impl Draws<'_, '_> {
         &mut self,
         at: &At<'_, '_>,
         [n, n_non]: [u32; 2],
-        drawn: &mut Drawn<'_>,
+        samples: &mut PointSamples<'_>,
         records: &mut Vec<Candidate>,
     ) -> Option<u32> {
-        let contributing = drawn.contributing.lights;
+        let contributing = samples.contributing.lights;
         if contributing.is_empty() {
-            drawn.others = Others::Noncontributing { n: n + n_non, scale: f32::INFINITY };
-            return Some(at.draw_noncontributing(drawn, self.buffers, records));
+            samples.others = Others::Noncontributing { n: n + n_non, scale: f32::INFINITY };
+            return Some(at.draw_noncontributing(samples, self.buffers, records));
         }
 
         // Expected contribution Σ E·V̂
         let expected = if contributing.len() <= MAX_WEIGHTED {
-            self.weigh(at, &drawn.contributing)?
+            self.weigh(at, &samples.contributing)?
         } else {
             contributing.iter().map(|&PhotonCount { light, count }| at.learned.irradiance_of(light, count)).sum()
         };
 
         // Survival of samples of non-contributing lights
-        at.learned.find_singles(&drawn.contributing, &mut self.buffers.singles);
-        drawn.singles.end = self.buffers.singles.len();
-        drawn.others = Others::Noncontributing { n: n_non, scale: SURVIVAL / expected };
+        at.learned.find_singles(&samples.contributing, &mut self.buffers.singles);
+        samples.singles.end = self.buffers.singles.len();
+        samples.others = Others::Noncontributing { n: n_non, scale: SURVIVAL / expected };
         if contributing.len() <= MAX_WEIGHTED {
-            self.draw_weighted(at, drawn, records);
+            self.draw_weighted(at, samples, records);
         } else {
-            self.draw_by_photons(at, drawn, records);
+            self.draw_by_photons(at, samples, records);
         }
-        Some(n + at.draw_noncontributing(drawn, self.buffers, records))
+        Some(n + at.draw_noncontributing(samples, self.buffers, records))
     }
 
     /// Weights the contributing lights by E·√V̂. Returns Σ E·V̂; `None` if the sums are 0 or not finite.
@@ -347,35 +358,35 @@ impl Draws<'_, '_> {
     }
 
     /// Draws samples of the contributing lights, in proportion to their weights.
-    fn draw_weighted(&mut self, at: &At<'_, '_>, drawn: &mut Drawn<'_>, records: &mut Vec<Candidate>) {
-        let Buffers { weights, rates, .. } = &mut *self.buffers;
+    fn draw_weighted(&mut self, at: &At<'_, '_>, samples: &mut PointSamples<'_>, records: &mut Vec<Candidate>) {
+        let ContributingBuffers { weights, rates, .. } = &mut *self.buffers;
         let [offset] = at.point.stream.domain(domain::COUNTS).draw::<1>();
-        let scale = drawn.n as f32 / weights.iter().sum::<f32>();
-        let lights = drawn.contributing.lights;
+        let scale = samples.n as f32 / weights.iter().sum::<f32>();
+        let lights = samples.contributing.lights;
         let numbers = || systematic(weights, scale, offset).zip(lights);
         rates.extend(numbers().map(|(counts, &PhotonCount { light, .. })| at.rate(light, counts)));
-        drawn.rates.end = rates.len();
+        samples.rates.end = rates.len();
 
         let buffers = &*self.buffers;
         let counts = systematic(&buffers.weights, scale, offset);
         for (k, (counts, &PhotonCount { light, .. })) in counts.zip(lights).enumerate() {
-            let rate = buffers.rates[drawn.rates.start + k];
+            let rate = buffers.rates[samples.rates.start + k];
             for i in 0..counts.drawn {
                 let u = at.point.stream.split(domain::CONTRIBUTING + k as u32, counts.drawn, i).draw::<2>();
-                records.extend(at.sample(light, rate, u, drawn, buffers));
+                records.extend(at.sample(light, rate, u, samples, buffers));
             }
         }
     }
 
     /// Draws samples of contributing lights, chosen in proportion to their photon counts.
-    fn draw_by_photons(&self, at: &At<'_, '_>, drawn: &Drawn<'_>, records: &mut Vec<Candidate>) {
-        let (ContributingLights { lights, sums }, n) = (drawn.contributing, drawn.n);
+    fn draw_by_photons(&self, at: &At<'_, '_>, samples: &PointSamples<'_>, records: &mut Vec<Candidate>) {
+        let (ContributingLights { lights, sums }, n) = (samples.contributing, samples.n);
         let Some(&total) = sums.last() else { return };
         for i in 0..n {
             let [u_choice, u0, u1] = at.point.stream.split(domain::LIGHT, n, i).draw::<3>();
             let k = cumulative::find(sums, u_choice * total as f32).min(lights.len() - 1);
-            let rate = drawn.rate_by_photons(k);
-            records.extend(at.sample(lights[k].light, rate, [u0, u1], drawn, self.buffers));
+            let rate = samples.rate_by_photons(k);
+            records.extend(at.sample(lights[k].light, rate, [u0, u1], samples, self.buffers));
         }
     }
 }
@@ -383,12 +394,17 @@ impl Draws<'_, '_> {
 impl At<'_, '_> {
     /// Draws samples of the lights without photons, with roulette by their expected contribution. Returns the number of
     /// surviving samples.
-    fn draw_noncontributing(&self, drawn: &Drawn<'_>, buffers: &Buffers, records: &mut Vec<Candidate>) -> u32 {
-        let Others::Noncontributing { n, scale } = drawn.others else { return 0 };
-        if drawn.contributing.lights.len() == self.lights.lit.len() {
+    fn draw_noncontributing(
+        &self,
+        samples: &PointSamples<'_>,
+        buffers: &ContributingBuffers,
+        records: &mut Vec<Candidate>,
+    ) -> u32 {
+        let Others::Noncontributing { n, scale } = samples.others else { return 0 };
+        if samples.contributing.lights.len() == self.lights.lit.len() {
             return 0;
         }
-        let (contributing, singles) = (&drawn.contributing, &buffers.singles[drawn.singles.clone()]);
+        let (contributing, singles) = (&samples.contributing, &buffers.singles[samples.singles.clone()]);
         let mut count = 0;
         for i in 0..n {
             let [u_choice, u_survival, u0, u1] = self.point.stream.split(domain::NONCONTRIBUTING, n, i).draw::<4>();
@@ -396,7 +412,7 @@ impl At<'_, '_> {
             else {
                 continue;
             };
-            let SampledLight { light, pmf, .. } = noncontributing.choice;
+            let SampledLight { light, pmf, .. } = noncontributing.sampled;
             // Contributing lights have their own samples
             if contributing.index_of(light).is_some() || !(noncontributing.expected.importance > 0.0) {
                 continue;
@@ -404,7 +420,7 @@ impl At<'_, '_> {
             let survival = survival(&noncontributing, scale);
             if u_survival < survival {
                 count += 1;
-                records.extend(self.sample(light, n as f32 * pmf * survival, [u0, u1], drawn, buffers));
+                records.extend(self.sample(light, n as f32 * pmf * survival, [u0, u1], samples, buffers));
             }
         }
         count

@@ -151,7 +151,7 @@ impl Estimate {
 
 /// The estimates of a batch, and buffers.
 #[derive(Debug, Default)]
-pub(super) struct Buffers {
+pub(super) struct CorrelatedBuffers {
     estimates: Vec<Estimate>,
     /// c of each candidate; `None` outside the combined estimate.
     controls: Vec<Option<[f32; 3]>>,
@@ -171,7 +171,7 @@ pub(super) struct Buffers {
 
 impl Correlated {
     /// T1. Zero-valued samples are added to the sums; all others become candidates.
-    pub(super) fn propose(&self, t1: &mut T1<'_>, b: &mut Buffers) {
+    pub(super) fn propose(&self, t1: &mut T1<'_>, b: &mut CorrelatedBuffers) {
         let T1 { job, points, candidates, .. } = t1;
         b.controls.clear();
         b.pending.clear();
@@ -202,7 +202,7 @@ impl Correlated {
     }
 
     /// Computes the estimates from the traced candidates; `out[i]` belongs to point `i`.
-    pub(super) fn resolve(candidates: &Candidates, segments: &Segments, b: &mut Buffers, out: &mut [Rgb]) {
+    pub(super) fn resolve(candidates: &Candidates, segments: &Segments, b: &mut CorrelatedBuffers, out: &mut [Rgb]) {
         let are_free = segments.are_free(&candidates.contributions);
         let traced = candidates.records.iter().zip(&candidates.contributions).zip(are_free);
         for (((c, contribution), is_free), control) in traced.zip(&b.controls) {
@@ -221,7 +221,7 @@ impl Correlated {
     }
 }
 
-impl Buffers {
+impl CorrelatedBuffers {
     /// Draws samples of delta lights.
     fn draw_delta(&mut self, job: &RenderJob, index: usize, point: &ShadingPoint<'_>, candidates: &mut Candidates) {
         let estimate = self.estimates[index];
@@ -321,7 +321,7 @@ impl Buffers {
             candidates.stats.emitter_rays += self.rays.len() as u64;
             job.world.intersect_emitters(&self.rays, &mut self.hits, &mut self.emitter_hits);
             if crossing == 0 {
-                let Buffers { pending, emitter_hits, far, emitters, .. } = &mut *self;
+                let CorrelatedBuffers { pending, emitter_hits, far, emitters, .. } = &mut *self;
                 find_emitters(job, points, pending, emitter_hits, choice_by_sampler(job), far, emitters);
             }
             self.next_rays.clear();

@@ -40,14 +40,14 @@ pub enum Estimator {
 
 /// Candidates and segments of a batch, and the buffers of estimators.
 #[derive(Debug, Default)]
-pub(in crate::direct) struct Batch {
+pub(in crate::direct) struct PointBatch {
     pub(in crate::direct) candidates: Candidates,
     pub(in crate::direct) segments: Segments,
     bsdf: BsdfBuffers,
-    ris: ris::Buffers,
+    ris: ris::RisBuffers,
     components: Components,
-    correlated: correlated::Buffers,
-    contributing: contributing::Buffers,
+    correlated: correlated::CorrelatedBuffers,
+    contributing: contributing::ContributingBuffers,
 }
 
 impl Estimator {
@@ -143,8 +143,8 @@ impl Estimator {
     }
 
     /// T1: candidates with their unshadowed integrands and the densities of all techniques.
-    pub(in crate::direct) fn propose(&self, job: &RenderJob, points: &[ShadingPoint<'_>], batch: &mut Batch) {
-        let Batch { candidates, bsdf, .. } = batch;
+    pub(in crate::direct) fn propose(&self, job: &RenderJob, points: &[ShadingPoint<'_>], batch: &mut PointBatch) {
+        let PointBatch { candidates, bsdf, .. } = batch;
         candidates.clear();
         let t1 = &mut T1 { job, points, bsdf, candidates };
         match self {
@@ -179,11 +179,11 @@ impl Estimator {
         &self,
         job: &RenderJob,
         points: &[ShadingPoint<'_>],
-        batch: &mut Batch,
+        batch: &mut PointBatch,
         fits: &mut Fits,
         out: &mut [Rgb],
     ) {
-        let Batch { candidates, segments, components, correlated, ris, .. } = batch;
+        let PointBatch { candidates, segments, components, correlated, ris, .. } = batch;
         let start = Instant::now();
 
         // The time of normal equations counts as `solve`

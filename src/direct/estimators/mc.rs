@@ -1,7 +1,7 @@
 //! `mc`: light sampling only. Specular lobes, which light samples cannot hit, get one BSDF sample.
 
 use crate::bsdfs::Bsdf;
-use crate::direct::candidates::{Candidates, Drawn, SampleAllocation};
+use crate::direct::candidates::{Candidates, SampleAllocation, SampledBy};
 use crate::direct::light_samples;
 use crate::direct::point::ShadingPoint;
 use crate::direct::t1::T1;
@@ -36,8 +36,8 @@ pub(super) fn allocation_at(point: &ShadingPoint<'_>) -> SampleAllocation {
 
 /// Contributions. BSDF samples count for specular lobes only.
 pub(super) fn select(candidates: &mut Candidates) {
-    candidates.weigh(|c| match c.drawn {
-        Drawn::Bsdf => 0.0,
-        Drawn::Light | Drawn::DeltaLight | Drawn::DeltaBsdf => c.own_factor(),
+    candidates.weigh(|c| match c.sampled_by {
+        SampledBy::Bsdf => 0.0,
+        SampledBy::Light | SampledBy::DeltaLight | SampledBy::DeltaBsdf => c.own_factor(),
     });
 }

@@ -5,8 +5,8 @@
 //! | [`mc`] | light samples | 1/(n·p) | sum |
 //! | [`mis`] | light and BSDF samples | weights of a heuristic | sum |
 //! | [`ris`] | many light and BSDF samples, in chunks | draws from each chunk | sum |
-//! | [`ocv`] | like `mis`, by light group | like `mis` | control variates |
-//! | [`optimal_mis`] | like `mis`, by light group | like `mis` | optimal weights |
+//! | [`ocv`] | like `mis`, by group of lights | like `mis` | control variates |
+//! | [`optimal_mis`] | like `mis`, by group of lights | like `mis` | optimal weights |
 //! | [`correlated`] | samples of one technique | 1/(n·p) | two estimates combined |
 //! | [`contributing`] | light samples by contribution, and BSDF samples | like `mis` | sum |
 
@@ -19,5 +19,5 @@ pub mod ocv;
 pub mod optimal_mis;
 pub mod ris;
 
-pub(super) use estimator::Batch;
 pub use estimator::Estimator;
+pub(super) use estimator::PointBatch;

@@ -3,6 +3,10 @@
 //! After T2, the samples of a point are accumulated into normal equations with the columns c_j = h_j/p_α − I_j, whose
 //! expectation is 0, and y = f·V/p_α. The estimate is ȳ − Σ_j β_j c̄_j [Eq. 7 of the paper]. The forms differ in the
 //! samples that β is fitted to.
+//!
+//! The form over pixels does not come here. [`crate::direct::ColumnDirectLighting`] sums the control variates of each
+//! pixel, and `render/control_variates.rs` fits β and subtracts them after the last sample. In the stages, this form is
+//! `mis`; see [`Estimator`](super::Estimator).
 
 use super::mis::Mis;
 use crate::direct::components::Components;
@@ -23,9 +27,8 @@ pub struct Ocv {
 }
 
 impl Ocv {
-    /// Computes the estimates from the sums of `components`; `out[i]` belongs to `points[i]`.
-    ///
-    /// The form over pixels is the work of [`crate::direct::ColumnDirectLighting`].
+    /// Computes the estimates from the sums of `components`; `out[i]` belongs to `points[i]`. Never called with the form
+    /// over pixels.
     pub(super) fn resolve(
         &self,
         points: &[ShadingPoint<'_>],

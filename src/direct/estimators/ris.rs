@@ -3,7 +3,8 @@
 //! T1 makes M proposals per point by light and BSDF sampling. Multiple importance sampling weights them into one set
 //! [Talbot 2005, §4.6.1]; the target q̂ is the luminance of f·G·L. N proposals are drawn in proportion to q̂·r. Only
 //! these are evaluated in colour and traced. The estimate is unbiased for any M ≥ N ≥ 1: given the proposals, its
-//! expectation over the draws is the estimate that traces all proposals.
+//! expectation over the draws is the estimate that traces all proposals. The factor 1/N and the sum of all weights in
+//! [Talbot 2005, Eq. 4.1] are in [`Draw::scale`].
 //!
 //! The target `visibility` multiplies q̂ by √V̂, where V̂ > 0 is the visibility of each light estimated from its
 //! photons ([`crate::lights::learned_visibility`]). If V is 1 with probability V̂ and 0 otherwise, the density of
@@ -74,7 +75,7 @@ impl Ris {
 
     /// T1 and select, alternately: makes the proposals of a chunk of points and draws samples from them. Only the
     /// samples become candidates, with their contributions.
-    pub(super) fn propose_and_draw(&self, t1: &mut T1<'_>, b: &mut Buffers) {
+    pub(super) fn propose_and_draw(&self, t1: &mut T1<'_>, b: &mut RisBuffers) {
         // BSDF samples of all points. Light samples are only counted here, and made in chunks
         t1.propose(allocation, |_, _, _, allocation, _| allocation.light_draws);
         let T1 { job, points, candidates, .. } = t1;
@@ -98,7 +99,7 @@ impl Ris {
     }
 
     /// T1: takes a chunk from the remaining points, and makes its proposals.
-    fn propose_chunk<'a>(&self, job: &RenderJob, rest: &mut Chunk<'a>, b: &mut Buffers) -> Chunk<'a> {
+    fn propose_chunk<'a>(&self, job: &RenderJob, rest: &mut Chunk<'a>, b: &mut RisBuffers) -> Chunk<'a> {
         b.proposals.clear();
         b.numbers.clear();
         let Chunk { first, points, bsdf } = *rest;
@@ -126,7 +127,7 @@ impl Ris {
     }
 
     /// Select: draws the samples of the points of a chunk.
-    fn draw_chunk(&self, chunk: &Chunk<'_>, b: &mut Buffers, candidates: &mut Candidates) {
+    fn draw_chunk(&self, chunk: &Chunk<'_>, b: &mut RisBuffers, candidates: &mut Candidates) {
         let mut bsdf = chunk.bsdf;
         for (i, point) in chunk.points.iter().enumerate() {
             let range = b.proposals.points()[i];
@@ -163,7 +164,7 @@ impl Ris {
     }
 
     /// Draws N proposals of a point.
-    fn draw(&self, point: &ShadingPoint<'_>, range: PointProposals, u: f32, b: &mut Buffers) {
+    fn draw(&self, point: &ShadingPoint<'_>, range: PointProposals, u: f32, b: &mut RisBuffers) {
         let weights = &b.proposals.weight[range.start..range.end];
 
         // The number u is used directly for systematic sampling; other methods derive independent numbers from it
@@ -236,7 +237,7 @@ struct Chunk<'a> {
 
 /// Buffers kept from batch to batch.
 #[derive(Debug, Default)]
-pub(super) struct Buffers {
+pub(super) struct RisBuffers {
     bsdf_samples: Vec<Candidate>,
     proposals: ProposalColumns,
     draws: Vec<Draw>,
@@ -250,7 +251,7 @@ pub(super) struct Buffers {
     numbers: Vec<[f32; 2]>,
 }
 
-impl Buffers {
+impl RisBuffers {
     /// Traces all proposals, and sets the weights of occluded ones to 0. Returns the number of segments.
     fn probe(&mut self, job: &RenderJob, chunk: &Chunk<'_>) -> u64 {
         self.probes.clear();

@@ -5,7 +5,7 @@ use super::vertex_data::{PlainMeshVertex, VertexData};
 use crate::bsdfs::{Bsdf, Diffuse};
 use crate::direct::point::{ShadingPoint, lobe_for_lights};
 use crate::geometry::TriangleMesh;
-use crate::lights::{GlossyLobe, LightSampling};
+use crate::lights::{GlossyLobe, JobLights};
 use crate::materials::SurfaceBsdf;
 use crate::media::Sides;
 use crate::settings::SampleCounts;
@@ -153,7 +153,7 @@ impl<'w> Vertices<'w> {
 
     /// Assigns rows to all vertices added; vertices with their own BSDFs come first. Times and random numbers are set
     /// by the caller.
-    pub fn finish(&mut self, lights: &LightSampling) {
+    pub fn finish(&mut self, lights: &JobLights) {
         let (pending, plain) = (std::mem::take(&mut self.pending), std::mem::take(&mut self.plain));
         // The kernel writes whole vectors from the first plain row on
         self.surface.reserve(padded(pending.len() + padded(plain.len())));
@@ -243,7 +243,7 @@ impl<'w> Vertices<'w> {
     }
 
     /// Sets the lobes used by the choice of lights.
-    fn find_lobes(&mut self, lights: &LightSampling) {
+    fn find_lobes(&mut self, lights: &JobLights) {
         let lobes = &mut self.surface.lobes;
         lobes.clear();
         if lights.sampler.needs_lobes() && !self.bsdfs.is_empty() {
@@ -294,7 +294,7 @@ impl<'w> Vertices<'w> {
     pub fn select(
         &mut self,
         other: &Vertices<'w>,
-        lights: &LightSampling,
+        lights: &JobLights,
         bsdf: impl Fn(usize) -> Option<SurfaceBsdf<'w>>,
     ) {
         let mut row_of = vec![0_u32; other.path.iter().max().map_or(0, |&path| path as usize + 1)];
@@ -337,10 +337,10 @@ mod tests {
     use lumiris_numbers::samplers::{SampleStream, SamplerKind};
     use std::sync::Arc;
 
-    fn lights() -> LightSampling {
+    fn lights() -> JobLights {
         let set = LightSetBuilder::default().build(&Bounds3::from_points([Vec3::ZERO, Vec3::ONE]));
         let choice = LightChoice { kind: LightSamplerKind::Uniform, infinite_fraction: None, volumes: false };
-        LightSampling::new(Arc::new(set), choice, 1)
+        JobLights::new(Arc::new(set), choice, 1)
     }
 
     fn stream(path: u32, sample: u32) -> SampleStream {

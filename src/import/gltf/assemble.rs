@@ -359,7 +359,7 @@ impl<'a> Assembly<'a> {
         // Light
         let (p, axis) = (m.transform_point3(Vec3::ZERO), m.transform_vector3(-Vec3::Z).normalize_or(-Vec3::Z));
         match light.key("type").text() {
-            Some("directional") => self.lights.push(Light::Distant(DistantLight { wi: -axis, l: intensity })),
+            Some("directional") => self.lights.push(Light::Distant(DistantLight { wi: -axis, irradiance: intensity })),
             Some("spot") => {
                 let angle = |key: &str, default: f32| light.key("spot").key(key).number().unwrap_or(default).cos();
                 let cos_total = angle("outerConeAngle", std::f32::consts::FRAC_PI_4);

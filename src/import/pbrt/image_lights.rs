@@ -71,7 +71,8 @@ impl EnvironmentDesc {
 
     /// Scales the light's intensity, or sets its power if `power` is positive.
     fn scaled(&self, light: ImageLight, factor: Rgb, power: f32) -> ImageLight {
-        let brightness = if power > 0.0 && light.phi() > 0.0 { power / light.phi() } else { 1.0 };
+        let brightness =
+            if power > 0.0 && light.power_luminance() > 0.0 { power / light.power_luminance() } else { 1.0 };
         light.scaled(factor * (self.scale * brightness))
     }
 

@@ -118,7 +118,7 @@ impl Builder<'_> {
         // pbrt-v4 replaces the scale, including the normalisation of the white point, so the colour's luminance remains
         // a factor.
         let l = if illuminance > 0.0 { l * illuminance } else { l };
-        Some(Light::Distant(DistantLight { wi: wi_world, l }))
+        Some(Light::Distant(DistantLight { wi: wi_world, irradiance: l }))
     }
 
     fn infinite(&mut self, p: &ParamSet, placed: Placed, d: &mut Diagnostics) -> Option<Light> {

@@ -371,7 +371,9 @@ mod tests {
                 .unwrap();
         assert!(s.leaves_lights_out());
         let s = settings("Integrator \"path\" \"string lightsampler\" \"photons\"").unwrap();
-        assert!(s.light_sampler == LightSamplerKind::Photons && s.uses_visibility_cache() && !s.leaves_lights_out());
+        assert!(
+            s.light_sampler == LightSamplerKind::VisibilityCache && s.uses_visibility_cache() && !s.leaves_lights_out()
+        );
         let s = settings("Integrator \"path\" \"string target\" \"visibility\"").unwrap();
         assert!(s.ris.target == Target::Visibility && !s.uses_visibility_cache(), "the target is that of ris alone");
         let s = settings("Integrator \"path\" \"string estimator\" \"ris\" \"string target\" \"visibility\"").unwrap();

@@ -147,7 +147,7 @@ fn area(set: &LightSet, light: LightId) -> f32 {
 
 /// Power of a light with an area.
 fn power(set: &LightSet, light: LightId) -> f32 {
-    if let Light::Area(area) = &set.lights[light as usize] { area.phi() } else { 0.0 }
+    if let Light::Area(area) = &set.lights[light as usize] { area.power_luminance() } else { 0.0 }
 }
 
 /// A table in proportion to the contributions, smoothed over neighbouring cells.

@@ -33,7 +33,8 @@ pub enum LightSamplerKind {
     /// By a bound of the contribution at the point.
     Tree,
     /// By the same bound, over the lights that the visibility cache finds.
-    Photons,
+    #[strum(serialize = "photons")]
+    VisibilityCache,
 }
 
 /// How lights are chosen.
@@ -109,15 +110,15 @@ pub enum LightSampler {
     /// By the tree; infinite lights beside it.
     Tree(TreeChoice),
     /// By the visibility cache, and by the tree.
-    Photons(VisibilityCacheSampler),
+    VisibilityCache(VisibilityCacheSampler),
 }
 
 impl LightSampler {
-    /// A sampler of `lights`, with their indices as ids. `scene_radius` determines the power of infinite lights. The
-    /// photon sampler has no visibility cache yet.
+    /// A sampler of `lights`, with their indices as ids. `scene_radius` determines the power of infinite lights. No
+    /// visibility cache is set yet.
     pub fn new(choice: LightChoice, lights: &[Light], scene_radius: f32) -> Self {
         let tree = |powers: &[f32]| TreeChoice::new(lights, powers, choice.infinite_fraction, choice.volumes);
-        let powers: Vec<f32> = lights.iter().map(|light| light.phi(scene_radius)).collect();
+        let powers: Vec<f32> = lights.iter().map(|light| light.power_luminance(scene_radius)).collect();
         match choice.kind {
             LightSamplerKind::Uniform => {
                 let weights: Vec<f32> = powers.iter().map(|&p| if p > 0.0 { 1.0 } else { 0.0 }).collect();
@@ -125,8 +126,8 @@ impl LightSampler {
             }
             LightSamplerKind::Power => LightSampler::Power(FixedChoice::new(&power_weights(&powers))),
             LightSamplerKind::Tree => LightSampler::Tree(tree(&powers)),
-            LightSamplerKind::Photons => {
-                LightSampler::Photons(VisibilityCacheSampler::new(tree(&powers), lights, scene_radius))
+            LightSamplerKind::VisibilityCache => {
+                LightSampler::VisibilityCache(VisibilityCacheSampler::new(tree(&powers), lights, scene_radius))
             }
         }
     }
@@ -134,7 +135,7 @@ impl LightSampler {
     /// Sets the visibility cache, if the sampler uses one.
     pub(super) fn set_visibility_cache(&mut self, visibility_cache: Option<Arc<VisibilityCache>>) {
         match self {
-            LightSampler::Photons(choice) => choice.visibility_cache = visibility_cache,
+            LightSampler::VisibilityCache(choice) => choice.visibility_cache = visibility_cache,
             LightSampler::Uniform(_) | LightSampler::Power(_) | LightSampler::Tree(_) => {}
         }
     }
@@ -143,7 +144,7 @@ impl LightSampler {
     pub fn tree(&self) -> Option<&TreeChoice> {
         match self {
             LightSampler::Tree(choice) => Some(choice),
-            LightSampler::Photons(choice) => Some(&choice.base),
+            LightSampler::VisibilityCache(choice) => Some(&choice.base),
             LightSampler::Uniform(_) | LightSampler::Power(_) => None,
         }
     }
@@ -163,7 +164,7 @@ impl LightSampler {
                 Some(SampledLight { light: s.index as LightId, pmf: s.pmf, u: s.u })
             }
             LightSampler::Tree(choice) => choice.sample(ctx, u),
-            LightSampler::Photons(choice) => choice.sample(ctx, u),
+            LightSampler::VisibilityCache(choice) => choice.sample(ctx, u),
         }
     }
 
@@ -189,7 +190,7 @@ impl LightSampler {
         match self {
             LightSampler::Uniform(choice) | LightSampler::Power(choice) => choice.runs(positions, out),
             LightSampler::Tree(choice) => choice.runs(ctx, RunPositions::all(positions), out),
-            LightSampler::Photons(choice) => choice.runs(ctx, positions, out),
+            LightSampler::VisibilityCache(choice) => choice.runs(ctx, positions, out),
         }
     }
 
@@ -199,7 +200,7 @@ impl LightSampler {
         match self {
             LightSampler::Uniform(choice) | LightSampler::Power(choice) => choice.table.pmf(light as usize),
             LightSampler::Tree(choice) => choice.pmf(ctx, light),
-            LightSampler::Photons(choice) => choice.pmf(ctx, light),
+            LightSampler::VisibilityCache(choice) => choice.pmf(ctx, light),
         }
     }
 }

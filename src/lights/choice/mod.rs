@@ -1,8 +1,9 @@
 //! The lights of a scene and the choice among them: [`light_sampler`] chooses one light, [`set`] holds all lights,
-//! [`groups`] are components of the mixture density, [`sampling`] joins them, and [`sample_columns`] samples for many points.
+//! [`mixture_groups`] are components of the mixture density, [`job_lights`] joins them for a render job, and
+//! [`sample_columns`] samples for many points.
 
-pub mod groups;
+pub mod job_lights;
 pub mod light_sampler;
+pub mod mixture_groups;
 pub mod sample_columns;
-pub mod sampling;
 pub mod set;

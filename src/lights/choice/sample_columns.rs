@@ -4,9 +4,9 @@
 //! lights one by one. A light that has a kernel always uses it, so the result is bit-identical for any number of
 //! points.
 
-use super::groups::MAX_GROUPS;
+use super::job_lights::JobLights;
 use super::light_sampler::LightSampler;
-use super::sampling::LightSampling;
+use super::mixture_groups::MAX_GROUPS;
 use crate::lights::{
     AreaLight, AreaShape, BranchTable, LeAndPdf, Light, LightCtx, LightId, LightLanes, LightSample, SampledLight,
 };
@@ -155,7 +155,7 @@ impl LobeColumns {
     }
 }
 
-/// Memory of [`LightSampling::sample_many`].
+/// Memory of [`JobLights::sample_many`].
 #[derive(Debug, Default)]
 pub struct Scratch {
     /// The light that each point chose.
@@ -173,7 +173,7 @@ pub struct Scratch {
 
 impl Scratch {
     /// Prepares for samples of `lights` at the `n` points `at`; each point may be sampled several times.
-    pub fn begin(&mut self, lights: &LightSampling, n: usize, at: LitPoints<'_>) {
+    pub fn begin(&mut self, lights: &JobLights, n: usize, at: LitPoints<'_>) {
         self.branches.clear();
         if let LightSampler::Tree(choice) = &lights.sampler
             && lights.sampler.only_light().is_none()
@@ -184,20 +184,20 @@ impl Scratch {
         }
     }
 
-    /// [`LightGroups::pmfs`](super::groups::LightGroups::pmfs) of `lights` at point `i`, given as `at`. There must be
+    /// [`MixtureGroups::pmfs`](super::mixture_groups::MixtureGroups::pmfs) of `lights` at point `i`, given as `at`. There must be
     /// more than one light.
     #[inline]
-    pub fn group_pmfs(&self, lights: &LightSampling, i: usize, at: &LightCtx) -> [f32; MAX_GROUPS] {
+    pub fn group_pmfs(&self, lights: &JobLights, i: usize, at: &LightCtx) -> [f32; MAX_GROUPS] {
         lights.groups.pmfs_with(&lights.sampler, at, self.branches.at(i))
     }
 
-    /// The light that point `i` chose in the last [`LightSampling::sample_many`], if there is more than one light.
+    /// The light that point `i` chose in the last [`JobLights::sample_many`], if there is more than one light.
     pub fn chosen(&self, i: usize) -> LightId {
         self.chosen[i].light
     }
 }
 
-impl LightSampling {
+impl JobLights {
     /// Samples a direction to a light for each of the `n` points `at`: the light by `u[0]`, the direction by `u[1]` and
     /// `u[2]`. The results equal [`sample`](Self::sample) up to rounding, except that the radiance and density of
     /// infinite lights are sums over all of them. `out` must have whole vectors. `scratch` must have begun with these
@@ -409,7 +409,7 @@ impl LightSampler {
                 (&[light], None) if choice.tree.is_empty() => Some(light),
                 _ => None,
             },
-            LightSampler::Photons(_) => None,
+            LightSampler::VisibilityCache(_) => None,
         }
     }
 }
@@ -451,7 +451,7 @@ mod tests {
         let sphere = Shape::Quadric(Quadric { kind, group_from_local, local_from_group, flip_normal: false });
         builder.add_area(3, &sphere, &Emission::constant(Rgb::splat(7.0)));
         builder.add(Light::Point(PointLight { p: Vec3::new(2.0, 2.0, 2.0), intensity: Rgb::splat(3.0) }));
-        builder.add(Light::Distant(DistantLight { wi: Vec3::Z, l: Rgb::WHITE }));
+        builder.add(Light::Distant(DistantLight { wi: Vec3::Z, irradiance: Rgb::WHITE }));
     }
 
     fn sky(builder: &mut LightSetBuilder) {
@@ -462,7 +462,7 @@ mod tests {
 
     fn assert_like_singles(builder: LightSetBuilder, kind: LightSamplerKind, stream: &mut Pcg32) {
         let set = Arc::new(builder.build(&Bounds3 { min: -Vec3::ONE, max: Vec3::splat(3.0) }));
-        let lights = LightSampling::new(set, kind, 1);
+        let lights = JobLights::new(set, kind, 1);
         let len = padded(N);
         let [mut p, mut n, mut ns] = [(); 3].map(|()| Columns3::default());
         [&mut p, &mut n, &mut ns].into_iter().for_each(|c| c.reserve(len));
@@ -491,7 +491,7 @@ mod tests {
     }
 
     /// Compares `out` with single samples.
-    fn assert_same(lights: &LightSampling, at: LitPoints<'_>, u: &[Column; 3], out: &LightSamples) {
+    fn assert_same(lights: &JobLights, at: LitPoints<'_>, u: &[Column; 3], out: &LightSamples) {
         let mut drawn = 0;
         for i in 0..N {
             let ctx = at.get(i);

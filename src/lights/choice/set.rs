@@ -96,7 +96,7 @@ impl LightSetBuilder {
         // Infinite lights with a radiance in all directions, and lights with power
         let has_le = |light: &Light| light.is_infinite() && !light.is_delta();
         let infinite = (0..self.lights.len()).filter(|&i| has_le(&self.lights[i])).map(|i| i as LightId).collect();
-        let is_lit = |&i: &usize| self.lights[i].phi(scene_radius) > 0.0;
+        let is_lit = |&i: &usize| self.lights[i].power_luminance(scene_radius) > 0.0;
         let lit = (0..self.lights.len()).filter(is_lit).map(|i| i as LightId).collect();
         self.emitting.sort_by_key(|e| e.geometry);
         LightSet {
@@ -164,7 +164,7 @@ impl LightSet {
 
     /// A sampler of the same kind over the delta lights; `None` if there are none.
     pub fn delta_sampler(&self, choice: LightChoice) -> Option<LightSampler> {
-        let is_lit = |light: &&Light| light.is_delta() && light.phi(self.scene_radius) > 0.0;
+        let is_lit = |light: &&Light| light.is_delta() && light.power_luminance(self.scene_radius) > 0.0;
         self.lights.iter().find(is_lit)?;
         let black = Light::Point(PointLight { p: Vec3::ZERO, intensity: Rgb::BLACK });
         let delta: Vec<Light> =

@@ -10,13 +10,13 @@ pub struct DistantLight {
     /// Unit direction to the light.
     pub wi: Vec3,
     /// Irradiance on a surface that faces it.
-    pub l: Rgb,
+    pub irradiance: Rgb,
 }
 
 impl DistantLight {
     #[inline]
     pub(in crate::lights) fn sample_li(&self) -> Option<LightSample> {
-        let s = infinite_sample(self.wi, self.l, 1.0);
-        (!self.l.is_black()).then_some(LightSample { is_delta: true, ..s })
+        let s = infinite_sample(self.wi, self.irradiance, 1.0);
+        (!self.irradiance.is_black()).then_some(LightSample { is_delta: true, ..s })
     }
 }

@@ -42,7 +42,7 @@ pub struct ImageLight {
     /// Luminance times solid angle over the square.
     distribution: PiecewiseConstant2D,
     /// Luminance of the power.
-    phi: f32,
+    power_luminance: f32,
 }
 
 impl ImageLight {
@@ -64,9 +64,9 @@ impl ImageLight {
         let texels: Vec<Rgb> = texels.into_iter().map(cleaned).collect();
         let powers = powers(mapping, size, &texels);
         let weights: Vec<f32> = powers.iter().map(|&w| w as f32).collect();
-        let phi = powers.iter().sum::<f64>() as f32;
+        let power_luminance = powers.iter().sum::<f64>() as f32;
         let distribution = PiecewiseConstant2D::new(&weights, width);
-        Ok(ImageLight { p, world_from_light, mapping, texels, size, distribution, phi })
+        Ok(ImageLight { p, world_from_light, mapping, texels, size, distribution, power_luminance })
     }
 
     /// Name of the kind of light, for messages.
@@ -81,13 +81,13 @@ impl ImageLight {
     #[must_use]
     pub fn scaled(mut self, factor: Rgb) -> Self {
         self.texels.iter_mut().for_each(|c| *c *= factor);
-        self.phi = powers(self.mapping, self.size, &self.texels).iter().sum::<f64>() as f32;
+        self.power_luminance = powers(self.mapping, self.size, &self.texels).iter().sum::<f64>() as f32;
         self
     }
 
     /// Luminance of the emitted power.
-    pub fn phi(&self) -> f32 {
-        self.phi
+    pub fn power_luminance(&self) -> f32 {
+        self.power_luminance
     }
 
     /// Radiant intensity towards the unit direction `w`.
@@ -144,7 +144,7 @@ impl ImageLight {
                 bounds: at,
                 cos_theta_o: -1.0,
                 cos_theta_e: 0.0,
-                intensity: self.phi / (4.0 * PI),
+                intensity: self.power_luminance / (4.0 * PI),
                 ..LightBounds::EMPTY
             },
             ImageMapping::Plane { half: [hx, hy] } => {
@@ -156,7 +156,7 @@ impl ImageLight {
                     axis: (self.world_from_light * Vec3::Z).normalize(),
                     cos_theta_o,
                     cos_theta_e: if cos_theta_o < 0.0 { 0.0 } else { 1.0 },
-                    intensity: self.phi / steradians,
+                    intensity: self.power_luminance / steradians,
                     ..LightBounds::EMPTY
                 }
             }
@@ -220,7 +220,7 @@ mod tests {
         // A cube has six faces
         assert!((6.0 * 4.0 * corner([1.0, 1.0]) - 4.0 * std::f64::consts::PI).abs() < 1e-12);
         let light = ImageLight::new(Vec3::ZERO, Mat3::IDENTITY, ImageMapping::Sphere, vec![Rgb::splat(2.0); 4], [2, 2]);
-        assert!((light.unwrap().phi() - 8.0 * PI).abs() < 1e-4);
+        assert!((light.unwrap().power_luminance() - 8.0 * PI).abs() < 1e-4);
     }
 
     #[test]

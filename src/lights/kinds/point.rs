@@ -27,7 +27,7 @@ impl PointLight {
         EmissionSample::in_space(self.p, sample_uniform_sphere(u), self.intensity * (4.0 * PI))
     }
 
-    pub(in crate::lights) fn phi(&self) -> f32 {
+    pub(in crate::lights) fn power_luminance(&self) -> f32 {
         4.0 * PI * self.intensity.luminance()
     }
 
@@ -76,7 +76,7 @@ mod tests {
         let light = Light::Point(PointLight { p: Vec3::new(0.0, 3.0, 0.0), intensity });
         let s = light.sample_li(&LightCtx::at(Vec3::ZERO), [0.5; 2]).unwrap();
         assert_eq!((s.li, s.wi, s.t, s.pdf, s.is_delta), (Rgb::new(1.0, 2.0, 0.0), Vec3::Y, 3.0, 1.0, true));
-        assert!((light.phi(1.0) - 4.0 * PI * intensity.luminance()).abs() < 1e-3);
+        assert!((light.power_luminance(1.0) - 4.0 * PI * intensity.luminance()).abs() < 1e-3);
         assert!(light.sample_li(&LightCtx::at(Vec3::new(0.0, 3.0, 0.0)), [0.5; 2]).is_none());
     }
 }

@@ -49,7 +49,7 @@ pub struct PortalLight {
     /// Density of emitted directions over (s, t).
     emitted: PiecewiseConstant2D,
     /// Luminance of the power through the portal.
-    phi: f32,
+    power_luminance: f32,
 }
 
 /// A rectangle that light comes through.
@@ -171,13 +171,13 @@ impl PortalLight {
 
         let to_sky = portal.world_from_portal.z_axis;
         let flux = map.integral(|w| (world_from_light * w).dot(to_sky).max(0.0));
-        let phi = flux as f32 * portal.extent[0] * portal.extent[1] * scale;
-        PortalLight { portal, map, light_from_world, scale, cells: n, sums, emitted, phi }
+        let power_luminance = flux as f32 * portal.extent[0] * portal.extent[1] * scale;
+        PortalLight { portal, map, light_from_world, scale, cells: n, sums, emitted, power_luminance }
     }
 
     /// Luminance of the power that passes through the portal (W).
-    pub fn phi(&self) -> f32 {
-        self.phi
+    pub fn power_luminance(&self) -> f32 {
+        self.power_luminance
     }
 
     /// Radiance of the sky in the unit direction `w`.
@@ -461,7 +461,7 @@ mod tests {
         }
         // From next to the portal the visible sky is a hemisphere, whose flux through 1.5 m² is π·1.5
         let expected = 1.5 * std::f32::consts::PI * Rgb::new(0.5, 0.25, 1.0).luminance();
-        assert!((light.phi() - expected).abs() < 2e-4 * expected, "{} {expected}", light.phi());
+        assert!((light.power_luminance() - expected).abs() < 2e-4 * expected, "{} {expected}", light.power_luminance());
     }
 
     #[test]
@@ -543,7 +543,7 @@ mod tests {
     }
 
     #[test]
-    fn phi_is_the_flux_of_a_sun_of_one_texel() {
+    fn the_power_is_the_flux_of_a_sun_of_one_texel() {
         for at in [70, 105, 118, 135, 150] {
             let sky = || sky(|i| if i == at { 900.0 } else { 0.1 }, 16);
             let (map, turn, z) = (sky(), Mat3::from_rotation_x(0.4), portal().world_from_portal.z_axis);
@@ -554,8 +554,8 @@ mod tests {
                 let w = Frame::from_z(z).to_world(sample_cosine_hemisphere(u));
                 flux.add(PI * f64::from(map.le(turn.transpose() * w).luminance()));
             }
-            let (expected, phi) = (flux.mean() * 0.5 * 1.5, f64::from(light_of(sky()).phi()));
-            assert!((phi - expected).abs() < 3e-3 * expected, "{at}: {phi} {expected}");
+            let (expected, power) = (flux.mean() * 0.5 * 1.5, f64::from(light_of(sky()).power_luminance()));
+            assert!((power - expected).abs() < 3e-3 * expected, "{at}: {power} {expected}");
         }
     }
 

@@ -36,7 +36,7 @@ impl SpotLight {
         EmissionSample::in_space(self.p, d.normalize(), self.intensity * self.solid_angle())
     }
 
-    pub(in crate::lights) fn phi(&self) -> f32 {
+    pub(in crate::lights) fn power_luminance(&self) -> f32 {
         self.intensity.luminance() * self.solid_angle()
     }
 

@@ -1,5 +1,5 @@
 //! A bounding volume hierarchy over lights, descended at random in proportion to an upper bound of each child's
-//! contribution ([`lumiris_numbers::math::light_bound`]) [Conty Estévez and Kulla 2018; Pharr et al. 2023, §12.6.3].
+//! contribution, [`LightBound::importance`] [Conty Estévez and Kulla 2018; Pharr et al. 2023, §12.6.3].
 
 use super::branches::{Branches, COLUMNS};
 use super::build::{Item, build};

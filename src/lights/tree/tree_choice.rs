@@ -31,7 +31,7 @@ pub(in crate::lights) fn one_of(lights: &[LightId], u: f32, pmf: f32) -> Sampled
 impl TreeChoice {
     /// A choice among `lights` that have power, in a scene of radius `scene_radius` (m); `infinite_fraction` as in [`new`](Self::new).
     pub(in crate::lights) fn of_lights(lights: &[Light], scene_radius: f32, infinite_fraction: Option<f32>) -> Self {
-        let powers: Vec<f32> = lights.iter().map(|light| light.phi(scene_radius)).collect();
+        let powers: Vec<f32> = lights.iter().map(|light| light.power_luminance(scene_radius)).collect();
         Self::new(lights, &powers, infinite_fraction, false)
     }
 

@@ -39,7 +39,7 @@ const MIN_PATHS: f32 = 0.5;
 /// The visibility of lights estimated from photons.
 #[derive(Clone, Debug)]
 pub struct LearnedVisibility {
-    choice: TreeChoice,
+    tree_choice: TreeChoice,
     /// For each infinite light, the luminance of the irradiance on a surface facing it; 0 for others.
     irradiances: Vec<f32>,
     /// Φ/(A·N) of each light: the irradiance at which one photon is expected.
@@ -52,7 +52,7 @@ pub struct LearnedVisibility {
 #[derive(Clone, Copy, Debug)]
 pub struct NoncontributingLight {
     /// The light.
-    pub choice: SampledLight,
+    pub sampled: SampledLight,
     /// Its expected contribution without photons.
     pub expected: ExpectedContribution,
 }
@@ -83,38 +83,40 @@ fn estimate(importance: f32, of_one_photon: f32, count: f32) -> f32 {
 pub(super) fn facing_irradiance(light: &Light, scene_radius: f32) -> f32 {
     let disk = PI * scene_radius * scene_radius;
     match light {
-        Light::Distant(_) => light.phi(scene_radius) / disk,
+        Light::Distant(_) => light.power_luminance(scene_radius) / disk,
         // π times the mean radiance
-        Light::InfiniteConstant { .. } | Light::InfiniteImage { .. } => light.phi(scene_radius) / (4.0 * disk),
+        Light::InfiniteConstant { .. } | Light::InfiniteImage { .. } => {
+            light.power_luminance(scene_radius) / (4.0 * disk)
+        }
         // The mean over the scene
-        Light::Portal(_) => light.phi(scene_radius) / disk,
+        Light::Portal(_) => light.power_luminance(scene_radius) / disk,
         Light::Point(_) | Light::Spot(_) | Light::Image(_) | Light::Area(_) | Light::Volume(_) => 0.0,
     }
 }
 
 impl LearnedVisibility {
-    /// The visibility of `lights` according to `cache`; `choice` holds the tree over the lights.
+    /// The visibility of `lights` according to `cache`; `tree_choice` holds the tree over the lights.
     pub(in crate::lights) fn new(
-        choice: TreeChoice,
+        tree_choice: TreeChoice,
         lights: &[Light],
         scene_radius: f32,
         cache: &VisibilityCache,
     ) -> Self {
         let of_one_photon: Vec<f32> = (0..)
             .zip(lights)
-            .map(|(id, light)| light.phi(scene_radius) / (cache.area() * cache.paths(id).max(MIN_PATHS)))
+            .map(|(id, light)| light.power_luminance(scene_radius) / (cache.area() * cache.paths(id).max(MIN_PATHS)))
             .map(|irradiance| irradiance.clamp(f32::MIN_POSITIVE, 1e30))
             .collect();
-        let of_nodes = choice.tree.sums(|light| of_one_photon[light as usize]);
+        let of_nodes = tree_choice.tree.sums(|light| of_one_photon[light as usize]);
         let irradiances = lights.iter().map(|light| facing_irradiance(light, scene_radius)).collect();
-        LearnedVisibility { choice, irradiances, of_one_photon, of_nodes }
+        LearnedVisibility { tree_choice, irradiances, of_one_photon, of_nodes }
     }
 
     /// E of a light or an upper bound of it, up to a factor common to all lights; 0 if it cannot contribute.
     #[inline]
     pub fn importance(&self, ctx: &LightCtx, light: LightId) -> f32 {
-        if self.choice.tree.contains(light) {
-            self.choice.tree.light_importance(&ctx.diffuse(), light)
+        if self.tree_choice.tree.contains(light) {
+            self.tree_choice.tree.light_importance(&ctx.diffuse(), light)
         } else {
             self.irradiances[light as usize]
         }
@@ -124,8 +126,8 @@ impl LearnedVisibility {
     #[inline]
     pub fn expect(&self, ctx: &LightCtx, light: LightId, count: u32) -> ExpectedContribution {
         let e = self.importance(ctx, light);
-        let is_by_lobe = is_glossy(ctx) && self.choice.tree.contains(light);
-        let importance = if is_by_lobe { self.choice.tree.light_importance(ctx, light) } else { e };
+        let is_by_lobe = is_glossy(ctx) && self.tree_choice.tree.contains(light);
+        let importance = if is_by_lobe { self.tree_choice.tree.light_importance(ctx, light) } else { e };
         ExpectedContribution { importance, visibility: self.visibility(light, e, count) }
     }
 
@@ -145,7 +147,7 @@ impl LearnedVisibility {
     pub fn find_singles(&self, contributing: &ContributingLights<'_>, singles: &mut Vec<u32>) {
         let first = singles.len();
         let once = contributing.lights.iter().filter(|entry| entry.count == 1);
-        singles.extend(once.filter_map(|entry| self.choice.tree.leaf(entry.light)));
+        singles.extend(once.filter_map(|entry| self.tree_choice.tree.leaf(entry.light)));
         singles[first..].sort_unstable();
     }
 
@@ -160,10 +162,10 @@ impl LearnedVisibility {
         singles: &[u32],
         u: f32,
     ) -> Option<NoncontributingLight> {
-        let TreeChoice { tree, infinite, .. } = &self.choice;
+        let TreeChoice { tree, infinite, .. } = &self.tree_choice;
         let others = || infinite.iter().filter(|&&light| contributing.index_of(light).is_none());
         let count = others().count();
-        let p_infinite = self.choice.probability_of_some(ctx, count);
+        let p_infinite = self.tree_choice.probability_of_some(ctx, count);
         if u < p_infinite {
             let x = u / p_infinite * count as f32;
             let i = (x as usize).min(count - 1);
@@ -174,8 +176,8 @@ impl LearnedVisibility {
 
         // Lights in the tree
         let u = ((u - p_infinite) / (1.0 - p_infinite)).min(ONE_MINUS_EPSILON);
-        let choice = tree.sample_by(u, singles, self.by_visibility(ctx))?;
-        Some(self.evaluated(ctx, SampledLight { pmf: choice.pmf * (1.0 - p_infinite), ..choice }))
+        let sampled = tree.sample_by(u, singles, self.by_visibility(ctx))?;
+        Some(self.evaluated(ctx, SampledLight { pmf: sampled.pmf * (1.0 - p_infinite), ..sampled }))
     }
 
     /// Evaluates a light without photons, with the probability that [`Self::sample_noncontributing`] chooses it.
@@ -187,9 +189,9 @@ impl LearnedVisibility {
         singles: &[u32],
         light: LightId,
     ) -> NoncontributingLight {
-        let TreeChoice { tree, infinite, .. } = &self.choice;
+        let TreeChoice { tree, infinite, .. } = &self.tree_choice;
         let count = infinite.iter().filter(|&&light| contributing.index_of(light).is_none()).count();
-        let p_infinite = self.choice.probability_of_some(ctx, count);
+        let p_infinite = self.tree_choice.probability_of_some(ctx, count);
         let pmf = if tree.contains(light) {
             tree.pmf_by(light, singles, self.by_visibility(ctx)) * (1.0 - p_infinite)
         } else if infinite.binary_search(&light).is_ok() {
@@ -213,8 +215,8 @@ impl LearnedVisibility {
     }
 
     #[inline]
-    fn evaluated(&self, ctx: &LightCtx, choice: SampledLight) -> NoncontributingLight {
-        NoncontributingLight { choice, expected: self.expect(ctx, choice.light, 0) }
+    fn evaluated(&self, ctx: &LightCtx, sampled: SampledLight) -> NoncontributingLight {
+        NoncontributingLight { sampled, expected: self.expect(ctx, sampled.light, 0) }
     }
 }
 
@@ -236,7 +238,7 @@ mod tests {
         };
         let mut lights: Vec<Light> = (0..12).map(lamp).collect();
         lights.push(Light::InfiniteConstant { l: Rgb::splat(0.1) });
-        lights.push(Light::Distant(DistantLight { wi: Vec3::Z, l: Rgb::splat(0.2) }));
+        lights.push(Light::Distant(DistantLight { wi: Vec3::Z, irradiance: Rgb::splat(0.2) }));
         lights
     }
 
@@ -294,11 +296,11 @@ mod tests {
             let (mut means, mut squares) = ([0.0_f64; 14], [0.0_f64; 14]);
             for _ in 0..draws {
                 let sampled = learned.sample_noncontributing(&ctx, &contributing, &singles, s.random::<f32>()).unwrap();
-                let SampledLight { light, pmf, u } = sampled.choice;
+                let SampledLight { light, pmf, u } = sampled.sampled;
                 assert!((0.0..1.0).contains(&u) && pmf > 0.0);
                 assert_eq!(sampled.expected.importance, learned.importance(&ctx, light));
                 if !seen.contains(&light) {
-                    assert_eq!(learned.noncontributing_light(&ctx, &contributing, &singles, light).choice.pmf, pmf);
+                    assert_eq!(learned.noncontributing_light(&ctx, &contributing, &singles, light).sampled.pmf, pmf);
                 }
                 means[light as usize] += f64::from(1.0 / pmf) / f64::from(draws);
                 squares[light as usize] += f64::from(1.0 / pmf).powi(2) / f64::from(draws);
@@ -320,7 +322,7 @@ mod tests {
             let contributing = cache.lookup(AT, Vec3::Z);
             let near =
                 |i: u32| learned.sample_noncontributing(&ctx, &contributing, &[], (i as f32 + 0.5) / 4096.0).unwrap();
-            (0..4096).filter(|&i| near(i).choice.light < 3).count()
+            (0..4096).filter(|&i| near(i).sampled.light < 3).count()
         };
         let [few, many] = [1.0, 1e6].map(share_of_near);
         assert!(few > many + 100, "{few} {many}");
@@ -339,7 +341,7 @@ mod tests {
             let chosen = |i: u32| {
                 learned.sample_noncontributing(&ctx, &contributing, &singles, (i as f32 + 0.5) / 4096.0).unwrap()
             };
-            (0..4096).filter(|&i| (8..12).contains(&chosen(i).choice.light)).count()
+            (0..4096).filter(|&i| (8..12).contains(&chosen(i).sampled.light)).count()
         };
         let [none, many, single] = [share_of_far(&[], 0), share_of_far(&[9, 11], 50), share_of_far(&[9, 11], 1)];
         assert_eq!(none, many, "lights with photons enough tell nothing of others");

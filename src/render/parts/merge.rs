@@ -11,7 +11,7 @@ use super::stored_tile::StoredTile;
 use crate::direct::Fits;
 use crate::film::accumulator::PixelAccumulator;
 use crate::film::fixed_sums::FixedSum;
-use crate::film::layers::{LayerScratch, PackedLayers, PixelLight};
+use crate::film::light_layers::{LayerScratch, PackedLayers, PixelLight};
 use crate::film::packed::PackedSums;
 use crate::film::{Film, PixelBounds};
 use crate::render::control_variates;

@@ -4,7 +4,7 @@ use super::error::PartError;
 use super::header::FilmHeader;
 use crate::film::PixelBounds;
 use crate::film::encoding::{Decoder, Encoder};
-use crate::film::layers::{LayerScratch, PackedLayers};
+use crate::film::light_layers::{LayerScratch, PackedLayers};
 use crate::film::packed::{PackedRows, PackedSums};
 use crate::film::replicas::ReplicaAccumulator;
 use crate::render::tiles::Tile;

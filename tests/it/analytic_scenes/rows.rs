@@ -153,7 +153,7 @@ fn weight_configurations() -> Vec<Configuration> {
 fn visibility_cache_configurations() -> Vec<Configuration> {
     use CacheContents::{Absent, Empty, Right, Wrong};
     let base = &BASE;
-    let light_sampler = LightSamplerKind::Photons;
+    let light_sampler = LightSamplerKind::VisibilityCache;
 
     // Choosing lights
     let mut all = [Absent, Empty, Right, Wrong]

@@ -104,7 +104,10 @@ fn a_triangle_with_a_light_and_a_camera_is_read() {
     let scene = loaded(folder.path(), &triangle()).unwrap().scene;
     assert_eq!(scene.geometry.primitive_counts(), PrimitiveCounts { triangles: 1, ..PrimitiveCounts::default() });
     assert_eq!(scene.film.resolution, [1440, 720]);
-    assert!((scene.lights.lights[0].phi(1.0) - 4.0 * std::f32::consts::PI).abs() < 1e-3, "683 cd are 1 W/sr");
+    assert!(
+        (scene.lights.lights[0].power_luminance(1.0) - 4.0 * std::f32::consts::PI).abs() < 1e-3,
+        "683 cd are 1 W/sr"
+    );
 }
 
 #[test]
@@ -114,7 +117,7 @@ fn lights_are_in_watts_or_in_the_candela_of_emission() {
     let light = |file: &[u8], light_units| {
         std::fs::write(&path, file).unwrap();
         let options = LoadOptions { light_units, ..LoadOptions::default() };
-        load(&path, &options).unwrap().scene.lights.lights[0].phi(1.0)
+        load(&path, &options).unwrap().scene.lights.lights[0].power_luminance(1.0)
     };
     // Blanks compensate for the different lengths
     let [point, sun] = [("point", 8), ("directional", 2)]

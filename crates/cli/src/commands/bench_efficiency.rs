@@ -73,7 +73,7 @@ fn parse_case(text: &str) -> Result<NamedOptions, String> {
 /// The default cases: estimators × light samplers × sample counts.
 fn default_cases(base: &Settings) -> Vec<Case> {
     let kinds = [EstimatorKind::Mis, EstimatorKind::Ris, EstimatorKind::Ocv, EstimatorKind::Contributing];
-    let lights = [LightSamplerKind::Tree, LightSamplerKind::Photons];
+    let lights = [LightSamplerKind::Tree, LightSamplerKind::VisibilityCache];
     let mut cases = vec![Case { name: "default".to_owned(), settings: *base }];
     for (estimator, light_sampler) in kinds.iter().flat_map(|kind| lights.iter().map(move |lights| (*kind, *lights))) {
         // `contributing` always finds its lights by photons

@@ -3,6 +3,9 @@
 //! With n_i samples x_ij of density p_i for each technique i, the estimate is
 //! Σ_i (1/n_i) Σ_j w_i(x_ij) f(x_ij)/p_i(x_ij), and it is unbiased if Σ_i w_i = 1 wherever f ≠ 0 and w_i = 0 where
 //! p_i = 0. The deterministic mixture is the balance heuristic.
+//!
+//! The renderer applies these weights in `src/direct/candidates.rs`, `src/direct/columns` and
+//! `src/integrators/path_state.rs`; see `src/direct/estimators/mis.rs`.
 
 use super::mc;
 use crate::math::number::Number;
@@ -67,7 +70,7 @@ impl Heuristic {
     /// cannot have drawn it.
     #[inline]
     pub fn factor(self, a: Technique, b: Technique) -> f32 {
-        self.weight(a, b) * mc::weight(a.n, a.p)
+        self.weight(a, b) * mc::factor(a.n, a.p)
     }
 }
 

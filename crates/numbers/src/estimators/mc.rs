@@ -1,9 +1,9 @@
 //! Plain Monte Carlo: E[f/p] = ∫ f for any density p that is positive where f is not zero. Unbiased.
 
-/// The weight 1/(n·p) of one of `n` samples of density `p`; 0 for densities that are impossible for a sample (p ≤ 0,
-/// NaN).
+/// The factor 1/(n·p) of f for one of `n` samples of density `p`; 0 for densities that are impossible for a sample
+/// (p ≤ 0, NaN).
 #[inline]
-pub fn weight(n: f32, p: f32) -> f32 {
+pub fn factor(n: f32, p: f32) -> f32 {
     if p > 0.0 { 1.0 / (n * p) } else { 0.0 }
 }
 
@@ -19,9 +19,9 @@ mod tests {
     use super::*;
 
     #[test]
-    fn weights_and_pools_have_known_values() {
+    fn factors_and_pools_have_known_values() {
         assert_eq!(
-            (weight(4.0, 0.5), weight(4.0, 0.0), weight(4.0, -1.0), weight(4.0, f32::NAN)),
+            (factor(4.0, 0.5), factor(4.0, 0.0), factor(4.0, -1.0), factor(4.0, f32::NAN)),
             (0.5, 0.0, 0.0, 0.0)
         );
         let [a, b] = [[1.0, 2.0, 3.0], [5.0, 10.0, -1.0]];

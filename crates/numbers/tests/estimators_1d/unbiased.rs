@@ -120,8 +120,8 @@ fn single_draw_estimate(integral: Integral, stream: &mut Pcg32, p: &mut Proposal
 
 fn plain_estimate(integral: Integral, stream: &mut Pcg32, _: &mut Proposals) -> [f64; 3] {
     let x = integral.sample(stream.random::<[f32; 2]>().map(f64::from));
-    let weight = f64::from(mc::weight(1.0, integral.pdf(x) as f32));
-    integral.f(x).map(|f| f * weight)
+    let factor = f64::from(mc::factor(1.0, integral.pdf(x) as f32));
+    integral.f(x).map(|f| f * factor)
 }
 
 fn defensive_estimate(integral: Integral, stream: &mut Pcg32, _: &mut Proposals) -> [f64; 3] {

@@ -133,7 +133,7 @@ impl AreaLight {
     }
 
     /// Luminance of the emitted power, π·A·L, doubled for a two-sided light.
-    pub fn phi(&self) -> f32 {
+    pub fn power_luminance(&self) -> f32 {
         let sides = if self.emission.two_sided { 2.0 } else { 1.0 };
         PI * self.area() * self.mean_luminance() * sides
     }

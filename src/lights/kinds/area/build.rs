@@ -219,7 +219,7 @@ mod tests {
         let mesh = TriangleMesh::new(p, vec![[0, 0, 1], [0, 1, 2], [0, 2, 3], [1, 1, 1]]).unwrap();
         let out = lights(mesh);
         assert_eq!(out.light_of_primitive, [0, 1, 1, 2]);
-        let powers: Vec<bool> = out.lights.iter().map(|l| l.phi() > 0.0).collect();
+        let powers: Vec<bool> = out.lights.iter().map(|l| l.power_luminance() > 0.0).collect();
         assert_eq!(powers, [false, true, false]);
         assert_eq!(out.lights[2].primitive, 3);
     }

@@ -1,4 +1,5 @@
-//! Groups of lights, each a component of the mixture density of light sampling.
+//! Groups of lights, each a component of the mixture density of light sampling in `ocv` and `optimal-mis`. The light
+//! groups of a scene file are [`LightLayers`](crate::lights::LightLayers).
 //!
 //! All infinite lights form one group, since they overlap. Each other light forms a group if there are few lights; with
 //! many lights, subtrees of a light tree form groups. A light is chosen with the probability given by [`LightSampler`].
@@ -15,9 +16,9 @@ pub const MAX_GROUPS: usize = 8;
 /// Group of lights that are never chosen.
 const NO_GROUP: u8 = u8::MAX;
 
-/// Lights in groups.
+/// The lights in groups, as components of a mixture.
 #[derive(Clone, Debug, Default)]
-pub struct LightGroups {
+pub struct MixtureGroups {
     /// The group of each light.
     group_of: Vec<u8>,
     /// True if group 0 holds the infinite lights.
@@ -46,7 +47,7 @@ struct FixedGroup {
     table: AliasTable,
 }
 
-impl LightGroups {
+impl MixtureGroups {
     /// Divides `lights`, which `sampler` chooses from, into at most `max` (1 to [`MAX_GROUPS`]) groups.
     pub fn new(lights: &[Light], sampler: &LightSampler, max: usize) -> Self {
         let max = max.clamp(1, MAX_GROUPS);
@@ -88,7 +89,7 @@ impl LightGroups {
                 Choice::Fixed(groups.into_iter().map(fixed).collect())
             }
         };
-        LightGroups { group_of, has_infinite, choice }
+        MixtureGroups { group_of, has_infinite, choice }
     }
 
     /// Number of groups.
@@ -139,7 +140,7 @@ impl LightGroups {
         }
 
         // Mixture with the visibility cache
-        if let LightSampler::Photons(choice) = sampler {
+        if let LightSampler::VisibilityCache(choice) = sampler {
             choice.group_pmfs(ctx, |light| self.group_of(light), &mut pmfs);
         }
         pmfs
@@ -157,7 +158,7 @@ impl LightGroups {
     ) -> Option<SampledLight> {
         let of_base = |u| self.sample_base(sampler, ctx, group, group_pmf, u);
         match sampler {
-            LightSampler::Photons(choice) => {
+            LightSampler::VisibilityCache(choice) => {
                 choice.sample_group(ctx, |light| self.group_of(light) == Some(group), group_pmf, u, of_base)
             }
             LightSampler::Uniform(_) | LightSampler::Power(_) | LightSampler::Tree(_) => of_base(u),
@@ -196,7 +197,7 @@ impl LightGroups {
 mod tests {
     use super::*;
     use crate::lights::{
-        LightSamplerKind, LightSampling, LightSetBuilder, PointLight, PrimaryPhoton, SurfacePoint, VisibilityCache,
+        JobLights, LightSamplerKind, LightSetBuilder, PointLight, PrimaryPhoton, SurfacePoint, VisibilityCache,
     };
     use lumiris_numbers::math::{Bounds3, Rgb, Vec3};
     use lumiris_test_support::assert_chi_squared;
@@ -204,9 +205,9 @@ mod tests {
     use std::sync::Arc;
 
     const KINDS: [LightSamplerKind; 4] =
-        [LightSamplerKind::Uniform, LightSamplerKind::Power, LightSamplerKind::Tree, LightSamplerKind::Photons];
+        [LightSamplerKind::Uniform, LightSamplerKind::Power, LightSamplerKind::Tree, LightSamplerKind::VisibilityCache];
 
-    fn set(kind: LightSamplerKind, points: u32, infinite: u32) -> LightSampling {
+    fn set(kind: LightSamplerKind, points: u32, infinite: u32) -> JobLights {
         let mut b = LightSetBuilder::default();
         for _ in 0..infinite {
             b.add(Light::InfiniteConstant { l: Rgb::splat(0.3) });
@@ -216,7 +217,7 @@ mod tests {
             b.add(Light::Point(PointLight { p, intensity: Rgb::splat(if i == 2 { 0.0 } else { 0.5 + i as f32 }) }));
         }
         let set = b.build(&Bounds3 { min: Vec3::ZERO, max: Vec3::splat(3.0) });
-        let mut set = LightSampling::new(Arc::new(set), kind, 1);
+        let mut set = JobLights::new(Arc::new(set), kind, 1);
         // A third of the lights is visible, or all of them if there are many
         let step = if points > 90 { 1 } else { 3 };
         let at = SurfacePoint { p: Vec3::new(0.4, 0.3, 0.0), n: Vec3::Z };
@@ -232,7 +233,7 @@ mod tests {
             for (points, infinite) in [(4, 0), (4, 1), (30, 2), (100, 1), (0, 2), (1, 0)] {
                 for max in [1, 2, 5, 8] {
                     let set = set(kind, points, infinite);
-                    let groups = LightGroups::new(&set.lights, &set.sampler, max);
+                    let groups = MixtureGroups::new(&set.lights, &set.sampler, max);
                     let ctx = LightCtx::on(Vec3::new(0.4, 0.3, 0.0), Vec3::Z);
                     let pmfs = groups.pmfs(&set.sampler, &ctx);
                     assert!((pmfs.iter().sum::<f32>() - 1.0).abs() < 1e-5, "{kind:?} {pmfs:?}");
@@ -270,7 +271,7 @@ mod tests {
     fn few_lights_have_a_group_each_and_dark_ones_none() {
         for kind in KINDS {
             let set = set(kind, 5, 1);
-            let groups = LightGroups::new(&set.lights, &set.sampler, 7);
+            let groups = MixtureGroups::new(&set.lights, &set.sampler, 7);
             assert_eq!(groups.len(), 5, "{kind:?}");
             let mut seen: Vec<_> = (0..6).map(|l| groups.group_of(l)).collect();
             assert_eq!(seen.remove(3), None);
@@ -278,6 +279,6 @@ mod tests {
             assert_eq!(seen, (0..5).map(Some).collect::<Vec<_>>());
         }
         let empty = set(LightSamplerKind::Tree, 0, 0);
-        assert!(LightGroups::new(&empty.lights, &empty.sampler, 4).is_empty());
+        assert!(MixtureGroups::new(&empty.lights, &empty.sampler, 4).is_empty());
     }
 }

@@ -1,7 +1,8 @@
-//! The lights of a scene with a light sampler, groups, and the visibility cache.
+//! The lights of a render job: the lights of its scene, with the light sampler of its settings, groups, and the
+//! visibility cache.
 
-use super::groups::LightGroups;
 use super::light_sampler::{LightChoice, LightSampler};
+use super::mixture_groups::MixtureGroups;
 use super::set::LightSet;
 use crate::lights::visibility::visibility_cache::ContributingLights;
 use crate::lights::{
@@ -12,23 +13,23 @@ use lumiris_numbers::math::{Rgb, Vec3};
 use std::ops::Deref;
 use std::sync::Arc;
 
-/// Lights with their light sampler.
+/// The lights of a render job, with their light sampler.
 #[derive(Clone, Debug)]
-pub struct LightSampling {
+pub struct JobLights {
     set: Arc<LightSet>,
     /// Chooses one of them.
     pub sampler: LightSampler,
     /// Chooses among the delta lights in the same way; `None` if there are none.
     pub delta: Option<LightSampler>,
     /// The lights as components of a mixture.
-    pub groups: LightGroups,
+    pub groups: MixtureGroups,
     choice: LightChoice,
     visibility_cache: Option<Arc<VisibilityCache>>,
     /// Visibility estimated from the photons of the cache.
     learned: Option<LearnedVisibility>,
 }
 
-impl Deref for LightSampling {
+impl Deref for JobLights {
     type Target = LightSet;
 
     fn deref(&self) -> &LightSet {
@@ -36,13 +37,13 @@ impl Deref for LightSampling {
     }
 }
 
-impl LightSampling {
-    /// A sampling of the lights by `choice`, with at most `max` groups.
+impl JobLights {
+    /// Lights chosen by `choice`, with at most `max` groups.
     pub fn new(set: Arc<LightSet>, choice: impl Into<LightChoice>, max: usize) -> Self {
         let choice = choice.into();
         let sampler = LightSampler::new(choice, &set.lights, set.scene_radius);
-        let (delta, groups) = (set.delta_sampler(choice), LightGroups::new(&set.lights, &sampler, max));
-        LightSampling { set, sampler, delta, groups, choice, visibility_cache: None, learned: None }
+        let (delta, groups) = (set.delta_sampler(choice), MixtureGroups::new(&set.lights, &sampler, max));
+        JobLights { set, sampler, delta, groups, choice, visibility_cache: None, learned: None }
     }
 
     /// Changes the light sampler; the visibility cache stays.
@@ -57,7 +58,7 @@ impl LightSampling {
 
     /// Divides the lights into at most `max` groups.
     pub fn set_groups(&mut self, max: usize) {
-        self.groups = LightGroups::new(&self.set.lights, &self.sampler, max);
+        self.groups = MixtureGroups::new(&self.set.lights, &self.sampler, max);
     }
 
     /// Sets the visibility cache. Estimates remain unbiased for any content. Lights without power and unknown ids are
@@ -244,12 +245,12 @@ mod tests {
         LightChoice { kind: LightSamplerKind::Power, infinite_fraction: None, volumes: false },
         LightChoice { kind: LightSamplerKind::Tree, infinite_fraction: None, volumes: false },
         LightChoice { kind: LightSamplerKind::Tree, infinite_fraction: Some(0.125), volumes: false },
-        LightChoice { kind: LightSamplerKind::Photons, infinite_fraction: None, volumes: false },
-        LightChoice { kind: LightSamplerKind::Photons, infinite_fraction: Some(0.9), volumes: false },
+        LightChoice { kind: LightSamplerKind::VisibilityCache, infinite_fraction: None, volumes: false },
+        LightChoice { kind: LightSamplerKind::VisibilityCache, infinite_fraction: Some(0.9), volumes: false },
     ];
 
     /// A set with photons of some lights around (0.4, 0.3, 0); lights with greater ids have more photons.
-    fn with_cache(builder: LightSetBuilder, kind: LightChoice, seen: &[LightId]) -> LightSampling {
+    fn with_cache(builder: LightSetBuilder, kind: LightChoice, seen: &[LightId]) -> JobLights {
         let mut set = sampling(builder, kind, &bounds());
         let at = Vec3::new(0.4, 0.3, 0.0);
         let at = SurfacePoint { p: at, n: Vec3::Z };
@@ -259,8 +260,8 @@ mod tests {
         set
     }
 
-    fn sampling(builder: LightSetBuilder, kind: impl Into<LightChoice>, bounds: &Bounds3) -> LightSampling {
-        LightSampling::new(Arc::new(builder.build(bounds)), kind, 1)
+    fn sampling(builder: LightSetBuilder, kind: impl Into<LightChoice>, bounds: &Bounds3) -> JobLights {
+        JobLights::new(Arc::new(builder.build(bounds)), kind, 1)
     }
 
     fn quad(z: f32) -> Shape {
@@ -274,7 +275,7 @@ mod tests {
         b.add_area(7, &quad(3.0), &Emission::constant(Rgb::splat(5.0)));
         b.add_area(3, &quad(2.0), &Emission::constant(Rgb::BLACK));
         b.add(Light::InfiniteConstant { l: Rgb::splat(0.1) });
-        b.add(Light::Distant(DistantLight { wi: Vec3::Z, l: Rgb::WHITE }));
+        b.add(Light::Distant(DistantLight { wi: Vec3::Z, irradiance: Rgb::WHITE }));
         let texels = (0..16).map(|i| Rgb::splat(i as f32 * 0.01)).collect();
         let map = EnvironmentMap::new(texels, [4, 4], EnvironmentMapping::EqualArea, EnvironmentFilter::Bilinear);
         b.add(Light::infinite_image(Arc::new(map.unwrap()), &Affine3A::IDENTITY, 2.0));
@@ -318,7 +319,7 @@ mod tests {
         let mut builder = LightSetBuilder::default();
         builder.add_area(7, &quad(3.0), &Emission::constant(Rgb::splat(5.0)));
         builder.add(Light::InfiniteConstant { l: Rgb::splat(0.1) });
-        builder.add(Light::Distant(DistantLight { wi: Vec3::Z, l: Rgb::WHITE }));
+        builder.add(Light::Distant(DistantLight { wi: Vec3::Z, irradiance: Rgb::WHITE }));
         for (infinite_fraction, expected) in [(None, 2.0 / 3.0), (Some(0.25), 0.25), (Some(0.9375), 0.9375)] {
             let choice = LightChoice { infinite_fraction, ..LightSamplerKind::Tree.into() };
             let set = sampling(builder.clone(), choice, &bounds());

@@ -1,11 +1,11 @@
 //! Control variates of the estimates of a batch: means of r_j = h_j/p_α minus their expectations, for every component j
 //! of the mixture.
 //!
-//! The columns are defined in [`crate::direct::mixture`]. Here they cover the light groups, and the first of two lobes
-//! if BSDFs may have two; the column of the other lobe depends on these. As there, a sample with a zero unshadowed
+//! The columns are defined in [`crate::direct::mixture`]. Here they cover the groups of lights, and the first of two
+//! lobes if BSDFs may have two; the column of the other lobe depends on these. As there, a sample with a zero unshadowed
 //! integrand belongs to the component that drew it, and the density of BSDF sampling is 0 for a light sample hidden by
 //! another emitter. Columns do not depend on MIS weights: a sample with the weight 0 has the densities of both
-//! techniques.
+//! techniques. `render/control_variates.rs` fits their coefficients and subtracts them.
 
 use super::emitters::EmitterRays;
 use super::samples::{SampleColumns, Traced};
@@ -18,7 +18,7 @@ use lumiris_numbers::math::Vec3;
 
 /// Sums of the columns of all vertices.
 #[derive(Debug, Default)]
-pub(super) struct Controls {
+pub(super) struct ControlColumns {
     /// Groups, then the lobe.
     sums: Vec<[f32; MAX_COMPONENTS]>,
     /// Index of the lobe, if BSDFs may have two.
@@ -33,7 +33,7 @@ pub(super) struct Controls {
     occluded: Vec<bool>,
 }
 
-impl Controls {
+impl ControlColumns {
     /// Begins a batch: sets the columns of each vertex to the negative expectation. `scratch` must have begun the same
     /// batch.
     pub(super) fn begin(&mut self, job: &RenderJob, vertices: &Vertices<'_>, scratch: &mut Scratch) {
@@ -42,7 +42,7 @@ impl Controls {
         self.is_left_out.clear();
         self.is_left_out.resize(vertices.len(), false);
 
-        // Light groups
+        // Groups of lights
         let (lights, at) = (&job.lights, vertices.surface.lit_points());
         if let Some(light) = lights.sampler.only_light() {
             let group = lights.groups.group_of(light).unwrap_or(0);
@@ -79,7 +79,7 @@ impl Controls {
             self.parts[i as usize] = 1.0 / n_light;
         }
 
-        // Light groups
+        // Groups of lights
         let groups = &job.lights.groups;
         let group_of_only = job.lights.sampler.only_light().map(|light| groups.group_of(light));
         for (i, (sums, part)) in self.sums.iter_mut().zip(&self.parts).enumerate() {
@@ -91,10 +91,10 @@ impl Controls {
         // Lobe
         let Some(lobe) = self.lobe else { return };
         for (i, bsdf) in vertices.bsdfs.iter().enumerate() {
-            let (p_light, p_bsdf) = (samples.light.pdf[i], samples.bsdf.pdf[i]);
+            let (p_light, p_bsdf) = (samples.incident.pdf[i], samples.bsdf.pdf[i]);
             if !self.is_hidden[i] && samples.has_integrand(i, true) && p_bsdf > 0.0 {
                 let wo = vertices.surface.wo.vec3(i);
-                let p_lobe = bsdf.pdf_first_lobe(wo, samples.light.wi.vec3(i), p_bsdf);
+                let p_lobe = bsdf.pdf_first_lobe(wo, samples.incident.wi.vec3(i), p_bsdf);
                 self.sums[i][lobe] += p_lobe / (n_light * p_light + n_bsdf * p_bsdf);
             }
         }
@@ -109,7 +109,7 @@ impl Controls {
         emitters: &EmitterRays,
         vertices: &Vertices<'_>,
     ) {
-        // Light groups; rays that hit nothing belong to the group of the infinite lights
+        // Groups of lights; rays that hit nothing belong to the group of the infinite lights
         self.divide([n_light, n_bsdf], samples, false);
         let groups = &job.lights.groups;
         let infinite = job.lights.infinite.iter().find_map(|l| groups.group_of(*l));
@@ -131,7 +131,7 @@ impl Controls {
         let n = self.sums.len();
         self.parts.resize(n, 0.0);
         let alone = if by_light { 1.0 / n_light } else { 0.0 };
-        let (p_light, p_bsdf) = (&samples.light.pdf[..n], &samples.bsdf.pdf[..n]);
+        let (p_light, p_bsdf) = (&samples.incident.pdf[..n], &samples.bsdf.pdf[..n]);
         for (i, part) in self.parts.iter_mut().enumerate() {
             let own = p_light[i] / (n_light * p_light[i] + n_bsdf * p_bsdf[i]);
             *part = if samples.has_integrand(i, by_light) & (p_light[i] > 0.0) { own } else { alone };
@@ -144,12 +144,12 @@ impl Controls {
         for (i, bsdf) in vertices.bsdfs.iter().enumerate() {
             let wo = vertices.surface.wo.vec3(i);
             let is_first = samples.u[0][i] < bsdf.first_lobe(wo);
-            let (p_light, p_bsdf) = (samples.light.pdf[i], samples.bsdf.pdf[i]);
+            let (p_light, p_bsdf) = (samples.incident.pdf[i], samples.bsdf.pdf[i]);
             let is_own = !samples.has_integrand(i, false);
-            self.sums[i][lobe] += if is_own || samples.light.is_delta[i] {
+            self.sums[i][lobe] += if is_own || samples.incident.is_delta[i] {
                 if is_first { 1.0 / n_bsdf } else { 0.0 }
             } else {
-                let wi: Vec3 = samples.light.wi.vec3(i);
+                let wi: Vec3 = samples.incident.wi.vec3(i);
                 bsdf.pdf_first_lobe(wo, wi, p_bsdf) / (n_light * p_light + n_bsdf * p_bsdf)
             };
         }
