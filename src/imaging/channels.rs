@@ -1,4 +1,5 @@
-//! Channels of images: layers by their names, and positions of the colours.
+//! Channels of images: layers by their names, and positions of the colours. `render/output.rs` names and fills the
+//! channels of a rendered image, and `render/cryptomatte.rs` those of ids.
 
 /// Adjacent channels with a common name.
 #[derive(Clone, Debug, PartialEq, Eq)]

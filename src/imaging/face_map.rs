@@ -5,7 +5,7 @@
 //! of the face into its neighbours; if an edge has no neighbour, the texels at the edge are repeated.
 
 use super::ColorEncoding;
-use super::level::NearestByte;
+use super::texels::NearestByte;
 use lumiris_formats::ptex::{Neighbor, PtexFace, PtexFile, PtexTexels};
 use lumiris_numbers::math::{Rgb, Vec2};
 

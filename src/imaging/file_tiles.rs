@@ -2,8 +2,8 @@
 
 use super::ColorEncoding;
 use super::file::ImageError;
-use super::level::{Level, Texels, Tiled};
 use super::oiio::FilePyramid;
+use super::texels::{Level, Texels, Tiled};
 use super::tiles::{TILE, TileStore};
 use std::sync::Arc;
 

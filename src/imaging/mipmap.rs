@@ -7,8 +7,8 @@
 
 use super::file::ImageError;
 use super::file_tiles::FileTexels;
-use super::level::{Level, NearestByte, Texels, exact_bytes};
 use super::oiio::FilePyramid;
+use super::texels::{Level, NearestByte, Texels, exact_bytes};
 use super::tiles::TileStore;
 use super::{ColorEncoding, Image};
 use lumiris_numbers::math::{DVec2, Rgb, Vec2};

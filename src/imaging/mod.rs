@@ -2,7 +2,7 @@
 //!
 //! * Values: `image`, `channels`, [`color`], [`view_transform`], [`heat`]
 //! * Files: [`mod@file`], [`color_layers`], [`oiio`], [`file_parts`]
-//! * Lookups: [`mipmap`], `level`, [`face_map`]; texels outside memory: [`tiles`], [`texture_file`],
+//! * Lookups: [`mipmap`] (levels, and their choice by the width of a filter), `texels`, [`face_map`]; texels outside memory: [`tiles`], [`texture_file`],
 //!   `file_tiles`
 //! * Denoising and comparison: [`oidn`], [`metrics`], [`compare`]
 
@@ -16,11 +16,11 @@ pub mod file_parts;
 mod file_tiles;
 pub mod heat;
 mod image;
-mod level;
 pub mod metrics;
 pub mod mipmap;
 pub mod oidn;
 pub mod oiio;
+mod texels;
 pub mod texture_file;
 pub mod tiles;
 pub mod view_transform;

@@ -2,8 +2,8 @@
 
 use super::layout::{CHECKSUM, DIRECTORIES, Layout};
 use super::write::write_texture;
-use crate::imaging::level::{Level, Texels, Tiled};
 use crate::imaging::mipmap::{Filter, MipMap, Wrap};
+use crate::imaging::texels::{Level, Texels, Tiled};
 use crate::imaging::tiles::{TILE, TileStore};
 use std::fs::File;
 use std::io::{self, ErrorKind};

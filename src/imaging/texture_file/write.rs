@@ -2,8 +2,8 @@
 
 use super::directories::directories;
 use super::layout::{DIRECTORIES, Layout};
-use crate::imaging::level::{Level, Texels};
 use crate::imaging::mipmap::MipMap;
+use crate::imaging::texels::{Level, Texels};
 use crate::imaging::tiles::TILE;
 use std::io::{self, Write};
 

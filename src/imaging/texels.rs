@@ -1,4 +1,5 @@
-//! A level of an image pyramid: pixels as bytes or floats, in memory or in tiles.
+//! Storage of one level of an image pyramid: texels as bytes or floats, in memory or in tiles. [`super::mipmap`] makes
+//! the levels and chooses among them.
 
 use super::image::Image;
 use super::tiles::{TILE, TileStore};
