@@ -11,7 +11,7 @@ use std::sync::atomic::AtomicBool;
 
 /// The integrator of the settings. `cameras` gives the camera samples that preparations trace; `stop` ends preparations
 /// early.
-pub fn integrator<'a>(
+pub fn make_integrator<'a>(
     job: &'a RenderJob,
     cameras: Cameras<'_>,
     stop: &'a AtomicBool,

@@ -11,7 +11,7 @@
 //!
 //! In a half-space of albedo 1, a walk has more than n events with a probability ~ n^(−1/2). Russian roulette that
 //! continues from event n to n + 1 with probability √(1 − 1/n) balances cost and weight: the means of both grow like
-//! log n.
+//! log n. Roulette at vertices is in `roulette`.
 
 use super::domain;
 use super::path_state::{BsdfTechnique, PathState, TracedPath};

@@ -33,7 +33,7 @@ mod statistics;
 mod vertex_search;
 
 pub use camera_sample::{CameraSample, CameraSamples};
-pub use choice::integrator;
+pub use choice::make_integrator;
 pub use integrator::{Cameras, Integrator, Tracer};
 pub use irradiance_cache::{CacheIntegrator, IrradianceCache};
 pub use path::{PathIntegrator, PathTracer};

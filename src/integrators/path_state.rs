@@ -1,7 +1,7 @@
 //! The state of a path between two vertices, and the MIS weight of an emitter that its segment hits.
 
 use super::domain;
-use super::light_paths::{Chain, Guide};
+use super::light_paths::{Chain, LightPathGuide};
 use crate::accel::{Hit, RayBatch};
 use crate::direct::{Techniques, Vertices};
 use crate::film::{FeatureSet, Features};
@@ -102,7 +102,7 @@ impl PathState {
         job: &RenderJob,
         left: &LastVertices<'_, '_>,
         interaction: &SurfaceInteraction,
-        guide: Option<&Guide>,
+        guide: Option<&LightPathGuide>,
     ) -> Rgb {
         let lights = &job.lights;
         if interaction.hit.instance != Hit::NO_INSTANCE {

@@ -3,7 +3,7 @@
 use super::camera_sample::CameraSamples;
 use super::domain;
 use super::light_layers::LayerSums;
-use super::light_paths::{Chain, Guide};
+use super::light_paths::{Chain, LightPathGuide};
 use super::path_state::{LastVertices, PathState, Paths, TracedPath};
 use super::recording::Recording;
 use super::statistics::PathStats;
@@ -78,7 +78,7 @@ pub(super) struct VertexSearch {
     /// Sums per light group.
     pub(super) layers: LayerSums,
     /// Guide of the light paths, if light paths contribute.
-    pub(super) guide: Option<Arc<Guide>>,
+    pub(super) guide: Option<Arc<LightPathGuide>>,
     /// Copies of the traced rays, if requested.
     pub(super) recording: Option<Recording>,
 }

@@ -55,7 +55,8 @@ const CLOUD_CELLS: usize = 16;
 const CLOUD_POINTS: usize = 3;
 /// Margin of the estimated maximum density: a factor, and the minimum bound.
 const CLOUD_MARGIN: [f32; 2] = [1.25, 0.05];
-/// Weight of a shadow segment below which Russian roulette applies, and its survival probability.
+/// Weight of a shadow segment below which Russian roulette applies, and its survival probability. Roulette of paths is
+/// in `integrators/roulette.rs`.
 const FAINT: [f32; 2] = [0.1, 0.25];
 
 impl Heterogeneous {

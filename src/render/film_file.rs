@@ -50,7 +50,7 @@ impl FilmFile {
         let notes = asked.notes(storage.plan, &job.world.scene.camera);
         let mut header = FilmHeader::new(job, settings, spp, fingerprint, [described, notes]);
         if let Some(stored) = &storage.stored {
-            check_kinship(stored, &header)?;
+            check_resumable(stored, &header)?;
             // A stored plan is not measured again
             let plan = stored.header.note(PLAN_NOTE).filter(|_| header.note(PLAN_NOTE).is_none());
             header.notes.extend(plan.map(|text| (PLAN_NOTE.to_owned(), text.to_owned())));
@@ -88,7 +88,7 @@ impl FilmFile {
 }
 
 /// Fails if the stored sums belong to another scene or to other settings.
-fn check_kinship(stored: &Stored, header: &FilmHeader) -> Result<(), PartError> {
+fn check_resumable(stored: &Stored, header: &FilmHeader) -> Result<(), PartError> {
     let differences = stored.header.differences_of_rendering(header);
     if differences.is_empty() {
         return Ok(());

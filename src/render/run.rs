@@ -18,7 +18,7 @@ use crate::film::{FeatureSet, Film, FilmTile, PixelBounds};
 use crate::imaging::tiles::TileStore;
 use crate::integrators::camera_samples::CameraSampler;
 use crate::integrators::cells::REPLICA_CELL;
-use crate::integrators::{PathStats, Statistics, integrator, light_layers, reuse};
+use crate::integrators::{PathStats, Statistics, light_layers, make_integrator, reuse};
 use crate::planning::processor_time;
 use crate::scene::{FilmSettings, RenderJob};
 use rayon::prelude::*;
@@ -100,7 +100,7 @@ impl<'a> Run<'a> {
         let tells_noise = tells_noise || watch.is_some() || passes.is_some();
         let seed = self.job.settings().sampling.seed;
         let cameras = |pixel, sample| self.camera.sample_of_seed(pixel, sample, seed);
-        let mut integrator = integrator(self.job, &cameras, self.stop)?;
+        let mut integrator = make_integrator(self.job, &cameras, self.stop)?;
         let mut tiles = self.tiles(stored, cells)?;
 
         let end = self.end();

@@ -7,12 +7,12 @@ pub(in crate::integrators) struct Chain {
     /// direction (1/(m² sr), projected). 0 if light paths cannot sample the path.
     density: f32,
     /// True if the path has hit metal or glass.
-    is_bundled: bool,
+    passes_metal_or_glass: bool,
 }
 
 impl Chain {
     /// A path that light paths cannot sample.
-    pub(in crate::integrators) const NONE: Chain = Chain { density: 0.0, is_bundled: false };
+    pub(in crate::integrators) const NONE: Chain = Chain { density: 0.0, passes_metal_or_glass: false };
 
     /// At a first vertex. `cos` is the cosine between the camera ray and the geometric normal, `width` the pixel width.
     #[inline]
@@ -35,7 +35,7 @@ impl Chain {
     #[inline]
     #[must_use]
     pub(in crate::integrators) fn bundled(self) -> Self {
-        Chain { is_bundled: true, ..self }
+        Chain { passes_metal_or_glass: true, ..self }
     }
 
     /// True if light paths may sample the path, depending on its next vertices.
@@ -47,10 +47,10 @@ impl Chain {
     /// True if light paths can sample an emitter hit at the next vertex.
     #[inline]
     pub(in crate::integrators) fn is_caustic(&self) -> bool {
-        self.is_open() && self.is_bundled
+        self.is_open() && self.passes_metal_or_glass
     }
 
-    /// MIS weight of the camera path, where light paths have the density `of_light` ([`super::Guide::density`]).
+    /// MIS weight of the camera path, where light paths have the density `of_light` ([`super::LightPathGuide::density`]).
     #[inline]
     pub(in crate::integrators) fn camera_weight(&self, of_light: f32) -> f32 {
         1.0 - light_weight(of_light, self.density)

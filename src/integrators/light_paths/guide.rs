@@ -29,13 +29,13 @@ pub(super) struct Emitted {
     pub(super) d: Vec3,
     /// Power (W) if the image had only this light path.
     pub(super) power: Rgb,
-    /// See [`Guide::density`].
+    /// See [`LightPathGuide::density`].
     pub(super) density: f32,
 }
 
 /// Distribution of the first segments of light paths.
 #[derive(Clone, Debug)]
-pub(in crate::integrators) struct Guide {
+pub(in crate::integrators) struct LightPathGuide {
     lights: LightDistribution,
     /// Table of each light.
     group_of: Vec<u16>,
@@ -54,7 +54,7 @@ pub(super) struct Contributions {
     of_direction: Vec<f64>,
 }
 
-impl Guide {
+impl LightPathGuide {
     /// The first guide of a pilot: lights in proportion to power, and uniform directions. `None` without area lights.
     pub(super) fn everywhere(set: &LightSet, paths: u32) -> Option<Self> {
         let sources = set.sources();
@@ -78,7 +78,7 @@ impl Guide {
             _ => 0.0,
         };
         let rates = (0..set.lights.len() as LightId).map(rate).collect();
-        Some(Guide { lights, group_of, tables, rates, paths })
+        Some(LightPathGuide { lights, group_of, tables, rates, paths })
     }
 
     /// The same distribution with another number of paths.
@@ -86,8 +86,8 @@ impl Guide {
     pub(in crate::integrators) fn with_paths(&self, paths: u32) -> Self {
         let factor = paths as f32 / self.paths as f32;
         let rates = self.rates.iter().map(|rate| rate * factor).collect();
-        let Guide { lights, group_of, tables, .. } = self.clone();
-        Guide { lights, group_of, tables, rates, paths }
+        let LightPathGuide { lights, group_of, tables, .. } = self.clone();
+        LightPathGuide { lights, group_of, tables, rates, paths }
     }
 
     /// Empty contributions.
@@ -214,7 +214,7 @@ mod tests {
     #[test]
     fn light_paths_carry_the_power_of_all_lights_with_an_area() {
         let set = lights();
-        let guide = Guide::everywhere(&set, 1).unwrap();
+        let guide = LightPathGuide::everywhere(&set, 1).unwrap();
         let power: f32 = (1..4).map(|light| power(&set, light)).sum();
         let mut s = pcg32([1, 2, 3]);
         let mut moments = Moments::default();
@@ -228,7 +228,7 @@ mod tests {
     #[test]
     fn learned_light_paths_have_their_density() {
         let set = lights();
-        let all = Guide::everywhere(&set, 1000).unwrap();
+        let all = LightPathGuide::everywhere(&set, 1000).unwrap();
         let mut contributions = all.begin();
         for (light, d, value) in [(1, v(0.3, 0.2, -0.9), 1.0), (1, v(-0.5, 0.1, -0.4), 0.5), (2, v(0.1, 0.9, 0.4), 2.0)]
         {

@@ -1,6 +1,6 @@
 //! Contributions of light paths to the pixels, for some steps of share groups.
 
-use super::guide::Guide;
+use super::guide::LightPathGuide;
 use super::per_sample::per_sample;
 use super::pilot::LightPilot;
 use super::trace::{CameraConnection, PathBatch, Scene, batches, trace};
@@ -31,7 +31,7 @@ struct Entry {
 /// The contributions of light paths to the pixels of an image.
 #[derive(Debug)]
 pub(in crate::integrators) struct LightImage {
-    pub(in crate::integrators) guide: Arc<Guide>,
+    pub(in crate::integrators) guide: Arc<LightPathGuide>,
     bounds: PixelBounds,
     /// Number of steps so far.
     served: u32,

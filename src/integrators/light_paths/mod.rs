@@ -30,7 +30,7 @@ mod pilot;
 mod trace;
 
 pub(super) use chain::Chain;
-pub(super) use guide::Guide;
+pub(super) use guide::LightPathGuide;
 pub(super) use image::LightImage;
 pub use per_sample::per_sample;
 pub use pilot::LightPilot;

@@ -1,6 +1,6 @@
 //! The pilot that learns the emission of useful light paths, and estimates their variance and time.
 
-use super::guide::Guide;
+use super::guide::LightPathGuide;
 use super::trace::{PathBatch, Scene, Walker, batches, trace};
 use crate::integrators::exclusions::{self, Feature};
 use crate::integrators::statistics::LightPathStats;
@@ -21,7 +21,7 @@ const ROUNDS: u32 = 2;
 /// Results of the pilot.
 #[derive(Debug)]
 pub struct LightPilot {
-    pub(super) guide: Guide,
+    pub(super) guide: LightPathGuide,
     pub(super) stats: LightPathStats,
     /// Light paths of the last round that reach the camera: squared unweighted contribution, and density relative to
     /// the density of a camera sample.
@@ -45,7 +45,7 @@ impl LightPilot {
         let mut stats = LightPathStats::default();
 
         // Locate metal and glass
-        let everywhere = Guide::everywhere(set, rays as u32)?;
+        let everywhere = LightPathGuide::everywhere(set, rays as u32)?;
         let mut bundling = everywhere.begin();
         let scene = Scene::new(job, &everywhere);
         let of_batch = |walker: &mut Walker, batch: PathBatch| {
@@ -87,7 +87,7 @@ impl LightPilot {
     }
 
     /// The learned distribution of light paths.
-    pub(in crate::integrators) fn guide(&self) -> &Guide {
+    pub(in crate::integrators) fn guide(&self) -> &LightPathGuide {
         &self.guide
     }
 

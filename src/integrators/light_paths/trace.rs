@@ -1,7 +1,7 @@
 //! Light paths over metal and glass to surfaces visible to the camera, a batch at a time.
 
 use super::chain::{camera_density, light_weight};
-use super::guide::{Emitted, Guide};
+use super::guide::{Emitted, LightPathGuide};
 use crate::accel::{Coherence, Hit, RayBatch};
 use crate::film::filter::FilterSampler;
 use crate::integrators::statistics::LightPathStats;
@@ -28,7 +28,7 @@ struct LightPath {
     power: Rgb,
     stream: SampleStream,
     light: LightId,
-    /// Direction at the light, and density of the emission ([`Guide::density`]).
+    /// Direction at the light, and density of the emission ([`LightPathGuide::density`]).
     d: Vec3,
     density: f32,
 }
@@ -63,12 +63,12 @@ pub(super) struct Walker {
 /// Common data of all light paths.
 pub(super) struct Scene<'a> {
     pub(super) job: &'a RenderJob,
-    pub(super) guide: &'a Guide,
+    pub(super) guide: &'a LightPathGuide,
     pub(super) filter: FilterSampler,
 }
 
 impl<'a> Scene<'a> {
-    pub(super) fn new(job: &'a RenderJob, guide: &'a Guide) -> Self {
+    pub(super) fn new(job: &'a RenderJob, guide: &'a LightPathGuide) -> Self {
         Scene { job, guide, filter: job.world.scene.film.filter.sampler() }
     }
 }
@@ -82,7 +82,7 @@ impl Walker {
         self.active.clear();
         self.active.extend(paths.filter_map(|path| emit(scene, path_stream(seed, path))));
         // The last scattering event is the connection to the camera. Paths with one more event are left to camera paths
-        for bundled in 0..job.settings().integrator.depth().saturating_sub(1) {
+        for scattered in 0..job.settings().integrator.depth().saturating_sub(1) {
             self.rays.set(self.active.iter().map(|path| &path.ray));
             job.world.accel.intersect(&self.rays, Coherence::Incoherent, &mut self.hits);
             self.traced += self.active.len() as u64;
@@ -92,11 +92,11 @@ impl Walker {
                 let interaction = SurfaceInteraction::new(job, &path.ray, 0.0, 0.0, hit);
                 let Some(bsdf) = interaction.scatter(job) else { continue };
                 if bsdf.makes_caustics {
-                    self.next.extend(path.scattered(&interaction, &bsdf, VERTEX + bundled));
+                    self.next.extend(path.scattered(&interaction, &bsdf, VERTEX + scattered));
                 }
                 // A mixture may be metal for the light and another surface for the camera
                 let may_connect = !bsdf.makes_caustics || interaction.is_mixture(job);
-                if bundled > 0
+                if scattered > 0
                     && may_connect
                     && let Some((connection, segment)) = path.connect(scene, &interaction)
                 {

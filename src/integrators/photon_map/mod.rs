@@ -13,10 +13,10 @@
 //! density estimation is consistent. Bounces are counted from the vertex that looks up the maps, not counting mirrors
 //! before.
 //!
-//! Reading order: [`maps`], `boundary`, [`mod@guide`], `lookups`, `photon_map_integrator`.
+//! Reading order: [`maps`], `boundary`, [`gather_guide`], `lookups`, `photon_map_integrator`.
 
 mod boundary;
-pub mod guide;
+pub mod gather_guide;
 mod lookups;
 pub mod maps;
 mod photon_map_integrator;

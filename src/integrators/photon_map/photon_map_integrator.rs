@@ -1,6 +1,6 @@
 //! The integrator with photon maps.
 
-use super::guide::{Guide, GuidePhoton};
+use super::gather_guide::{GatherGuide, GuidePhoton};
 use super::lookups::Lookups;
 use super::maps::{self, MapMaker, PhotonMaps};
 use crate::cameras::CameraRay;
@@ -8,6 +8,7 @@ use crate::direct::{Estimator, Fits};
 use crate::film::{FeatureSet, PixelSample};
 use crate::integrators::camera_sample::{CameraSample, CameraSamples};
 use crate::integrators::diffuse;
+use crate::integrators::domain;
 use crate::integrators::integrator::{Cameras, Integrator, Tracer};
 use crate::integrators::path::{AtVertices, PathTracer};
 use crate::integrators::statistics::{PathStats, Statistics};
@@ -19,8 +20,6 @@ use lumiris_numbers::math::{Frame, Ray, Rgb};
 use std::f32::consts::FRAC_1_PI;
 use std::sync::atomic::AtomicBool;
 
-/// Random-number domain of the final gather at a vertex.
-const GATHER: u32 = 4;
 /// Number of photons that guide the directions of a gather.
 const GUIDES: u32 = 32;
 
@@ -134,7 +133,7 @@ impl PhotonMapTracer<'_> {
             let frame = Frame::from_z(request.point.ns);
             let guide = guide(self.maps, &request.point, &frame, fraction, &mut self.lookups.scratch);
             for i in 0..count {
-                let stream = request.stream.split(GATHER, count, i);
+                let stream = request.stream.split(domain::GATHER, count, i);
                 let [u_choice, u0, u1] = stream.draw::<3>();
                 let w = guide.sample(u_choice, [u0, u1]);
                 let pdf = guide.pdf(w);
@@ -164,7 +163,13 @@ impl PhotonMapTracer<'_> {
 }
 
 /// A guide from the photons around a vertex.
-fn guide(maps: &PhotonMaps, point: &GatherPoint, frame: &Frame, fraction: f32, scratch: &mut GatherScratch) -> Guide {
+fn guide(
+    maps: &PhotonMaps,
+    point: &GatherPoint,
+    frame: &Frame,
+    fraction: f32,
+    scratch: &mut GatherScratch,
+) -> GatherGuide {
     let mut photons = Vec::new();
     if fraction > 0.0 {
         let search = match maps.search {
@@ -177,5 +182,5 @@ fn guide(maps: &PhotonMaps, point: &GatherPoint, frame: &Frame, fraction: f32, s
             }
         });
     }
-    Guide::new(photons, fraction)
+    GatherGuide::new(photons, fraction)
 }

@@ -82,7 +82,7 @@ pub fn merge(paths: &[PathBuf], allows_missing: bool) -> Result<Merged, PartErro
     // The files are opened again one by one: there may be more parts than a process can have open files
     drop(readers);
     let first = parts.first().ok_or_else(|| PartError::Parts("there are no parts to merge".to_owned()))?;
-    check_kinship(&parts)?;
+    check_same_image(&parts)?;
     let samples = samples_of_all(&parts);
     let mut missing = coverage(&parts, &samples)?;
     missing.extend(parts.iter().filter(|p| !p.header.is_finished).map(|p| {
@@ -126,7 +126,7 @@ fn listed(lines: &[String]) -> String {
 }
 
 /// Fails if a part does not belong to the image of the first part.
-fn check_kinship(parts: &[Part]) -> Result<(), PartError> {
+fn check_same_image(parts: &[Part]) -> Result<(), PartError> {
     for part in &parts[1..] {
         let differences = parts[0].header.differences(&part.header);
         if !differences.is_empty() {

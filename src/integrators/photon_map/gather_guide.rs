@@ -22,12 +22,12 @@ pub struct GuidePhoton {
 
 /// A density of directions about a normal (+z).
 #[derive(Clone, Debug)]
-pub struct Guide {
+pub struct GatherGuide {
     histogram: Option<PiecewiseConstant2D>,
     fraction: f32,
 }
 
-impl Guide {
+impl GatherGuide {
     /// A guide by photons. Without photons, the density is the cosine.
     pub fn new(photons: impl IntoIterator<Item = GuidePhoton>, fraction: f32) -> Self {
         let mut cells = [0.0; CELLS * CELLS];
@@ -38,7 +38,7 @@ impl Guide {
             }
         }
         let is_lit = cells.iter().any(|&power| power > 0.0) && fraction > 0.0;
-        Guide { histogram: is_lit.then(|| PiecewiseConstant2D::new(&cells, CELLS)), fraction }
+        GatherGuide { histogram: is_lit.then(|| PiecewiseConstant2D::new(&cells, CELLS)), fraction }
     }
 
     /// A direction with z > 0, up to rounding.
