@@ -1,4 +1,5 @@
-//! The options for settings: one per row of [`lumiris::settings::table`].
+//! The options for settings: one per row of [`lumiris::settings::table`]. For example, the row of `--estimator` is in
+//! `settings/table/direct.rs`; its macro `row!` makes `set`, which writes the value into the settings.
 
 use clap::builder::{PossibleValuesParser, TypedValueParser, ValueParser};
 use clap::{Arg, ArgMatches, Args, Command, FromArgMatches};
