@@ -86,9 +86,28 @@ impl RayBatch {
 
     /// Replaces all rays by the rays `indices` of `from`.
     pub fn gather(&mut self, from: &RayBatch, indices: &[u32]) {
-        for (to, from) in self.columns_mut().into_iter().zip(from.columns()) {
+        self.gather_columns(from.columns().map(|column| &column[..]), indices);
+    }
+
+    /// Replaces all rays by rays with these origins, directions and times, and ends if not infinite.
+    pub fn gather_rows(
+        &mut self,
+        [ox, oy, oz]: [&[f32]; 3],
+        [dx, dy, dz]: [&[f32]; 3],
+        t_max: Option<&[f32]>,
+        time: &[f32],
+        rows: &[u32],
+    ) {
+        self.gather_columns([ox, oy, oz, dx, dy, dz, t_max.unwrap_or(time), time], rows);
+        if t_max.is_none() {
+            self.t_max.fill(f32::INFINITY);
+        }
+    }
+
+    fn gather_columns(&mut self, from: [&[f32]; 8], rows: &[u32]) {
+        for (to, from) in self.columns_mut().into_iter().zip(from) {
             to.clear();
-            to.extend(indices.iter().map(|&i| from[i as usize]));
+            to.extend(rows.iter().map(|&row| from[row as usize]));
         }
     }
 

@@ -83,21 +83,7 @@ impl Scatter {
 
         // Their rays
         kernels::origins(level(), &vertices.surface.ends(len), wi.get(len), &mut o.get_mut(len));
-        let ([ox, oy, oz], [dx, dy, dz]) = (o.get(len), wi.get(len));
-        let rays = &mut next.rays;
-        let columns = [
-            (&mut rays.ox, ox),
-            (&mut rays.oy, oy),
-            (&mut rays.oz, oz),
-            (&mut rays.dx, dx),
-            (&mut rays.dy, dy),
-            (&mut rays.dz, dz),
-            (&mut rays.time, &vertices.time),
-        ];
-        for (to, from) in columns {
-            to.extend(rows.iter().map(|&row| from[row as usize]));
-        }
-        rays.t_max.resize(rays.ox.len(), f32::INFINITY);
+        next.rays.gather_rows(o.get(len), wi.get(len), None, &vertices.time, rows);
     }
 
     /// Resamples M proposals at vertices whose BSDFs can only be evaluated.

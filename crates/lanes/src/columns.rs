@@ -24,6 +24,20 @@ pub fn reserve(columns: &mut [&mut Column], len: usize) {
     }
 }
 
+/// Replaces `rows` by the rows below `n` for which `is_kept` is true. There is no branch: nothing predicts which rows
+/// contribute.
+#[inline]
+pub fn select_rows(n: usize, is_kept: impl Fn(usize) -> bool, rows: &mut Vec<u32>) {
+    rows.clear();
+    rows.resize(n, 0);
+    let mut count = 0;
+    for i in 0..n {
+        rows[count] = i as u32;
+        count += usize::from(is_kept(i));
+    }
+    rows.truncate(count);
+}
+
 impl Columns3 {
     /// Extends shorter columns to `len`.
     pub fn reserve(&mut self, len: usize) {
@@ -53,6 +67,23 @@ impl Columns3 {
         self.set(i, Vec3::from_array(c.to_array()));
     }
 
+    /// Replaces the vectors `rows` by zero where `is_removed` is true; both have the same length.
+    pub fn remove(&mut self, rows: &[u32], is_removed: &[bool]) {
+        for column in &mut self.0 {
+            for (&row, &is_removed) in rows.iter().zip(is_removed) {
+                let kept = u32::from(is_removed).wrapping_sub(1);
+                column[row as usize] = f32::from_bits(column[row as usize].to_bits() & kept);
+            }
+        }
+    }
+
+    /// Adds the first `n` vectors of `other`.
+    pub fn add(&mut self, other: &Columns3, n: usize) {
+        for (sum, column) in self.0.iter_mut().zip(&other.0) {
+            sum[..n].iter_mut().zip(&column[..n]).for_each(|(sum, value)| *sum += value);
+        }
+    }
+
     /// The vector `i`.
     #[inline]
     pub fn vec3(&self, i: usize) -> Vec3 {
@@ -64,5 +95,30 @@ impl Columns3 {
     #[inline]
     pub fn rgb(&self, i: usize) -> Rgb {
         Rgb::from_array(self.vec3(i).to_array())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rows_are_selected_and_removed_in_order() {
+        let mut rows = vec![9; 7];
+        select_rows(6, |i| i % 3 != 1, &mut rows);
+        assert_eq!(rows, [0, 2, 3, 5]);
+        select_rows(4, |_| false, &mut rows);
+        assert!(rows.is_empty());
+
+        let (mut values, mut sums) = (Columns3::default(), Columns3::default());
+        values.reserve(8);
+        sums.reserve(8);
+        for i in 0..4 {
+            values.set(i, Vec3::splat(if i == 1 { f32::INFINITY } else { i as f32 }));
+            sums.set(i, Vec3::ONE);
+        }
+        values.remove(&[1, 2], &[true, false]);
+        sums.add(&values, 3);
+        assert_eq!([0, 1, 2, 3].map(|i| sums.vec3(i).x), [1.0, 1.0, 3.0, 1.0]);
     }
 }

@@ -279,21 +279,23 @@ impl ColumnDirectLighting {
         let VertexBatch { job, techniques, vertices, .. } = *batch;
         // Control variates of a light sample need its occlusion by emitters, even if its weight is 0
         let hides = round.by_light && techniques.has_controls && job.world.emitters_hide();
-        let is_traced = |samples: &SampleColumns, i: usize| {
-            !samples.c.rgb(i).is_black() || hides && samples.bsdf.pdf[i] > 0.0 && samples.has_integrand(i, true)
-        };
         let (n, len) = (round.rows, padded(round.rows));
         self.samples.make_segments(&vertices.surface, len);
-        let rows = (0..n as u32).filter(|&i| is_traced(&self.samples, i as usize));
-        self.traced.gather(rows, &self.samples, len, &vertices.time);
+        let ColumnDirectLighting { samples, traced, .. } = &mut *self;
+        let [r, g, b] = samples.c.get(n);
+        let contributes = |i: usize| (r[i] != 0.0) | (g[i] != 0.0) | (b[i] != 0.0);
+        if hides {
+            let is_hidden = |i: usize| samples.bsdf.pdf[i] > 0.0 && samples.has_integrand(i, true);
+            traced.gather(n, |i| contributes(i) || is_hidden(i), samples, &vertices.time);
+        } else {
+            traced.gather(n, contributes, samples, &vertices.time);
+        }
         let proposed = Instant::now();
         self.occlude(batch, round, stats);
         let traced_at = Instant::now();
 
-        let ColumnDirectLighting { samples, traced, radiance, .. } = &mut *self;
-        for i in traced.visible() {
-            radiance.set_rgb(i, radiance.rgb(i) + samples.c.rgb(i));
-        }
+        self.samples.c.remove(&self.traced.rows, &self.traced.occluded);
+        self.radiance.add(&self.samples.c, n);
         if let Some(visible) = &mut sinks.visible {
             for row in self.traced.visible() {
                 let light = if round.by_light { Some(self.light_of(job, row)) } else { self.emitter_rays.lights[row] };

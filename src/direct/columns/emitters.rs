@@ -8,7 +8,7 @@ use crate::direct::vertices::Vertices;
 use crate::lights::LightId;
 use crate::lights::sample_columns::LightSamples;
 use crate::scene::{EmitterHit, EmitterScratch, RenderJob};
-use lumiris_lanes::columns::padded;
+use lumiris_lanes::columns::{padded, select_rows};
 use lumiris_numbers::math::Ray;
 
 /// Rays of BSDF samples, traced against emitters only.
@@ -40,8 +40,7 @@ impl EmitterRays {
         let (at, time) = (vertices.surface.lit_points(), &vertices.time);
         lights.clear();
         lights.resize(n, None);
-        rows.clear();
-        rows.extend((0..n as u32).filter(|&i| samples.bsdf.pdf[i as usize] > 0.0));
+        select_rows(n, |i| samples.bsdf.pdf[i] > 0.0, rows);
         far.clear();
         let has_infinite = !job.lights.infinite.is_empty();
         let mut add = |samples: &mut SampleColumns, i: usize, hit: Option<EmitterHit>| {

@@ -3,7 +3,7 @@
 use crate::accel::RayBatch;
 use crate::direct::vertices::{BsdfSamples, Surface};
 use crate::lights::sample_columns::LightSamples;
-use lumiris_lanes::columns::{Column, Columns3, reserve};
+use lumiris_lanes::columns::{Column, Columns3, reserve, select_rows};
 use lumiris_lanes::level;
 use lumiris_lanes::vertex::{self as kernels, Ends, Rays};
 
@@ -79,34 +79,16 @@ pub(super) struct Traced {
 }
 
 impl Traced {
-    /// Collects the segments of the given rows; `time` is a column.
+    /// Collects the segments of the first `n` rows for which `is_traced` is true; `time` is a column.
     pub(super) fn gather(
         &mut self,
-        rows: impl Iterator<Item = u32>,
+        n: usize,
+        is_traced: impl Fn(usize) -> bool,
         samples: &SampleColumns,
-        len: usize,
         time: &[f32],
     ) {
-        let Traced { rows: index, rays, .. } = self;
-        index.clear();
-        index.extend(rows);
-        rays.clear();
-
-        // Compact each column
-        let ([ox, oy, oz], [dx, dy, dz]) = (samples.o.get(len), samples.d.get(len));
-        let columns = [
-            (&mut rays.ox, ox),
-            (&mut rays.oy, oy),
-            (&mut rays.oz, oz),
-            (&mut rays.dx, dx),
-            (&mut rays.dy, dy),
-            (&mut rays.dz, dz),
-            (&mut rays.t_max, &samples.t_max[..len]),
-            (&mut rays.time, time),
-        ];
-        for (to, from) in columns {
-            to.extend(index.iter().map(|&i| from[i as usize]));
-        }
+        select_rows(n, is_traced, &mut self.rows);
+        self.rays.gather_rows(samples.o.get(n), samples.d.get(n), Some(&samples.t_max[..n]), time, &self.rows);
     }
 
     /// Rows of the unoccluded segments.
