@@ -67,20 +67,12 @@ impl Columns3 {
         self.set(i, Vec3::from_array(c.to_array()));
     }
 
-    /// Replaces the vectors `rows` by zero where `is_removed` is true; both have the same length.
-    pub fn remove(&mut self, rows: &[u32], is_removed: &[bool]) {
-        for column in &mut self.0 {
-            for (&row, &is_removed) in rows.iter().zip(is_removed) {
-                let kept = u32::from(is_removed).wrapping_sub(1);
-                column[row as usize] = f32::from_bits(column[row as usize].to_bits() & kept);
-            }
-        }
-    }
-
-    /// Adds the first `n` vectors of `other`.
-    pub fn add(&mut self, other: &Columns3, n: usize) {
+    /// Adds the first vectors of `other` where `mask` has all bits; 0 leaves a vector as it is.
+    pub fn add_masked(&mut self, other: &Columns3, mask: &[u32]) {
         for (sum, column) in self.0.iter_mut().zip(&other.0) {
-            sum[..n].iter_mut().zip(&column[..n]).for_each(|(sum, value)| *sum += value);
+            for ((sum, value), mask) in sum.iter_mut().zip(column).zip(mask) {
+                *sum += f32::from_bits(value.to_bits() & mask);
+            }
         }
     }
 
@@ -103,7 +95,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn rows_are_selected_and_removed_in_order() {
+    fn rows_are_selected_and_added() {
         let mut rows = vec![9; 7];
         select_rows(6, |i| i % 3 != 1, &mut rows);
         assert_eq!(rows, [0, 2, 3, 5]);
@@ -117,8 +109,7 @@ mod tests {
             values.set(i, Vec3::splat(if i == 1 { f32::INFINITY } else { i as f32 }));
             sums.set(i, Vec3::ONE);
         }
-        values.remove(&[1, 2], &[true, false]);
-        sums.add(&values, 3);
+        sums.add_masked(&values, &[0, 0, u32::MAX]);
         assert_eq!([0, 1, 2, 3].map(|i| sums.vec3(i).x), [1.0, 1.0, 3.0, 1.0]);
     }
 }

@@ -114,14 +114,14 @@ fn draw_chunk<const N: usize>(
 /// Replaces streams of points with blue-noise errors by these points.
 fn blue_noise([a, _, c]: &mut Words) {
     // The samples of a pixel share their entry of the table
-    let mut last = [a[0], c[0] >> 16];
-    let mut entry = BlueNoise::of(last[0], last[1]);
-    for (a, c) in a.iter_mut().zip(c) {
-        let pixel = [*a, *c >> 16];
-        if pixel != last {
-            (last, entry) = (pixel, BlueNoise::of(pixel[0], pixel[1]));
-        }
-        (*a, *c) = (entry.seed, *c & 0xffff ^ entry.rank);
+    let mut first = 0;
+    while first < CHUNK {
+        let (block, pixel) = (a[first], c[first] >> 16);
+        let end = (first + 1..CHUNK).find(|&i| (a[i] != block) | (c[i] >> 16 != pixel)).unwrap_or(CHUNK);
+        let entry = BlueNoise::of(block, pixel);
+        a[first..end].fill(entry.seed);
+        c[first..end].iter_mut().for_each(|c| *c = *c & 0xffff ^ entry.rank);
+        first = end;
     }
 }
 

@@ -294,8 +294,7 @@ impl ColumnDirectLighting {
         self.occlude(batch, round, stats);
         let traced_at = Instant::now();
 
-        self.samples.c.remove(&self.traced.rows, &self.traced.occluded);
-        self.radiance.add(&self.samples.c, n);
+        self.radiance.add_masked(&self.samples.c, self.traced.mask(n));
         if let Some(visible) = &mut sinks.visible {
             for row in self.traced.visible() {
                 let light = if round.by_light { Some(self.light_of(job, row)) } else { self.emitter_rays.lights[row] };
@@ -317,7 +316,7 @@ impl ColumnDirectLighting {
     /// stay there.
     fn occlude(&mut self, batch: &VertexBatch<'_, '_>, round: Round, stats: &mut DirectStats) {
         let VertexBatch { job, vertices, .. } = *batch;
-        let Traced { rows, rays, occluded, crossing, some_rays, some_occluded } = &mut self.traced;
+        let Traced { rows, rays, occluded, crossing, some_rays, some_occluded, .. } = &mut self.traced;
 
         // Segments that may pass surfaces or media
         let crosses = |row: u32| job.shadows_pass() || vertices.media(row as usize) != Sides::default();

@@ -71,6 +71,8 @@ pub(super) struct Traced {
     pub(super) rows: Vec<u32>,
     pub(super) rays: RayBatch,
     pub(super) occluded: Vec<bool>,
+    /// See [`Self::mask`].
+    mask: Vec<u32>,
     /// Indices of the segments that may pass surfaces or media.
     pub(super) crossing: Vec<u32>,
     /// Copies of some of the segments, and their occlusion.
@@ -89,6 +91,16 @@ impl Traced {
     ) {
         select_rows(n, is_traced, &mut self.rows);
         self.rays.gather_rows(samples.o.get(n), samples.d.get(n), Some(&samples.t_max[..n]), time, &self.rows);
+    }
+
+    /// The mask of the first `n` rows: all bits at those with an unoccluded segment, else 0.
+    pub(super) fn mask(&mut self, n: usize) -> &[u32] {
+        self.mask.clear();
+        self.mask.resize(n, 0);
+        for (&row, &is_occluded) in self.rows.iter().zip(&self.occluded) {
+            self.mask[row as usize] = u32::from(is_occluded).wrapping_sub(1);
+        }
+        &self.mask
     }
 
     /// Rows of the unoccluded segments.
