@@ -9,7 +9,7 @@ use lumiris::bsdfs::{
 };
 use lumiris::lights::{EnvironmentFilter, EnvironmentMap, EnvironmentMapping};
 use lumiris::lights::{Light, LightCtx, LightLanes, PointLight};
-use lumiris::materials::surface::SurfaceBsdf;
+use lumiris::materials::SurfaceBsdf;
 use lumiris_lanes::curve::{hilbert_points, hilbert_points_scalar, strata, strata_scalar};
 use lumiris_lanes::ris_weights::{Proposals, Weights, weigh};
 use lumiris_numbers::estimators::heuristics::Heuristic;

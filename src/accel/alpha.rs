@@ -1,5 +1,5 @@
-//! Alpha masks: decides whether a hit on a geometry with an alpha texture stops a ray. [`AlphaTest::stops`] is called by
-//! `embree/callbacks.rs` and `bvh/walk.rs` during the traversal, so hits that do not stop a ray never leave a tracer.
+//! Alpha masks: decides whether a hit on a geometry with an alpha texture stops a ray. `embree/callbacks.rs` and
+//! `bvh/walk.rs` call [`AlphaTest::stops`] during the traversal, so hits that do not stop a ray never leave a tracer.
 
 use super::ray_tracer::Hit;
 use crate::geometry::{AlphaSource, GeometrySet};

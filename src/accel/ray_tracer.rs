@@ -166,8 +166,8 @@ impl Hit {
     /// `instance` of hits in the root group.
     pub const NO_INSTANCE: u32 = crate::geometry::NO_INSTANCE;
 
-    /// True if this is the first of two hits of a ray: by t, and for equal t by (instance, geometry, primitive). Applied
-    /// by both tracers, so that coincident surfaces do not depend on the order of traversal.
+    /// True if this is the first of two hits of a ray: by t, and for equal t by (instance, geometry, primitive).
+    /// Applied by both tracers, so that coincident surfaces do not depend on the order of traversal.
     #[inline]
     pub fn precedes(&self, other: &Hit) -> bool {
         let key = |h: &Hit| (h.instance, h.geometry, h.primitive);

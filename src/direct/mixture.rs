@@ -142,8 +142,8 @@ impl Mixture {
     }
 }
 
-/// Draws the light samples of a point separately for each group of lights. A group gets N times its probability, rounded by
-/// one random number for all groups. Returns the mixture at the point.
+/// Draws the light samples of a point separately for each group of lights. A group gets N times its probability,
+/// rounded by one random number for all groups. Returns the mixture at the point.
 pub(super) fn draw_groups(
     job: &RenderJob,
     index: u32,

@@ -1,5 +1,5 @@
-//! Sums as bytes, little-endian, without zero bytes at both ends of a number. With a few hundred samples per pixel, a
-//! film takes about half of its memory.
+//! Sums as bytes for the files of `render/parts`, little-endian, without zero bytes at both ends of a number.
+//! With a few hundred samples per pixel, a film takes about half of its memory.
 //!
 //! A number begins with a byte: its five lower bits are the number of the following bytes, its three upper bits the
 //! number of pairs of zero bytes below them. A signed number is doubled, and odd if negative.

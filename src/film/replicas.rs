@@ -4,6 +4,8 @@
 //! In each square of k × k pixels, the seed of the image determines one pixel. k is 8 in large images, and less in
 //! small ones. So replicas are spread evenly, and differ between seeds.
 //!
+//! `render/tiles.rs` decides whether an image has replicas, and `render/tile_samples.rs` adds their samples.
+//!
 //! Light paths are traced for the whole image, so a replica shares the light paths of its pixel. Their contribution has
 //! a random sign in the mean of the replica, which stands for the difference ([`PixelSample::offset`]), and no sign in
 //! the spread of its samples.

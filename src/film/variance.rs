@@ -14,9 +14,11 @@
 //! of many bounces. So replicas are partitioned by position in the image and by level, the logarithm of s²/N averaged
 //! over 3 × 3 pixels to reduce noise. A set is split at the middle of its longest dimension as long as both parts have
 //! enough replicas.
+//!
+//! `render/output.rs` writes these variances; the noise of an image ([`super::image_noise`]) follows from them.
 
 use super::pixel::PixelSums;
-use super::tiles::Film;
+use super::tiled_film::Film;
 use super::variance_scale::{Position, ReplicaVariance, VarianceScale};
 use rayon::prelude::*;
 use std::ops::Range;

@@ -2,8 +2,8 @@
 //!
 //! * Values: `image`, `channels`, [`color`], [`view_transform`], [`heat`]
 //! * Files: [`mod@file`], [`color_layers`], [`oiio`], [`file_parts`]
-//! * Lookups: [`mipmap`] (levels, and their choice by the width of a filter), `texels`, [`face_map`]; texels outside memory: [`tiles`], [`texture_file`],
-//!   `file_tiles`
+//! * Lookups: [`mipmap`] (levels, and their choice by the width of a filter), `texels`, [`face_map`]; texels outside
+//!   memory: [`tiles`], [`texture_file`], `file_tiles`
 //! * Denoising and comparison: [`oidn`], [`metrics`], [`compare`]
 
 mod channels;

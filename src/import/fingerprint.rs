@@ -1,4 +1,5 @@
 //! The fingerprint of a scene: a hash of the contents of all its files, independent of their location.
+//! `render/parts/header.rs` compares it.
 
 use lumiris_formats::source::SourceMap;
 use rayon::prelude::*;

@@ -1,4 +1,4 @@
-//! Units of the punctual lights of glTF scenes.
+//! Units of the punctual lights of glTF scenes, which `gltf/assemble.rs` applies.
 
 use strum::{EnumString, IntoStaticStr, VariantNames};
 

@@ -1,6 +1,6 @@
 //! Russian roulette of camera paths, applied by `scatter` to each next segment. Elsewhere: `interior` has roulette of
-//! walks through the interiors of materials, `media/heterogeneous.rs` of faint shadow segments, and `photons/walk.rs` of
-//! photons.
+//! walks through the interiors of materials, `media/heterogeneous.rs` of faint shadow segments, and `photons/walk.rs`
+//! of photons.
 
 use super::domain;
 use crate::settings::IntegratorSettings;

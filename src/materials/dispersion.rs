@@ -8,6 +8,8 @@
 //! The responses are those of the CIE 1931 observer to D65 in Rec.709, without their negative parts. Monochromatic
 //! colours are outside of Rec.709, and are therefore rendered less saturated. As everywhere, the spectra of lights and
 //! reflectances within a channel are treated as constant.
+//!
+//! `integrators/vertex_search.rs` samples the wavelength of a path at its first dispersive surface.
 
 use lumiris_formats::spectra::{Spectrum, white_responses};
 use lumiris_numbers::math::{PiecewiseConstant1D, Rgb};

@@ -11,6 +11,8 @@
 //! light that leaves over the flux ∫ S μ dμ of the light that entered: 0 for α = 0, 1 for α = 1, and monotone between.
 //! It excludes the reflection of the boundary on the outside. A phase function of asymmetry g is equivalent to an
 //! isotropic one with (1 − g) σ_s, by the similarity relation [van de Hulst 1980].
+//!
+//! Called by `import/pbrt/subsurface.rs` to turn a reflectance into an interior. `integrators/interior.rs` walks there.
 
 use crate::bsdfs::fresnel::fr_dielectric;
 

@@ -1,9 +1,9 @@
 //! All materials of a scene, and the BSDF at a hit.
 
-use super::bump;
 use super::material::{Material, MaterialEntry, MaterialId};
 use super::parameters::{Coat, Textures, distribution_of, valid_eta};
-use super::surface::SurfaceBsdf;
+use super::shading_frame::shading_frame;
+use super::surface_bsdf::SurfaceBsdf;
 use crate::bsdfs::{
     Base, Bsdf, CoatTable, CoatedDiffuse, Dielectric, Diffuse, DiffuseTransmission, Evaluated, Measured,
     MeasuredTables, ProposalDensity, ThinDielectric, TrowbridgeReitz,
@@ -177,7 +177,7 @@ impl MaterialSet {
         let entry = &self.entries[id as usize];
         let t = Textures { set: textures, ctx };
         let bsdf = self.local_bsdf(id, &t)?;
-        let frame = bump::shading_frame(entry, textures, hit, ctx);
+        let frame = shading_frame(entry, textures, hit, ctx);
         let frame = match &entry.material {
             Material::Principled(material) => material.frame(frame, hit.dpdv, &t),
             _ => frame,

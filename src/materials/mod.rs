@@ -1,9 +1,10 @@
 //! Materials: evaluate textures at a hit and build the BSDF in its shading frame. The semantics are those of pbrt-v4.
+//! [`SurfaceInteraction::scatter`](crate::scene::SurfaceInteraction::scatter) calls [`MaterialSet::bsdf`] at each hit.
 //!
 //! Reading order: [`parameters`], [`dispersion`], [`evaluated`], [`hair`], [`principled`], [`material`] (all kinds),
-//! [`bump`], [`surface`], [`material_set`]; [`half_space`] computes the reflectance of an interior.
+//! [`shading_frame`] (normal maps, bumps), [`surface_bsdf`], [`material_set`]; [`half_space`] computes the reflectance
+//! of an interior.
 
-pub mod bump;
 pub mod dispersion;
 pub mod evaluated;
 pub mod hair;
@@ -12,7 +13,8 @@ pub mod material;
 pub mod material_set;
 pub mod parameters;
 pub mod principled;
-pub mod surface;
+pub mod shading_frame;
+pub mod surface_bsdf;
 
 pub use dispersion::Dispersion;
 pub use evaluated::EvaluatedMaterial;
@@ -22,4 +24,4 @@ pub use material::{Material, MaterialEntry, MaterialId, NormalMap};
 pub use material_set::MaterialSet;
 pub use parameters::{Coat, ConductorSpectrum, Roughness};
 pub use principled::PrincipledMaterial;
-pub use surface::SurfaceBsdf;
+pub use surface_bsdf::SurfaceBsdf;

@@ -16,9 +16,9 @@
 
 use super::cloud::Cloud;
 use super::coefficients::Coefficients;
+use super::flight::{EmissionLookup, EmissionLookups, End, Flight, FlightSampler, Segment};
 use super::grid::{RgbGrid, Scalars, UniformGrid};
 use super::majorants::{MajorantGrid, MajorantIterator};
-use super::track::{EmissionLookup, EmissionLookups, End, Flight, FlightSampler, Segment};
 use lumiris_numbers::math::{Affine3A, Bounds3, DAffine3, DVec3, Rgb, Vec3};
 
 /// The spatially varying field.

@@ -1,6 +1,6 @@
 //! A homogeneous medium, in closed form.
 
-use super::track::{End, Flight, Segment};
+use super::flight::{End, Flight, Segment};
 use lumiris_numbers::math::{Rgb, Vec3};
 
 /// A homogeneous medium.

@@ -1,8 +1,9 @@
-//! A medium of any kind, and the media of a scene.
+//! A medium of any kind, and the media of a scene. Paths call [`Medium::fly`] in `integrators/vertex_search.rs` and
+//! `integrators/interior.rs`, shadow segments [`Medium::transmittance`] in `direct/transmittance.rs`.
 
+use super::flight::{EmissionLookup, EmissionLookups, Flight, FlightSampler, Segment};
 use super::heterogeneous::Heterogeneous;
 use super::homogeneous::Homogeneous;
-use super::track::{EmissionLookup, EmissionLookups, Flight, FlightSampler, Segment};
 use lumiris_numbers::math::{Rgb, Vec3};
 use std::sync::Arc;
 

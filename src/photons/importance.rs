@@ -9,7 +9,7 @@
 
 use super::error::PhotonError;
 use super::map::{GatherPoint, GatherScratch, PhotonMap, Search};
-use super::path::{BATCH, domain, path_stream};
+use super::path_stream::{BATCH, domain, path_stream};
 use super::photon::{Origin, Photon};
 use super::walk::{Particle, WalkSettings, Walker};
 use crate::bsdfs::dielectric::Transport;

@@ -2,7 +2,7 @@
 //! their powers and a is the floor, so that no light has less than a/L of the paths.
 //!
 //! Lights are chosen by inversion, so that with stratified random numbers each light gets its expected number of paths
-//! up to a few.
+//! up to a few. `trace` draws from it.
 
 use crate::lights::sample_columns::ChosenLight;
 use crate::lights::{LightId, LightSet};

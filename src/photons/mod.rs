@@ -9,7 +9,9 @@
 //! scattering event ([`Origin`]): none (straight from a light), a Lambertian lobe, or another lobe. The last kind are
 //! caustic photons, whether the light before that event was direct or indirect.
 //!
-//! Reading order: [`photon`], `tree`, [`map`]; [`light_distribution`], `path`, `walk`; [`importance`],
+//! `integrators/photon_map/maps.rs` and `planning/visibility_cache.rs` call [`trace_photons`].
+//!
+//! Reading order: [`photon`], `tree`, [`map`]; [`light_distribution`], `path_stream`, `walk`; [`importance`],
 //! [`trace`]; [`error`].
 
 pub mod error;
@@ -18,7 +20,7 @@ pub mod light_distribution;
 pub mod map;
 #[cfg(test)]
 mod map_tests;
-pub(crate) mod path;
+pub(crate) mod path_stream;
 pub mod photon;
 pub mod trace;
 mod tree;

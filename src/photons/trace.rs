@@ -13,7 +13,7 @@ use super::error::PhotonError;
 use super::importance::Importance;
 use super::light_distribution::LightDistribution;
 use super::map::GatherScratch;
-use super::path::{BATCH, domain, path_stream};
+use super::path_stream::{BATCH, domain, path_stream};
 use super::photon::{Origin, Photon};
 use super::walk::{Particle, ParticleHit, WalkSettings, Walker};
 use crate::bsdfs::dielectric::Transport;

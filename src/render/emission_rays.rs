@@ -5,7 +5,8 @@
 //! At the edge of a lamp it causes nearly all of the variance. There the sample is *split* [Arvo and Kirk 1990] into
 //! several camera rays, one of which continues as a path. Let e be the emission met by that ray and e_i the emission
 //! met by the m − 1 others. The sample f becomes f − e + (e + Σ e_i)/m, which has the same expected value. The number m
-//! follows from a pilot ([`crate::planning::allocation`]), never from the samples themselves.
+//! follows from a pilot ([`crate::planning::allocation`]), never from the samples themselves. `worker` traces these
+//! rays after each batch.
 
 use super::tiles::batches;
 use crate::film::{FeatureSet, PixelSample};

@@ -1,4 +1,4 @@
-//! Prediction of the memory that an image takes.
+//! Prediction of the memory that an image takes, for `lumiris info` and the limit of `lumiris render`.
 //!
 //! A packed pixel takes the bits in which it differs from its neighbours, which depend on its samples. The figures here
 //! were measured with one scene at 1 sample (docs/measurements/memory.md). Their growth is estimated: a sum needs one

@@ -1,7 +1,8 @@
 //! CPU time of a rendering by phase.
 //!
 //! The stages of a batch are measured in wall-clock time, and a whole tile in CPU time of its thread as well. The ratio
-//! of both scales all stages of the tiles, which removes the time taken by other programs.
+//! of both scales all stages of the tiles, which removes the time taken by other programs. The program prints them
+//! (`commands/laps.rs`).
 
 use crate::integrators::PathStats;
 use crate::planning::processor_time;

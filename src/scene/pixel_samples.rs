@@ -1,4 +1,4 @@
-//! Numbers of camera samples, if they vary between pixels.
+//! Numbers of camera samples, if they vary between pixels. Planned by `planning/allocation.rs` and `noise_target.rs`.
 
 use crate::film::PixelBounds;
 

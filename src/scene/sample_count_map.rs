@@ -1,4 +1,4 @@
-//! The optimal sample counts of each pixel.
+//! The optimal sample and proposal counts of `ris` in each pixel, made by `planning/proposals.rs`.
 
 use crate::film::PixelBounds;
 use crate::settings::SampleCounts;

@@ -1,4 +1,4 @@
-//! A scene with its ray tracers.
+//! A scene with its ray tracers. Rays against emitters only are traced here, for BSDF samples of direct light.
 
 use super::input::Scene;
 use crate::accel::bvh::Bvh;

@@ -16,7 +16,7 @@ use lumiris::integrators::CameraSamples;
 use lumiris::integrators::path::Recording;
 use lumiris::integrators::{PathStats, PathTracer, Tracer};
 use lumiris::render::RenderSettings;
-use lumiris::render::batches::Batches;
+use lumiris::render::measured_batches::Batches;
 use lumiris::scene::RenderJob;
 use lumiris_numbers::estimators::stats::median;
 use serde::Serialize;

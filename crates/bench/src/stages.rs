@@ -14,7 +14,7 @@ use lumiris::integrators::CameraSamples;
 use lumiris::integrators::path::Recording;
 use lumiris::integrators::{PathStats, PathTracer, Tracer};
 use lumiris::render::BATCH_PATHS;
-use lumiris::render::batches::camera_batches;
+use lumiris::render::measured_batches::camera_batches;
 use lumiris::scene::RenderJob;
 use lumiris::settings::IntegratorKind;
 use lumiris_numbers::estimators::stats::median;

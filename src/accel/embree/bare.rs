@@ -1,5 +1,5 @@
 //! Plain Embree: loops over prefilled packets, without the additions of the renderer. They measure the best possible
-//! speed of a query, and thereby the cost of conversion and of exact hits.
+//! speed of a query, and thereby the cost of conversion and of exact hits. Only `crates/bench` uses them.
 //!
 //! The scene is built as in the renderer, but without the flag that allows a filter function per query. Quadrics,
 //! patches and alpha masks use callbacks as in the renderer.

@@ -1,5 +1,5 @@
-//! State shared by the callbacks of a query: the batch, and the nearest hit of each lane so far. Ties are detected here;
-//! [`Hit::precedes`](crate::accel::Hit::precedes) decides them. `query` traces rays with a noted tie again.
+//! State shared by the callbacks of a query: the batch, and the nearest hit of each lane so far. Ties are detected
+//! here; [`Hit::precedes`](crate::accel::Hit::precedes) decides them. `query` traces rays with a noted tie again.
 
 use super::scene_ids::{Reported, SceneIds};
 use crate::accel::RayBatch;

@@ -2,10 +2,10 @@
 //! of the mixture.
 //!
 //! The columns are defined in [`crate::direct::mixture`]. Here they cover the groups of lights, and the first of two
-//! lobes if BSDFs may have two; the column of the other lobe depends on these. As there, a sample with a zero unshadowed
-//! integrand belongs to the component that drew it, and the density of BSDF sampling is 0 for a light sample hidden by
-//! another emitter. Columns do not depend on MIS weights: a sample with the weight 0 has the densities of both
-//! techniques. `render/control_variates.rs` fits their coefficients and subtracts them.
+//! lobes if BSDFs may have two; the column of the other lobe depends on these. As there, a sample with a zero
+//! unshadowed integrand belongs to the component that drew it, and the density of BSDF sampling is 0 for a light sample
+//! hidden by another emitter. Columns do not depend on MIS weights: a sample with the weight 0 has the densities of
+//! both techniques. `render/control_variates.rs` fits their coefficients and subtracts them.
 
 use super::emitters::EmitterRays;
 use super::samples::{SampleColumns, Traced};

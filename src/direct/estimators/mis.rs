@@ -1,9 +1,9 @@
 //! `mis`: light and BSDF samples, combined by multiple importance sampling [Veach and Guibas 1995].
 //!
-//! The weight is [`Heuristic::weight_of_expected`], in `heuristics.rs` of `crates/numbers`. It is applied in three places:
+//! The weight is [`Heuristic::weight_of_expected`], in `heuristics.rs` of `crates/numbers`, applied in three places:
 //!
-//! * stages: [`Candidate::factor`](crate::direct::candidates::Candidate::factor), and [`lumiris_lanes::ris_weights`] for
-//!   the proposals of `ris`;
+//! * stages: [`Candidate::factor`](crate::direct::candidates::Candidate::factor), and [`lumiris_lanes::ris_weights`]
+//!   for the proposals of `ris`;
 //! * columns: `weigh` in `direct/columns/column_direct_lighting.rs`, with the kernel `weigh` of
 //!   [`lumiris_lanes::vertex`];
 //! * an emitter hit by the next segment of the path, which is the BSDF sample: `LastVertices::weight` in

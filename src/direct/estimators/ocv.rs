@@ -27,8 +27,8 @@ pub struct Ocv {
 }
 
 impl Ocv {
-    /// Computes the estimates from the sums of `components`; `out[i]` belongs to `points[i]`. Never called with the form
-    /// over pixels.
+    /// Computes the estimates from the sums of `components`; `out[i]` belongs to `points[i]`. The form over pixels,
+    /// which does not come here, would have the mean of the samples.
     pub(super) fn resolve(
         &self,
         points: &[ShadingPoint<'_>],
@@ -56,10 +56,11 @@ impl Ocv {
         for (i, (out, sums)) in out.iter_mut().zip(sums.chunks(len)).enumerate() {
             let integrals = &mixtures[i].integrals;
             let estimate = match self.form {
-                OcvForm::Progressive | OcvForm::Pixels => match fits.beta(points[i].fit) {
+                OcvForm::Progressive => match fits.beta(points[i].fit) {
                     Some(beta) => form.estimate(*equations, sums, beta, integrals),
                     None => equations.mean(sums),
                 },
+                OcvForm::Pixels => equations.mean(sums),
                 OcvForm::Paper => form.estimate(*equations, sums, &beta[i * width..][..width], integrals),
             };
             if self.form == OcvForm::Progressive {

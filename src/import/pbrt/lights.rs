@@ -1,4 +1,4 @@
-//! `LightSource`, `AreaLightSource`
+//! `LightSource`, `AreaLightSource`. Lights that need images are finished in `image_lights`.
 
 use super::checks::{FilePlace, file_name, unknown};
 use super::descriptions::{AreaLightDesc, EnvironmentDesc, ImageUse};

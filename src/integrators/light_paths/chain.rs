@@ -50,7 +50,8 @@ impl Chain {
         self.is_open() && self.passes_metal_or_glass
     }
 
-    /// MIS weight of the camera path, where light paths have the density `of_light` ([`super::LightPathGuide::density`]).
+    /// MIS weight of the camera path, where light paths have the density `of_light`
+    /// ([`super::LightPathGuide::density`]).
     #[inline]
     pub(in crate::integrators) fn camera_weight(&self, of_light: f32) -> f32 {
         1.0 - light_weight(of_light, self.density)

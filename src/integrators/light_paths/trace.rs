@@ -7,7 +7,7 @@ use crate::film::filter::FilterSampler;
 use crate::integrators::statistics::LightPathStats;
 use crate::lights::LightId;
 use crate::materials::SurfaceBsdf;
-use crate::photons::path::{BATCH, domain, path_stream};
+use crate::photons::path_stream::{BATCH, domain, path_stream};
 use crate::scene::{RenderJob, SurfaceInteraction};
 use lumiris_numbers::math::ray::{SEGMENT_END, offset_origin};
 use lumiris_numbers::math::{Ray, Rgb, Vec2, Vec3};

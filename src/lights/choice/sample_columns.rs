@@ -184,8 +184,8 @@ impl Scratch {
         }
     }
 
-    /// [`MixtureGroups::pmfs`](super::mixture_groups::MixtureGroups::pmfs) of `lights` at point `i`, given as `at`. There must be
-    /// more than one light.
+    /// [`MixtureGroups::pmfs`](super::mixture_groups::MixtureGroups::pmfs) of `lights` at point `i`, given as `at`.
+    /// There must be more than one light.
     #[inline]
     pub fn group_pmfs(&self, lights: &JobLights, i: usize, at: &LightCtx) -> [f32; MAX_GROUPS] {
         lights.groups.pmfs_with(&lights.sampler, at, self.branches.at(i))

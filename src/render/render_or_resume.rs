@@ -1,4 +1,4 @@
-//! Renders a job from its first sample, or from the sums of an earlier rendering.
+//! Entry points: renders a job from its first sample, or from the sums of an earlier rendering.
 
 use super::continuation::Continuation;
 use super::render_error::RenderError;

@@ -1,4 +1,4 @@
-//! Paths of photons and importons: their random numbers, and the batch size.
+//! Random numbers of the paths of photons and importons, and the size of their batches. The paths are traced by `walk`.
 //!
 //! Photon path t is a point of a scrambled Sobol' sequence over path space [Keller 1998, ch. 3; Burley 2020]. The
 //! sequence has 2¹⁶ points. Each block of 2¹⁶ photon paths is scrambled independently.
