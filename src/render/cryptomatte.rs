@@ -144,7 +144,7 @@ pub fn cryptomattes(
     let tiles = film.bounds.tiles(settings.tile_size);
     let camera = CameraSampler::new(job, settings.first_sample);
     let names: Vec<Vec<String>> = kinds.iter().map(|kind| kind.names(&job.world.scene)).collect();
-    let tracer = Tracer { job, film, camera, first: settings.first_sample, kinds, names: &names };
+    let tracer = CoverageTracer { job, film, camera, first: settings.first_sample, kinds, names: &names };
     let of_tiles: Vec<Vec<LayerTile>> =
         pool.install(|| tiles.par_iter().with_max_len(1).map(|tile| tracer.tile(tile)).collect());
 
@@ -196,7 +196,7 @@ impl Layer {
     }
 }
 
-struct Tracer<'a> {
+struct CoverageTracer<'a> {
     job: &'a RenderJob,
     film: &'a Film,
     camera: CameraSampler<'a>,
@@ -206,7 +206,7 @@ struct Tracer<'a> {
     names: &'a [Vec<String>],
 }
 
-impl Tracer<'_> {
+impl CoverageTracer<'_> {
     /// All Cryptomattes of a tile.
     fn tile(&self, tile: &PixelBounds) -> Vec<LayerTile> {
         // Coverage by key

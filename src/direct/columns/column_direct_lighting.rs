@@ -3,7 +3,7 @@
 use super::batch::{Round, VertexBatch};
 use super::control_columns::ControlColumns;
 use super::emitters::EmitterRays;
-use super::samples::{SampleColumns, Traced};
+use super::samples::{SampleColumns, TracedSegments};
 use super::sinks::{SampleOnLight, Sinks, VisibleSample, WeightAgainstLightPaths};
 use super::techniques::Techniques;
 use crate::accel::Coherence;
@@ -32,7 +32,7 @@ pub struct ColumnDirectLighting {
     allocations: Vec<SampleAllocation>,
     samples: SampleColumns,
     scratch: Scratch,
-    traced: Traced,
+    traced: TracedSegments,
     crossing: Crossing,
     emitter_rays: EmitterRays,
     controls: ControlColumns,
@@ -316,7 +316,7 @@ impl ColumnDirectLighting {
     /// stay there.
     fn occlude(&mut self, batch: &VertexBatch<'_, '_>, round: Round, stats: &mut DirectStats) {
         let VertexBatch { job, vertices, .. } = *batch;
-        let Traced { rows, rays, occluded, crossing, some_rays, some_occluded, .. } = &mut self.traced;
+        let TracedSegments { rows, rays, occluded, crossing, some_rays, some_occluded, .. } = &mut self.traced;
 
         // Segments that may pass surfaces or media
         let crosses = |row: u32| job.shadows_pass() || vertices.media(row as usize) != Sides::default();
@@ -350,7 +350,7 @@ impl ColumnDirectLighting {
         let mut crossing = std::mem::take(&mut self.crossing);
 
         // Light, medium and random numbers of each segment
-        let row = |traced: &Traced, k: usize| traced.rows[traced.crossing[k] as usize] as usize;
+        let row = |traced: &TracedSegments, k: usize| traced.rows[traced.crossing[k] as usize] as usize;
         let departure = |k: usize, d: Vec3| {
             let i = row(&self.traced, k);
             let lights_before = self.allocations.get(i).unwrap_or(&batch.usual).light_draws;

@@ -8,7 +8,7 @@
 //! both techniques. `render/control_variates.rs` fits their coefficients and subtracts them.
 
 use super::emitters::EmitterRays;
-use super::samples::{SampleColumns, Traced};
+use super::samples::{SampleColumns, TracedSegments};
 use crate::accel::RayBatch;
 use crate::direct::vertices::Vertices;
 use crate::lights::sample_columns::Scratch;
@@ -69,7 +69,7 @@ impl ControlColumns {
         job: &RenderJob,
         [n_light, n_bsdf]: [f32; 2],
         samples: &SampleColumns,
-        traced: &Traced,
+        traced: &TracedSegments,
         scratch: &Scratch,
         vertices: &Vertices<'_>,
     ) {
@@ -166,7 +166,7 @@ impl ControlColumns {
     }
 
     /// Determines which light samples that BSDF sampling could draw as well are hidden by another emitter.
-    fn find_hidden(&mut self, job: &RenderJob, samples: &SampleColumns, traced: &Traced) {
+    fn find_hidden(&mut self, job: &RenderJob, samples: &SampleColumns, traced: &TracedSegments) {
         self.is_hidden.clear();
         self.is_hidden.resize(self.sums.len(), false);
         self.hidden_of.clear();

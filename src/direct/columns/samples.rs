@@ -66,7 +66,7 @@ impl SampleColumns {
 
 /// Shadow segments of the samples.
 #[derive(Debug, Default)]
-pub(super) struct Traced {
+pub(super) struct TracedSegments {
     /// Rows of their vertices.
     pub(super) rows: Vec<u32>,
     pub(super) rays: RayBatch,
@@ -80,7 +80,7 @@ pub(super) struct Traced {
     pub(super) some_occluded: Vec<bool>,
 }
 
-impl Traced {
+impl TracedSegments {
     /// Collects the segments of the first `n` rows for which `is_traced` is true; `time` is a column.
     pub(super) fn gather(
         &mut self,

@@ -3,7 +3,7 @@
 use super::guide::LightPathGuide;
 use super::per_sample::per_sample;
 use super::pilot::LightPilot;
-use super::trace::{CameraConnection, PathBatch, Scene, batches, trace};
+use super::trace::{CameraConnection, PathBatch, TraceInput, batches, trace};
 use crate::film::{PixelBounds, PixelSample};
 use crate::integrators::camera_sample::CameraSamples;
 use crate::integrators::statistics::LightPathStats;
@@ -72,8 +72,8 @@ impl LightImage {
         let seed_of = |step: u32| pcg4d([seed, SEED, step, 0])[0];
         let batches: Vec<PathBatch> =
             (first..first.saturating_add(count)).flat_map(|step| batches(step, paths)).collect();
-        let scene = Scene::new(job, &self.guide);
-        let connections = trace(&scene, &batches, seed_of, &mut self.stats);
+        let input = TraceInput::new(job, &self.guide);
+        let connections = trace(&input, &batches, seed_of, &mut self.stats);
 
         // Sort the contributions by row, pixel and step
         let factor = 1.0 / paths as f32;

@@ -1,7 +1,7 @@
 //! The pilot that learns the emission of useful light paths, and estimates their variance and time.
 
 use super::guide::LightPathGuide;
-use super::trace::{PathBatch, Scene, Walker, batches, trace};
+use super::trace::{LightPathWalker, PathBatch, TraceInput, batches, trace};
 use crate::integrators::exclusions::{self, Feature};
 use crate::integrators::statistics::LightPathStats;
 use crate::scene::RenderJob;
@@ -46,28 +46,29 @@ impl LightPilot {
 
         // Locate metal and glass
         let everywhere = LightPathGuide::everywhere(set, rays as u32)?;
-        let mut bundling = everywhere.begin();
-        let scene = Scene::new(job, &everywhere);
-        let of_batch = |walker: &mut Walker, batch: PathBatch| {
+        let mut caustic_hits = everywhere.begin();
+        let input = TraceInput::new(job, &everywhere);
+        let of_batch = |walker: &mut LightPathWalker, batch: PathBatch| {
             let start = Instant::now();
-            (walker.first_hits(&scene, seed(batch.round), batch.paths), start.elapsed())
+            (walker.first_hits(&input, seed(batch.round), batch.paths), start.elapsed())
         };
         let hits: Vec<_> =
-            batches(0, rays).collect::<Vec<_>>().into_par_iter().map_init(Walker::default, of_batch).collect();
+            batches(0, rays).collect::<Vec<_>>().into_par_iter().map_init(LightPathWalker::default, of_batch).collect();
         stats.rays += rays;
         for (hits, time) in &hits {
-            hits.iter().for_each(|hit| everywhere.add(&mut bundling, hit.light, hit.d, hit.value.luminance().into()));
+            hits.iter()
+                .for_each(|hit| everywhere.add(&mut caustic_hits, hit.light, hit.d, hit.value.luminance().into()));
             stats.time += *time;
         }
 
         // Light paths over metal and glass that reach the camera
         let mut contributions = everywhere.begin();
-        let mut guide = everywhere.learned(set, &bundling)?;
+        let mut guide = everywhere.learned(set, &caustic_hits)?;
         let (mut moments, mut of_round) = (Vec::new(), (0, 0.0));
         for round in 1..=ROUNDS {
             let batches: Vec<_> = batches(round, rays / RAYS_PER_PATH).collect();
-            let (scene, before) = (Scene::new(job, &guide), stats);
-            let connections = trace(&scene, &batches, seed, &mut stats);
+            let (input, before) = (TraceInput::new(job, &guide), stats);
+            let connections = trace(&input, &batches, seed, &mut stats);
 
             // Learn from their contributions
             moments.clear();
@@ -79,8 +80,10 @@ impl LightPilot {
                 moments.push([(value / weight).powi(2), ratio]);
             }
             of_round = (stats.paths - before.paths, (stats.time - before.time).as_secs_f64() * 1e9);
-            guide = guide
-                .learned(set, &if round < ROUNDS { contributions.mixed(&bundling) } else { contributions.clone() })?;
+            guide = guide.learned(
+                set,
+                &if round < ROUNDS { contributions.mixed(&caustic_hits) } else { contributions.clone() },
+            )?;
         }
         let nanoseconds = stats.time.as_secs_f64() * 1e9 * divisor as f64;
         Some(LightPilot { guide, stats, moments, round: of_round, nanoseconds, pixels: bounds.area() as f64 })

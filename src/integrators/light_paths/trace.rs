@@ -48,7 +48,7 @@ pub(super) struct CameraConnection {
 
 /// Traces light paths; holds the buffers of one worker.
 #[derive(Debug, Default)]
-pub(super) struct Walker {
+pub(super) struct LightPathWalker {
     active: Vec<LightPath>,
     next: Vec<LightPath>,
     rays: RayBatch,
@@ -61,26 +61,26 @@ pub(super) struct Walker {
 }
 
 /// Common data of all light paths.
-pub(super) struct Scene<'a> {
+pub(super) struct TraceInput<'a> {
     pub(super) job: &'a RenderJob,
     pub(super) guide: &'a LightPathGuide,
     pub(super) filter: FilterSampler,
 }
 
-impl<'a> Scene<'a> {
+impl<'a> TraceInput<'a> {
     pub(super) fn new(job: &'a RenderJob, guide: &'a LightPathGuide) -> Self {
-        Scene { job, guide, filter: job.world.scene.film.filter.sampler() }
+        TraceInput { job, guide, filter: job.world.scene.film.filter.sampler() }
     }
 }
 
-impl Walker {
+impl LightPathWalker {
     /// Traces some of the light paths of a seed. `self.connections` becomes their unoccluded connections to the camera.
-    pub(super) fn trace(&mut self, scene: &Scene<'_>, seed: u32, paths: Range<u64>) {
-        let job = scene.job;
+    pub(super) fn trace(&mut self, input: &TraceInput<'_>, seed: u32, paths: Range<u64>) {
+        let job = input.job;
         self.connections.clear();
         self.shadows.clear();
         self.active.clear();
-        self.active.extend(paths.filter_map(|path| emit(scene, path_stream(seed, path))));
+        self.active.extend(paths.filter_map(|path| emit(input, path_stream(seed, path))));
         // The last scattering event is the connection to the camera. Paths with one more event are left to camera paths
         for scattered in 0..job.settings().integrator.depth().saturating_sub(1) {
             self.rays.set(self.active.iter().map(|path| &path.ray));
@@ -98,7 +98,7 @@ impl Walker {
                 let may_connect = !bsdf.makes_caustics || interaction.is_mixture(job);
                 if scattered > 0
                     && may_connect
-                    && let Some((connection, segment)) = path.connect(scene, &interaction)
+                    && let Some((connection, segment)) = path.connect(input, &interaction)
                 {
                     self.connections.push(connection);
                     self.shadows.push(&segment);
@@ -117,36 +117,36 @@ impl Walker {
 
 /// Metal or glass hit by a ray from a light.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Bundling {
+pub(super) struct CausticHit {
     pub(super) light: LightId,
     pub(super) d: Vec3,
     /// Incident power (W) if there were only one path.
     pub(super) value: Rgb,
 }
 
-impl Walker {
+impl LightPathWalker {
     /// Light paths whose first hit is metal or glass.
-    pub(super) fn first_hits(&mut self, scene: &Scene<'_>, seed: u32, paths: Range<u64>) -> Vec<Bundling> {
-        let job = scene.job;
+    pub(super) fn first_hits(&mut self, input: &TraceInput<'_>, seed: u32, paths: Range<u64>) -> Vec<CausticHit> {
+        let job = input.job;
         self.active.clear();
-        self.active.extend(paths.filter_map(|path| emit(scene, path_stream(seed, path))));
+        self.active.extend(paths.filter_map(|path| emit(input, path_stream(seed, path))));
         self.rays.set(self.active.iter().map(|path| &path.ray));
         job.world.accel.intersect(&self.rays, Coherence::Incoherent, &mut self.hits);
         let met = |(path, hit): (&LightPath, &Option<Hit>)| {
             let at = SurfaceInteraction::new(job, &path.ray, 0.0, 0.0, hit.as_ref()?);
-            let bundles = at.scatter(job)?.makes_caustics;
-            bundles.then_some(Bundling { light: path.light, d: path.d, value: path.power })
+            let makes_caustics = at.scatter(job)?.makes_caustics;
+            makes_caustics.then_some(CausticHit { light: path.light, d: path.d, value: path.power })
         };
         self.active.iter().zip(&self.hits).filter_map(met).collect()
     }
 }
 
 /// Samples the emission of a light path.
-fn emit(scene: &Scene<'_>, stream: SampleStream) -> Option<LightPath> {
+fn emit(input: &TraceInput<'_>, stream: SampleStream) -> Option<LightPath> {
     let [p0, p1, d0, d1] = stream.domain(domain::EMISSION).draw::<4>();
     let choice = stream.domain(domain::LIGHT).draw::<2>();
     let Emitted { light, p, p_error, n, d, power, density } =
-        scene.guide.emit(&scene.job.world.scene.lights, choice, [[p0, p1], [d0, d1]])?;
+        input.guide.emit(&input.job.world.scene.lights, choice, [[p0, p1], [d0, d1]])?;
     let ray = Ray { o: offset_origin(p, p_error, n, d), d, t_max: f32::INFINITY, time: 0.0 };
     Some(LightPath { ray, power, stream, light, d, density })
 }
@@ -162,15 +162,15 @@ impl LightPath {
     }
 
     /// Connects the path at any other surface to the camera. Returns the contribution and the shadow segment.
-    fn connect(&self, scene: &Scene<'_>, at: &SurfaceInteraction) -> Option<(CameraConnection, Ray)> {
-        let (job, film) = (scene.job, &scene.job.world.scene.film);
+    fn connect(&self, input: &TraceInput<'_>, at: &SurfaceInteraction) -> Option<(CameraConnection, Ray)> {
+        let (job, film) = (input.job, &input.job.world.scene.film);
         let camera = &job.world.scene.camera;
 
         // Project the point onto the film, and choose a pixel
         let [l0, l1, u] = self.stream.domain(FILM).draw::<3>();
         let p = at.surface.p;
         let projected = camera.project(p, [l0, l1], 0.0)?;
-        let CoveringPixel { pixel, weight: filter_weight } = sample_pixel(&scene.filter, projected.film_xy, u)?;
+        let CoveringPixel { pixel, weight: filter_weight } = sample_pixel(&input.filter, projected.film_xy, u)?;
         if !film.bounds.contains(pixel) {
             return None;
         }
@@ -257,18 +257,18 @@ pub(super) fn batches(round: u32, paths: u64) -> impl Iterator<Item = PathBatch>
 /// Traces batches of light paths. Returns the connections to the camera, in the order of the
 /// batches.
 pub(super) fn trace(
-    scene: &Scene<'_>,
+    input: &TraceInput<'_>,
     batches: &[PathBatch],
     seed: impl Fn(u32) -> u32 + Sync,
     stats: &mut LightPathStats,
 ) -> Vec<Vec<CameraConnection>> {
-    let one = |walker: &mut Walker, PathBatch { round, paths }: &PathBatch| {
+    let one = |walker: &mut LightPathWalker, PathBatch { round, paths }: &PathBatch| {
         let start = Instant::now();
         walker.traced = 0;
-        walker.trace(scene, seed(*round), paths.clone());
+        walker.trace(input, seed(*round), paths.clone());
         (walker.connections.clone(), walker.traced, start.elapsed())
     };
-    let all: Vec<_> = batches.par_iter().with_max_len(1).map_init(Walker::default, one).collect();
+    let all: Vec<_> = batches.par_iter().with_max_len(1).map_init(LightPathWalker::default, one).collect();
 
     // Statistics, in the order of the batches
     stats.paths += batches.iter().map(|batch| batch.paths.end - batch.paths.start).sum::<u64>();
