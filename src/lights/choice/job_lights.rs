@@ -41,24 +41,24 @@ impl JobLights {
     /// Lights chosen by `choice`, with at most `max` groups.
     pub fn new(set: Arc<LightSet>, choice: impl Into<LightChoice>, max: usize) -> Self {
         let choice = choice.into();
-        let sampler = LightSampler::new(choice, &set.lights, set.scene_radius);
-        let (delta, groups) = (set.delta_sampler(choice), MixtureGroups::new(&set.lights, &sampler, max));
+        let sampler = LightSampler::new(choice, &set);
+        let (delta, groups) = (LightSampler::of_delta(choice, &set), MixtureGroups::new(&set, &sampler, max));
         JobLights { set, sampler, delta, groups, choice, visibility_cache: None, learned: None }
     }
 
     /// Changes the light sampler; the visibility cache stays.
     pub fn choose_by(&mut self, choice: LightChoice, max: usize) {
-        self.sampler = LightSampler::new(choice, &self.set.lights, self.set.scene_radius);
+        self.sampler = LightSampler::new(choice, &self.set);
         self.choice = choice;
         self.sampler.set_visibility_cache(self.visibility_cache.clone());
-        self.delta = self.set.delta_sampler(choice);
+        self.delta = LightSampler::of_delta(choice, &self.set);
         self.learn();
         self.set_groups(max);
     }
 
     /// Divides the lights into at most `max` groups.
     pub fn set_groups(&mut self, max: usize) {
-        self.groups = MixtureGroups::new(&self.set.lights, &self.sampler, max);
+        self.groups = MixtureGroups::new(&self.set, &self.sampler, max);
     }
 
     /// Sets the visibility cache. Estimates remain unbiased for any content. Lights without power and unknown ids are
@@ -76,7 +76,7 @@ impl JobLights {
         let cache = self.visibility_cache.as_ref().filter(|cache| !cache.is_empty());
         self.learned = cache.map(|cache| {
             let choice = if self.choice.volumes {
-                TreeChoice::of_lights(lights, *scene_radius, self.choice.infinite_fraction)
+                self.set.tree_choice(self.choice.infinite_fraction, false)
             } else {
                 self.tree_choice()
             };
@@ -87,7 +87,7 @@ impl JobLights {
     /// The choice by the light tree, for any light sampler.
     pub fn tree_choice(&self) -> TreeChoice {
         let choice = self.sampler.tree().cloned();
-        choice.unwrap_or_else(|| TreeChoice::of_lights(&self.set.lights, self.set.scene_radius, None))
+        choice.unwrap_or_else(|| self.set.tree_choice(None, false))
     }
 
     /// The visibility estimated from photons; `None` without photons.
@@ -458,6 +458,16 @@ mod tests {
             set.choose_by(choice(volumes), 1);
             assert_eq!((set.samples_volumes(), set.sampler.pmf(&ctx, volume) > 0.0), (volumes, volumes));
             assert_eq!(set.learned_visibility().unwrap().importance(&ctx, volume), 0.0);
+        }
+    }
+
+    #[test]
+    fn the_light_tree_is_built_once() {
+        let mut set = sampling(builder(), LightSamplerKind::Tree, &bounds());
+        let tree = set.tree_choice().tree;
+        for kind in CHOICES {
+            set.choose_by(LightChoice { infinite_fraction: Some(0.3), ..kind }, 4);
+            assert!(Arc::ptr_eq(&tree, &set.tree_choice().tree), "{kind:?}");
         }
     }
 

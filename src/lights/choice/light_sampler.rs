@@ -9,9 +9,10 @@
 //!
 //! Lights without power are never chosen. Emitting media have no power, but can be included in the tree on request.
 
+use super::set::LightSet;
 use crate::lights::tree::sampled_light::UNIT;
 use crate::lights::{
-    Branches, Light, LightCtx, LightId, LightRun, RunPositions, SampledLight, TreeChoice, VisibilityCache,
+    Branches, Light, LightCtx, LightId, LightRun, LightTree, RunPositions, SampledLight, TreeChoice, VisibilityCache,
     VisibilityCacheSampler,
 };
 use lumiris_numbers::math::{AliasTable, cumulative};
@@ -114,20 +115,37 @@ pub enum LightSampler {
 }
 
 impl LightSampler {
-    /// A sampler of `lights`, with their indices as ids. `scene_radius` determines the power of infinite lights. No
-    /// visibility cache is set yet.
-    pub fn new(choice: LightChoice, lights: &[Light], scene_radius: f32) -> Self {
-        let tree = |powers: &[f32]| TreeChoice::new(lights, powers, choice.infinite_fraction, choice.volumes);
-        let powers: Vec<f32> = lights.iter().map(|light| light.power_luminance(scene_radius)).collect();
+    /// A sampler of all lights of a set. The photon sampler has no visibility cache yet.
+    pub fn new(choice: LightChoice, set: &LightSet) -> Self {
+        Self::of(choice, set, &set.powers, || set.tree_choice(choice.infinite_fraction, choice.volumes))
+    }
+
+    /// A sampler of the same kind over the delta lights of a set; `None` if there are none.
+    pub fn of_delta(choice: LightChoice, set: &LightSet) -> Option<Self> {
+        let is_delta = |light: LightId| set.lights[light as usize].is_delta();
+        if !set.lit.iter().any(|&light| is_delta(light)) {
+            return None;
+        }
+        let powers: Vec<f32> =
+            (0..).zip(&set.powers).map(|(light, &power)| if is_delta(light) { power } else { 0.0 }).collect();
+        let tree = || {
+            let infinite = set.lit_infinite().filter(|&light| is_delta(light)).collect();
+            TreeChoice::new(Arc::new(LightTree::new(&set.lights, Light::is_delta)), infinite, choice.infinite_fraction)
+        };
+        Some(Self::of(choice, set, &powers, tree))
+    }
+
+    /// A sampler of the lights with `powers`.
+    fn of(choice: LightChoice, set: &LightSet, powers: &[f32], tree: impl FnOnce() -> TreeChoice) -> Self {
         match choice.kind {
             LightSamplerKind::Uniform => {
                 let weights: Vec<f32> = powers.iter().map(|&p| if p > 0.0 { 1.0 } else { 0.0 }).collect();
                 LightSampler::Uniform(FixedChoice::new(&weights))
             }
-            LightSamplerKind::Power => LightSampler::Power(FixedChoice::new(&power_weights(&powers))),
-            LightSamplerKind::Tree => LightSampler::Tree(tree(&powers)),
+            LightSamplerKind::Power => LightSampler::Power(FixedChoice::new(&power_weights(powers))),
+            LightSamplerKind::Tree => LightSampler::Tree(tree()),
             LightSamplerKind::VisibilityCache => {
-                LightSampler::VisibilityCache(VisibilityCacheSampler::new(tree(&powers), lights, scene_radius))
+                LightSampler::VisibilityCache(VisibilityCacheSampler::new(tree(), &set.lights, set.scene_radius))
             }
         }
     }

@@ -7,8 +7,9 @@
 //! group can be fixed.
 
 use super::light_sampler::LightSampler;
+use super::set::LightSet;
 use crate::lights::tree::tree_choice::one_of;
-use crate::lights::{Branches, CutNode, Light, LightCtx, LightId, LightTree, SampledLight};
+use crate::lights::{Branches, CutNode, LightCtx, LightId, SampledLight};
 use lumiris_numbers::math::AliasTable;
 
 /// Maximum number of groups.
@@ -48,19 +49,11 @@ struct FixedGroup {
 }
 
 impl MixtureGroups {
-    /// Divides `lights`, which `sampler` chooses from, into at most `max` (1 to [`MAX_GROUPS`]) groups.
-    pub fn new(lights: &[Light], sampler: &LightSampler, max: usize) -> Self {
+    /// Divides the lights of `set`, which `sampler` chooses from, into at most `max` (1 to [`MAX_GROUPS`]) groups.
+    pub fn new(set: &LightSet, sampler: &LightSampler, max: usize) -> Self {
         let max = max.clamp(1, MAX_GROUPS);
-        let own_tree;
-        let tree = match sampler.tree() {
-            Some(choice) => &choice.tree,
-            None => {
-                let is_chosen = |light: &&Light| !matches!(light, Light::Volume(_));
-                let bounds: Vec<_> = lights.iter().map(|light| Some(light).filter(is_chosen)?.bounds()).collect();
-                own_tree = LightTree::new(&bounds);
-                &own_tree
-            }
-        };
+        let lights = &set.lights;
+        let tree = sampler.tree().map_or_else(|| set.tree(false), |choice| &choice.tree);
         let ctx = LightCtx::at(lumiris_numbers::math::Vec3::ZERO);
         let is_infinite = |i: usize| lights[i].is_infinite() && sampler.pmf(&ctx, i as LightId) > 0.0;
         let infinite: Vec<LightId> = (0..lights.len()).filter(|&i| is_infinite(i)).map(|i| i as LightId).collect();
@@ -197,7 +190,7 @@ impl MixtureGroups {
 mod tests {
     use super::*;
     use crate::lights::{
-        JobLights, LightSamplerKind, LightSetBuilder, PointLight, PrimaryPhoton, SurfacePoint, VisibilityCache,
+        JobLights, Light, LightSamplerKind, LightSetBuilder, PointLight, PrimaryPhoton, SurfacePoint, VisibilityCache,
     };
     use lumiris_numbers::math::{Bounds3, Rgb, Vec3};
     use lumiris_test_support::assert_chi_squared;
@@ -233,7 +226,7 @@ mod tests {
             for (points, infinite) in [(4, 0), (4, 1), (30, 2), (100, 1), (0, 2), (1, 0)] {
                 for max in [1, 2, 5, 8] {
                     let set = set(kind, points, infinite);
-                    let groups = MixtureGroups::new(&set.lights, &set.sampler, max);
+                    let groups = MixtureGroups::new(&set, &set.sampler, max);
                     let ctx = LightCtx::on(Vec3::new(0.4, 0.3, 0.0), Vec3::Z);
                     let pmfs = groups.pmfs(&set.sampler, &ctx);
                     assert!((pmfs.iter().sum::<f32>() - 1.0).abs() < 1e-5, "{kind:?} {pmfs:?}");
@@ -271,7 +264,7 @@ mod tests {
     fn few_lights_have_a_group_each_and_dark_ones_none() {
         for kind in KINDS {
             let set = set(kind, 5, 1);
-            let groups = MixtureGroups::new(&set.lights, &set.sampler, 7);
+            let groups = MixtureGroups::new(&set, &set.sampler, 7);
             assert_eq!(groups.len(), 5, "{kind:?}");
             let mut seen: Vec<_> = (0..6).map(|l| groups.group_of(l)).collect();
             assert_eq!(seen.remove(3), None);
@@ -279,6 +272,6 @@ mod tests {
             assert_eq!(seen, (0..5).map(Some).collect::<Vec<_>>());
         }
         let empty = set(LightSamplerKind::Tree, 0, 0);
-        assert!(MixtureGroups::new(&empty.lights, &empty.sampler, 4).is_empty());
+        assert!(MixtureGroups::new(&empty, &empty.sampler, 4).is_empty());
     }
 }

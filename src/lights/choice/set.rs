@@ -1,15 +1,15 @@
 //! All lights of a scene, and the map from hits to lights.
 
-use super::light_sampler::{LightChoice, LightSampler};
 use crate::geometry::{GeometryId, Shape};
 use crate::lights::kinds::volume_light::Parts;
 use crate::lights::{
-    AreaShape, Emission, Light, LightCtx, LightId, LightLayers, LightSample, PointLight, SampledLight, Sphere,
-    VolumeLight, area_lights_of,
+    AreaShape, Emission, Light, LightCtx, LightId, LightLayers, LightSample, LightTree, SampledLight, Sphere,
+    TreeChoice, VolumeLight, area_lights_of,
 };
 use crate::media::{Medium, MediumId, MediumSet};
 use lumiris_numbers::math::{Bounds3, Rgb, Vec3};
-use std::sync::Arc;
+use rayon::prelude::*;
+use std::sync::{Arc, OnceLock};
 
 /// Lights of the primitives of one geometry: one for all, or one for each.
 #[derive(Clone, Debug)]
@@ -96,16 +96,18 @@ impl LightSetBuilder {
         // Infinite lights with a radiance in all directions, and lights with power
         let has_le = |light: &Light| light.is_infinite() && !light.is_delta();
         let infinite = (0..self.lights.len()).filter(|&i| has_le(&self.lights[i])).map(|i| i as LightId).collect();
-        let is_lit = |&i: &usize| self.lights[i].power_luminance(scene_radius) > 0.0;
-        let lit = (0..self.lights.len()).filter(is_lit).map(|i| i as LightId).collect();
+        let powers: Vec<f32> = self.lights.par_iter().map(|light| light.power_luminance(scene_radius)).collect();
+        let lit = (0..).zip(&powers).filter(|(_, power)| **power > 0.0).map(|(light, _)| light).collect();
         self.emitting.sort_by_key(|e| e.geometry);
         LightSet {
             lights: self.lights,
             infinite,
+            powers,
             lit,
             layers: LightLayers::new(&self.groups),
             emitting: self.emitting,
             emitting_media: self.emitting_media,
+            trees: Default::default(),
             scene_centre: if center.is_finite() { center } else { Vec3::ZERO },
             scene_radius,
         }
@@ -119,6 +121,8 @@ pub struct LightSet {
     pub lights: Vec<Light>,
     /// Infinite lights, which rays that leave the scene hit, ascending.
     pub infinite: Vec<LightId>,
+    /// Luminance of the power of each light.
+    pub(super) powers: Vec<f32>,
     /// Lights with power, ascending.
     pub lit: Vec<LightId>,
     /// Layers of the image by groups of lights.
@@ -127,6 +131,8 @@ pub struct LightSet {
     emitting: Vec<EmittingGeometry>,
     /// Emitting media, by medium.
     emitting_media: Vec<Option<EmittingMedium>>,
+    /// The light trees without and with emitting media, once they are needed.
+    trees: [OnceLock<Arc<LightTree>>; 2],
     /// Centre of the scene's bounding sphere; the origin for an empty scene.
     pub scene_centre: Vec3,
     /// Radius of the scene's bounding sphere; 1 for a scene without extent.
@@ -162,14 +168,22 @@ impl LightSet {
         })
     }
 
-    /// A sampler of the same kind over the delta lights; `None` if there are none.
-    pub fn delta_sampler(&self, choice: LightChoice) -> Option<LightSampler> {
-        let is_lit = |light: &&Light| light.is_delta() && light.power_luminance(self.scene_radius) > 0.0;
-        self.lights.iter().find(is_lit)?;
-        let black = Light::Point(PointLight { p: Vec3::ZERO, intensity: Rgb::BLACK });
-        let delta: Vec<Light> =
-            self.lights.iter().map(|l| if l.is_delta() { l.clone() } else { black.clone() }).collect();
-        Some(LightSampler::new(choice, &delta, self.scene_radius))
+    /// The infinite lights with power, ascending.
+    pub(super) fn lit_infinite(&self) -> impl Iterator<Item = LightId> {
+        self.lit.iter().copied().filter(|&light| self.lights[light as usize].is_infinite())
+    }
+
+    /// The light tree, built at the first call; `volumes`: with the emitting parts of media.
+    pub(super) fn tree(&self, volumes: bool) -> &Arc<LightTree> {
+        let volumes = volumes && self.has_volume_lights();
+        let holds = |light: &Light| volumes || !matches!(light, Light::Volume(_));
+        self.trees[usize::from(volumes)].get_or_init(|| Arc::new(LightTree::new(&self.lights, holds)))
+    }
+
+    /// The choice by the light tree, with the probability `infinite_fraction` of the infinite lights (see
+    /// [`TreeChoice::new`]).
+    pub(super) fn tree_choice(&self, infinite_fraction: Option<f32>, volumes: bool) -> TreeChoice {
+        TreeChoice::new(Arc::clone(self.tree(volumes)), self.lit_infinite().collect(), infinite_fraction)
     }
 
     /// The area lights with their geometries.

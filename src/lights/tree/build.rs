@@ -2,7 +2,7 @@
 
 use super::node::Node;
 use crate::lights::{LightBounds, LightId};
-use lumiris_numbers::math::{Bounds3, Vec3};
+use lumiris_numbers::math::{Bounds3, Vec3, Vec3A};
 
 /// Maximum depth of heuristic splits. Below it, lights are split in halves, so that the trail of any leaf fits 64 bits.
 const MAX_HEURISTIC_DEPTH: u32 = 30;
@@ -15,12 +15,13 @@ const MANY: usize = 4096;
 pub(super) struct Item {
     pub(super) id: LightId,
     pub(super) bounds: LightBounds,
-    pub(super) center: Vec3,
 }
 
-#[inline]
-fn bucket(center: f32, min: f32, extent: f32) -> usize {
-    (((center - min) / extent * BUCKETS as f32) as usize).min(BUCKETS - 1)
+impl Item {
+    #[inline]
+    fn center(&self) -> Vec3 {
+        self.bounds.bounds.center()
+    }
 }
 
 /// Builds the subtree over n `items` into the 2n − 1 `nodes`; `first` is the index of the first node.
@@ -44,32 +45,31 @@ pub(super) fn build(nodes: &mut [Node], first: u32, items: &mut [Item], depth: u
 
 /// Reorders at least two items and returns the split index; neither part is empty.
 fn split(items: &mut [Item]) -> usize {
-    let centers = Bounds3::from_points(items.iter().map(|i| i.center));
-    let all = items.iter().fold(Bounds3::EMPTY, |b, i| b.union(i.bounds.bounds));
-    let (diagonal, longest) = (all.diagonal(), all.diagonal().max_element());
-    let cut = |axis: usize| {
-        let (min, extent) = (centers.min[axis], centers.max[axis] - centers.min[axis]);
-        if extent <= 0.0 || !extent.is_finite() {
-            return None;
+    let (mut centers, mut all) = (Bounds3::EMPTY, Bounds3::EMPTY);
+    for item in &*items {
+        centers = centers.union_point(item.center());
+        all = all.union(item.bounds.bounds);
+    }
+    let axes = [0, 1, 2].map(|axis| Axis::new(axis, &centers, &all));
+    let cuts = match &*items {
+        // Only the axis is to be chosen
+        [a, b] => {
+            let cost = a.bounds.cost() + b.bounds.cost();
+            axes.map(|axis| axis.map(|axis| Cut { cost: cost * axis.stretch, axis, bucket: 1 }))
         }
-        // Long thin parts are worse: regularise by the aspect ratio.
-        let stretch = longest / diagonal[axis];
-        best_cut(items, axis, min, extent).map(|cut| Cut { cost: cut.cost * stretch, ..cut })
-    };
-    let cuts = if items.len() > MANY {
-        let (x, (y, z)) = rayon::join(|| cut(0), || rayon::join(|| cut(1), || cut(2)));
-        [x, y, z]
-    } else {
-        [cut(0), cut(1), cut(2)]
+        many if many.len() > MANY => {
+            let [x, y, z] = axes.map(|axis| move || axis?.cut(&axis?.buckets(many)));
+            let (x, (y, z)) = rayon::join(x, || rayon::join(y, z));
+            [x, y, z]
+        }
+        few => all_cuts(few, axes),
     };
     let cheaper = |best: Cut, other: Cut| if other.cost < best.cost { other } else { best };
-    let best = cuts.into_iter().flatten().reduce(cheaper);
-    let Some(Cut { axis, bucket: cut, .. }) = best else { return items.len() / 2 };
+    let Some(Cut { axis, bucket, .. }) = cuts.into_iter().flatten().reduce(cheaper) else { return items.len() / 2 };
 
-    let (min, extent) = (centers.min[axis], centers.max[axis] - centers.min[axis]);
     let mut middle = 0;
     for i in 0..items.len() {
-        if bucket(items[i].center[axis], min, extent) < cut {
+        if axis.bucket(items[i].center()) < bucket {
             items.swap(i, middle);
             middle += 1;
         }
@@ -77,39 +77,115 @@ fn split(items: &mut [Item]) -> usize {
     middle
 }
 
+/// The cuts of minimum cost along each axis, by one pass over the items.
+fn all_cuts(items: &[Item], axes: [Option<Axis>; 3]) -> [Option<Cut>; 3] {
+    let mut buckets = [[Bucket::EMPTY; BUCKETS]; 3];
+    for item in items {
+        let center = item.center();
+        for (buckets, axis) in buckets.iter_mut().zip(axes) {
+            if let Some(axis) = axis {
+                axis.add(buckets, item, center);
+            }
+        }
+    }
+    let mut buckets = buckets.iter();
+    axes.map(|axis| axis.zip(buckets.next()).and_then(|(axis, buckets)| axis.cut(buckets)))
+}
+
+/// The lights of a bucket.
+#[derive(Clone, Copy)]
+struct Bucket {
+    /// Ends of their bounding box, in registers: whole vectors are stored and loaded.
+    min: Vec3A,
+    max: Vec3A,
+    /// Their other bounds.
+    lights: LightBounds,
+}
+
+impl Bucket {
+    const EMPTY: Bucket = Bucket { min: Vec3A::INFINITY, max: Vec3A::NEG_INFINITY, lights: LightBounds::EMPTY };
+
+    #[inline]
+    fn add(&mut self, light: &LightBounds) {
+        (self.min, self.max) = (self.min.min(light.bounds.min.into()), self.max.max(light.bounds.max.into()));
+        self.lights.add_emission(light);
+    }
+
+    fn bounds(&self) -> LightBounds {
+        LightBounds { bounds: Bounds3 { min: self.min.into(), max: self.max.into() }, ..self.lights }
+    }
+}
+
+/// The buckets of one axis: equal parts of the extent of the centres.
+#[derive(Clone, Copy)]
+struct Axis {
+    axis: usize,
+    min: f32,
+    extent: f32,
+    /// Factor of all costs: long thin parts are worse, so the aspect ratio of the items regularises.
+    stretch: f32,
+}
+
 /// A split along an axis.
 struct Cut {
     cost: f32,
-    axis: usize,
+    axis: Axis,
     /// The first bucket right of the split.
     bucket: usize,
 }
 
-/// The split of minimum cost along an axis.
-fn best_cut(items: &[Item], axis: usize, min: f32, extent: f32) -> Option<Cut> {
-    let mut buckets = [LightBounds::EMPTY; BUCKETS];
-    for item in items {
-        let b = &mut buckets[bucket(item.center[axis], min, extent)];
-        *b = b.union(&item.bounds);
+impl Axis {
+    /// `None` if the centres have no extent along the axis.
+    fn new(axis: usize, centers: &Bounds3, all: &Bounds3) -> Option<Axis> {
+        let (min, extent) = (centers.min[axis], centers.max[axis] - centers.min[axis]);
+        let diagonal = all.diagonal();
+        let stretch = diagonal.max_element() / diagonal[axis];
+        (extent > 0.0 && extent.is_finite()).then_some(Axis { axis, min, extent, stretch })
     }
-    // Costs right of each split, from the end; then left costs from the start.
-    let mut right_costs = [0.0; BUCKETS];
-    let mut right = LightBounds::EMPTY;
-    for i in (1..BUCKETS).rev() {
-        right = right.union(&buckets[i]);
-        right_costs[i] = if right.intensity > 0.0 { right.cost() } else { f32::INFINITY };
+
+    #[inline]
+    fn bucket(&self, center: Vec3) -> usize {
+        (((center[self.axis] - self.min) / self.extent * BUCKETS as f32) as usize).min(BUCKETS - 1)
     }
-    let mut left = LightBounds::EMPTY;
-    let mut best: Option<Cut> = None;
-    for bucket in 1..BUCKETS {
-        left = left.union(&buckets[bucket - 1]);
-        let cost = left.cost() + right_costs[bucket];
-        if left.intensity > 0.0
-            && right_costs[bucket] < f32::INFINITY
-            && best.as_ref().is_none_or(|best| cost < best.cost)
-        {
-            best = Some(Cut { cost, axis, bucket });
+
+    #[inline]
+    fn add(&self, buckets: &mut [Bucket; BUCKETS], item: &Item, center: Vec3) {
+        buckets[self.bucket(center)].add(&item.bounds);
+    }
+
+    fn buckets(&self, items: &[Item]) -> [Bucket; BUCKETS] {
+        let mut buckets = [Bucket::EMPTY; BUCKETS];
+        items.iter().for_each(|item| self.add(&mut buckets, item, item.center()));
+        buckets
+    }
+
+    /// The split of minimum cost, the first of equal ones; `None` if all lights are in one bucket.
+    fn cut(self, buckets: &[Bucket; BUCKETS]) -> Option<Cut> {
+        // Only splits behind a bucket with lights can have another cost than the split before
+        let mut filled = [(0, LightBounds::EMPTY); BUCKETS];
+        let mut count = 0;
+        for (i, bucket) in buckets.iter().enumerate().filter(|(_, bucket)| bucket.lights.intensity > 0.0) {
+            filled[count] = (i, bucket.bounds());
+            count += 1;
         }
+
+        // Costs right of each split, from the end; then left costs from the start
+        let mut right_costs = [0.0; BUCKETS];
+        let mut right = LightBounds::EMPTY;
+        for i in (1..count).rev() {
+            right.add(&filled[i].1);
+            right_costs[i] = right.cost();
+        }
+        let mut left = LightBounds::EMPTY;
+        let mut best: Option<Cut> = None;
+        for i in 1..count {
+            let (last, bounds) = &filled[i - 1];
+            left.add(bounds);
+            let cost = left.cost() + right_costs[i];
+            if right_costs[i] < f32::INFINITY && best.as_ref().is_none_or(|best| cost < best.cost) {
+                best = Some(Cut { cost, axis: self, bucket: last + 1 });
+            }
+        }
+        best.map(|best| Cut { cost: best.cost * self.stretch, ..best })
     }
-    best
 }

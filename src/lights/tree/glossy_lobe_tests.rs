@@ -21,7 +21,7 @@ fn second_moments(alpha: f32) -> [f64; 2] {
                 Light::Point(PointLight { p, intensity: Rgb::splat(s.random::<f32>() + 0.1) })
             })
             .collect();
-        let tree = LightTree::new(&lights.iter().map(Light::bounds).collect::<Vec<_>>());
+        let tree = LightTree::new(&lights, |_| true);
         let wo = sample_cosine_hemisphere(s.random::<[f32; 2]>());
 
         // Contexts with and without the lobe

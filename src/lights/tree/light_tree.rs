@@ -5,9 +5,10 @@ use super::branches::{Branches, COLUMNS};
 use super::build::{Item, build};
 use super::node::Node;
 use super::sampled_light::{LightRun, SampledLight, UNIT};
-use crate::lights::{LightBounds, LightCtx, LightId};
+use crate::lights::{Light, LightBounds, LightCtx, LightId};
 use lumiris_numbers::math::ONE_MINUS_EPSILON;
 use lumiris_numbers::math::light_bound::{LightBound, first_probability};
+use rayon::prelude::*;
 use std::ops::Deref;
 
 /// Maximum size of the stack of subtrees in [`LightTree::runs`]: one per level.
@@ -88,16 +89,17 @@ impl<'a> RunPositions<'a> {
 }
 
 impl LightTree {
-    /// The tree over the lights that have bounds; the index into `bounds` is the light's id.
-    pub fn new(bounds: &[Option<LightBounds>]) -> Self {
-        let mut items: Vec<Item> = bounds
-            .iter()
+    /// The tree over the lights that have bounds and that `holds` is true for.
+    pub fn new(lights: &[Light], holds: impl Fn(&Light) -> bool + Sync) -> Self {
+        let mut items: Vec<Item> = lights
+            .par_iter()
             .enumerate()
-            .filter_map(|(id, b)| b.map(|b| Item { id: id as LightId, bounds: b, center: b.bounds.center() }))
-            .filter(|item| item.center.is_finite() && item.bounds.intensity > 0.0)
+            .filter(|(_, light)| holds(light))
+            .filter_map(|(id, light)| Some(Item { id: id as LightId, bounds: light.bounds()? }))
+            .filter(|item| item.bounds.bounds.center().is_finite() && item.bounds.intensity > 0.0)
             .collect();
         let mut tree =
-            LightTree { trails: vec![NO_TRAIL; bounds.len()], leaves: vec![0; bounds.len()], ..LightTree::default() };
+            LightTree { trails: vec![NO_TRAIL; lights.len()], leaves: vec![0; lights.len()], ..LightTree::default() };
         if !items.is_empty() {
             tree.nodes = vec![Node::new(&LightBounds::EMPTY, true, 0); 2 * items.len() - 1];
             build(&mut tree.nodes, 0, &mut items, 0);
@@ -452,7 +454,7 @@ impl LightTree {
 mod tests {
     use super::*;
     use crate::geometry::{Shape, TriangleMesh};
-    use crate::lights::{Emission, GlossyLobe, Light, PointLight, SpotLight, area_lights_of};
+    use crate::lights::{Emission, GlossyLobe, PointLight, SpotLight, area_lights_of};
     use lumiris_numbers::math::warp::sample_uniform_sphere;
     use lumiris_numbers::math::{Rgb, Vec3};
     use lumiris_test_support::assert_chi_squared;
@@ -488,7 +490,7 @@ mod tests {
     }
 
     fn tree_of(lights: &[Light]) -> LightTree {
-        LightTree::new(&lights.iter().map(Light::bounds).collect::<Vec<_>>())
+        LightTree::new(lights, |_| true)
     }
 
     fn random_ctx(s: &mut Pcg32, scale: f32) -> LightCtx {
@@ -578,6 +580,16 @@ mod tests {
                 }
             }
         }
+    }
+
+    #[test]
+    fn the_tree_does_not_depend_on_the_number_of_threads() {
+        let lights = random_lights(20_000, 1.0, 3);
+        let [one, three] = [1, 3].map(|threads| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            pool.install(|| format!("{:?}", tree_of(&lights)))
+        });
+        assert!(one == three);
     }
 
     #[test]

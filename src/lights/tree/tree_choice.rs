@@ -3,7 +3,7 @@
 use super::branches::Branches;
 use super::light_tree::{LightTree, RunPositions};
 use super::sampled_light::{LightRun, SampledLight, UNIT};
-use crate::lights::{Light, LightCtx, LightId};
+use crate::lights::{LightCtx, LightId};
 use lumiris_numbers::math::ONE_MINUS_EPSILON;
 use std::ops::Deref;
 use std::sync::Arc;
@@ -29,27 +29,12 @@ pub(in crate::lights) fn one_of(lights: &[LightId], u: f32, pmf: f32) -> Sampled
 }
 
 impl TreeChoice {
-    /// A choice among `lights` that have power, in a scene of radius `scene_radius` (m); `infinite_fraction` as in [`new`](Self::new).
-    pub(in crate::lights) fn of_lights(lights: &[Light], scene_radius: f32, infinite_fraction: Option<f32>) -> Self {
-        let powers: Vec<f32> = lights.iter().map(|light| light.power_luminance(scene_radius)).collect();
-        Self::new(lights, &powers, infinite_fraction, false)
-    }
-
-    /// A choice among `lights` with the given `powers`. `volumes`: emitting parts of media are included.
-    /// `infinite_fraction` is the total probability of the infinite lights (0 to 1, exclusive); `None`: each has the
-    /// same probability as the whole tree.
-    pub(in crate::lights) fn new(
-        lights: &[Light],
-        powers: &[f32],
-        infinite_fraction: Option<f32>,
-        volumes: bool,
-    ) -> Self {
-        let is_asked_for = |light: &&Light| volumes || !matches!(light, Light::Volume(_));
-        let bounds: Vec<_> = lights.iter().map(|light| Some(light).filter(is_asked_for)?.bounds()).collect();
-        let is_chosen = |&i: &usize| lights[i].is_infinite() && powers[i] > 0.0;
-        let infinite: Vec<LightId> = (0..lights.len()).filter(is_chosen).map(|i| i as LightId).collect();
+    /// A choice among the lights of `tree` and the lights `infinite` beside it, ascending. `infinite_fraction` is the
+    /// total probability of the infinite lights (0 to 1, exclusive); `None`: each has the same probability as the whole
+    /// tree.
+    pub(in crate::lights) fn new(tree: Arc<LightTree>, infinite: Vec<LightId>, infinite_fraction: Option<f32>) -> Self {
         let odds = infinite_fraction.map_or(1.0, |f| f / ((1.0 - f) * infinite.len().max(1) as f32));
-        TreeChoice { tree: Arc::new(LightTree::new(&bounds)), infinite, odds }
+        TreeChoice { tree, infinite, odds }
     }
 
     /// Total probability of the infinite lights; 1 if no light in the tree can contribute.

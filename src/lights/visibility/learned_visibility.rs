@@ -224,9 +224,10 @@ impl LearnedVisibility {
 mod tests {
     use super::super::visibility_cache::{PathCount, PrimaryPhoton};
     use super::*;
-    use crate::lights::{DistantLight, PointLight, SurfacePoint};
+    use crate::lights::{DistantLight, LightTree, PointLight, SurfacePoint};
     use lumiris_numbers::math::{Rgb, Vec3};
     use lumiris_test_support::random::{RngExt, pcg32};
+    use std::sync::Arc;
 
     const RADIUS: f32 = 20.0;
     const AT: Vec3 = Vec3::new(0.5, 0.5, 0.0);
@@ -251,7 +252,12 @@ mod tests {
 
     fn learned(cache: &VisibilityCache) -> LearnedVisibility {
         let lights = lamps();
-        LearnedVisibility::new(TreeChoice::of_lights(&lights, RADIUS, None), &lights, RADIUS, cache)
+        LearnedVisibility::new(choice(&lights), &lights, RADIUS, cache)
+    }
+
+    fn choice(lights: &[Light]) -> TreeChoice {
+        let infinite = (0..).zip(lights).filter(|(_, light)| light.is_infinite()).map(|(id, _)| id).collect();
+        TreeChoice::new(Arc::new(LightTree::new(lights, |_| true)), infinite, None)
     }
 
     #[test]
@@ -263,7 +269,7 @@ mod tests {
             let photon = PrimaryPhoton { at: SurfacePoint { p: AT, n: Vec3::Z }, light: 0 };
             let cache = VisibilityCache::new(&[photon], 0.1);
             let cache = cache.with_paths(std::iter::once(PathCount { light: 0, paths }));
-            let learned = LearnedVisibility::new(TreeChoice::of_lights(&lights, RADIUS, None), &lights, RADIUS, &cache);
+            let learned = LearnedVisibility::new(choice(&lights), &lights, RADIUS, &cache);
             let importance = learned.importance(&ctx, 0);
             move |count| learned.visibility(0, importance, count)
         };
