@@ -40,6 +40,14 @@ impl<S: Simd> SphericalSetup<S> {
         SphericalSetup { x, y, z0, solid_angle, rotation: (g23.0 * scale, -(g23.1 * scale)), b, k }
     }
 
+    /// Memory of a setup.
+    #[inline(always)]
+    pub(super) fn empty(simd: S) -> Self {
+        let zero = f64x8::splat(simd, 0.0);
+        let (two, rotation) = ([zero; 2], (zero, zero));
+        SphericalSetup { x: two, y: two, z0: zero, solid_angle: zero, rotation, b: two, k: zero }
+    }
+
     /// The setup for the points `from`.
     #[inline(always)]
     pub(super) fn from_points(rectangle: &Rectangle, from: [f64x8<S>; 3]) -> Self {
