@@ -94,6 +94,9 @@ pub(super) struct PathState {
     pub(super) chain: Chain,
 }
 
+// More would not fit the cache beside the other columns of a batch
+const _: () = assert!(size_of::<PathState>() <= 80);
+
 impl PathState {
     /// Emission of a surface that the ray hits, times throughput and MIS weight.
     pub(super) fn emission(
