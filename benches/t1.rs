@@ -10,7 +10,7 @@ use lumiris::bsdfs::{
 use lumiris::lights::{EnvironmentFilter, EnvironmentMap, EnvironmentMapping};
 use lumiris::lights::{Light, LightCtx, LightLanes, PointLight};
 use lumiris::materials::SurfaceBsdf;
-use lumiris_lanes::curve::{hilbert_points, hilbert_points_scalar, strata, strata_scalar};
+use lumiris_lanes::hilbert::{hilbert_points, hilbert_points_scalar, strata, strata_scalar};
 use lumiris_lanes::ris_weights::{Proposals, Weights, weigh};
 use lumiris_numbers::estimators::heuristics::Heuristic;
 use lumiris_numbers::math::hash::pcg4d;

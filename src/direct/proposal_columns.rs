@@ -16,7 +16,7 @@ use crate::scene::RenderJob;
 use crate::settings::{ProposalPoints, Target};
 use lumiris_lanes::columns::{Column, Columns3, padded};
 use lumiris_lanes::lane::LANES;
-use lumiris_lanes::{curve, ris_weights};
+use lumiris_lanes::{hilbert, ris_weights};
 use lumiris_numbers::estimators::heuristics::Heuristic;
 use lumiris_numbers::estimators::ris::control::{ControlSum, doubt};
 use lumiris_numbers::estimators::ris::weight;
@@ -186,7 +186,7 @@ impl ProposalColumns {
         self.jitter.resize(count as usize, 0);
         match points {
             ProposalPoints::Stratified => {
-                curve::strata(phi, POSITIONS, count, &mut self.positions, &mut self.jitter);
+                hilbert::strata(phi, POSITIONS, count, &mut self.positions, &mut self.jitter);
             }
             ProposalPoints::Independent => {
                 for (i, (position, jitter)) in self.positions.iter_mut().zip(&mut self.jitter).enumerate() {
@@ -209,7 +209,7 @@ impl ProposalColumns {
             self.chosen[from..to].fill(ChosenLight { light: run.light, pmf: run.pmf });
         }
         let [u0, u1] = &mut self.u;
-        curve::hilbert_points(&self.positions, &self.jitter, &mut u0[start..end], &mut u1[start..end]);
+        hilbert::hilbert_points(&self.positions, &self.jitter, &mut u0[start..end], &mut u1[start..end]);
         (start..end).for_each(|i| self.p.set(i, point.p));
     }
 

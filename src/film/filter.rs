@@ -5,7 +5,7 @@
 //! al. 2023, §8.8]. All filters are products of a function of x and a function of y. Box and triangle are sampled in
 //! closed form; all others from piecewise constant tables of [`ENTRIES_PER_UNIT`] equal steps per pixel.
 //!
-//! `integrators/camera_samples.rs` draws the positions; `render/tile_samples.rs` adds the weighted samples.
+//! `integrators/camera_sampler.rs` draws the positions; `render/tile_samples.rs` adds the weighted samples.
 
 use lumiris_numbers::math::warp::sample_tent;
 use lumiris_numbers::math::{PiecewiseConstant1D, Vec2};

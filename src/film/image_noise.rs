@@ -1,5 +1,5 @@
 //! The noise of an image, by blocks of pixels. It is the target of `--noise`, for which `planning/noise_target.rs`
-//! plans the samples, and printed for finished images.
+//! plans the samples, and printed in the progress line and for finished images.
 //!
 //! The noise of a block of [`BLOCK`] × [`BLOCK`] pixels is σ/(|m| + 0.01), where m is the mean luminance of its pixels,
 //! and σ² the mean of their variances.

@@ -1,4 +1,4 @@
-//! Camera samples: the beginnings of paths.
+//! Camera samples: the beginnings of paths. `CameraSampler` draws them.
 
 use crate::accel::RayBatch;
 use crate::cameras::CameraRay;

@@ -6,11 +6,11 @@
 //! through the interiors of materials, `direct_light` adds L_d, `scatter` samples the next segments, and `roulette` ends
 //! paths. Neighbouring pixels may share paths ([`reuse`], [`cells`]), and light paths add caustics ([`light_paths`]).
 //! [`exclusions`] lists the features that exclude each other. [`irradiance_cache`] and [`photon_map`] replace the light
-//! reflected by Lambertian lobes (`diffuse`). [`camera_samples`] makes camera rays, and [`light_layers`] sums light by
+//! reflected by Lambertian lobes (`diffuse`). [`camera_sampler`] makes camera rays, and [`light_layers`] sums light by
 //! light group.
 
 mod camera_sample;
-pub mod camera_samples;
+pub mod camera_sampler;
 pub mod cells;
 mod choice;
 mod diffuse;

@@ -6,7 +6,7 @@
 use super::constants::{FACT_RAYS, LIGHT_SAMPLES};
 use crate::accel::{Coherence, RayBatch};
 use crate::bsdfs::Bsdf;
-use crate::integrators::camera_samples::CameraSampler;
+use crate::integrators::camera_sampler::CameraSampler;
 use crate::lights::{LightCtx, LightId};
 use crate::scene::{RenderJob, SurfaceInteraction};
 use lumiris_numbers::math::hash::{pcg4d, unit_f32};

@@ -4,7 +4,7 @@ use crate::direct::Fits;
 use crate::film::accumulator::RadianceAccumulator;
 use crate::film::{FeatureSet, PixelSample};
 use crate::integrators::CameraSamples;
-use crate::integrators::camera_samples::{CameraSampler, PixelSampleRange, Scratch};
+use crate::integrators::camera_sampler::{CameraSampler, PixelSampleRange, Scratch};
 use crate::integrators::cells::Blocks;
 use crate::integrators::exclusions::{self, Feature};
 use crate::integrators::light_paths::{self, LightPilot};

@@ -10,11 +10,11 @@ use crate::direct::Fits;
 use crate::film::PixelBounds;
 use crate::integrators::CameraSamples;
 use crate::integrators::PathTracer;
-use crate::integrators::camera_samples::CameraSampler;
+use crate::integrators::camera_sampler::CameraSampler;
 use crate::scene::{RenderJob, SampleCountMap};
 use crate::settings::ris::COSTS;
 use crate::settings::{EstimatorKind, IntegratorKind, IntegratorSettings, Proposals, SampleCounts, Strata, Target};
-use lumiris_numbers::estimators::ris::choice::{Costs, MomentsEstimate, Variances, clamp_ratio, optimal_ratio};
+use lumiris_numbers::estimators::ris::sample_counts::{Costs, MomentsEstimate, Variances, clamp_ratio, optimal_ratio};
 use rayon::prelude::*;
 
 /// Seed of the pilot. It must not use the random numbers of the image, whose samples would then depend on the choice.

@@ -12,7 +12,7 @@ use super::render_settings::RenderSettings;
 use crate::accel::{Coherence, Hit};
 use crate::film::{Film, PixelBounds};
 use crate::integrators::CameraSamples;
-use crate::integrators::camera_samples::{CameraSampler, PixelSampleRange, Scratch};
+use crate::integrators::camera_sampler::{CameraSampler, PixelSampleRange, Scratch};
 use crate::integrators::path::BATCH_PATHS;
 use crate::planning::preparation::{ThreadError, thread_pool};
 use crate::scene::{RenderJob, Scene};

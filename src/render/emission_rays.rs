@@ -11,7 +11,7 @@
 use super::tiles::batches;
 use crate::film::{FeatureSet, PixelSample};
 use crate::integrators::CameraSamples;
-use crate::integrators::camera_samples::{CameraSampler, PixelSampleRange, Scratch};
+use crate::integrators::camera_sampler::{CameraSampler, PixelSampleRange, Scratch};
 use crate::integrators::light_layers::{LayerSum, LayerSums};
 use crate::integrators::{PathStats, PathTracer, Tracer};
 use crate::scene::PixelSamples;

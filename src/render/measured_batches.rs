@@ -4,7 +4,7 @@ use super::render_settings::RenderSettings;
 use super::run::Run;
 use crate::film::PixelBounds;
 use crate::integrators::CameraSamples;
-use crate::integrators::camera_samples;
+use crate::integrators::camera_sampler;
 use crate::integrators::path::BATCH_PATHS;
 use crate::scene::RenderJob;
 use std::ops::Range;
@@ -22,7 +22,7 @@ pub struct Batches<'a> {
     /// Tile and pixel range of each batch; pixels are numbered row by row in the tile.
     parts: Vec<(PixelBounds, Range<usize>)>,
     samples: Range<u32>,
-    scratch: camera_samples::Scratch,
+    scratch: camera_sampler::Scratch,
 }
 
 impl<'a> Batches<'a> {
@@ -45,7 +45,7 @@ impl<'a> Batches<'a> {
         let share = rays as f64 / all.max(1) as f64;
         let is_taken = |i: usize| (i as f64 * GOLDEN_RATIO).fract() < share;
         let parts = parts.into_iter().enumerate().filter(|&(i, _)| is_taken(i)).map(|(_, part)| part).collect();
-        Batches { run, parts, samples: 0..per_pixel, scratch: camera_samples::Scratch::default() }
+        Batches { run, parts, samples: 0..per_pixel, scratch: camera_sampler::Scratch::default() }
     }
 
     /// Number of batches.

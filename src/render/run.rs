@@ -16,7 +16,7 @@ use crate::film::packed::PackedSums;
 use crate::film::replicas::ReplicaChoice;
 use crate::film::{FeatureSet, Film, FilmTile, PixelBounds};
 use crate::imaging::tiles::TileStore;
-use crate::integrators::camera_samples::CameraSampler;
+use crate::integrators::camera_sampler::CameraSampler;
 use crate::integrators::cells::REPLICA_CELL;
 use crate::integrators::{PathStats, Statistics, light_layers, make_integrator, reuse};
 use crate::planning::processor_time;

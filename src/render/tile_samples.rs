@@ -8,7 +8,7 @@ use crate::film::PixelBounds;
 use crate::film::replicas::ReplicaAccumulator;
 use crate::integrators::CameraSamples;
 use crate::integrators::PathStats;
-use crate::integrators::camera_samples::{self, PixelSampleRange};
+use crate::integrators::camera_sampler::{self, PixelSampleRange};
 use crate::integrators::cells::{self, REPLICA_CELL};
 use crate::integrators::path::BATCH_PATHS;
 use lumiris_numbers::estimators::ocv::block_of;
@@ -137,7 +137,7 @@ impl Run<'_> {
         tile: &PixelBounds,
         pixels: Range<usize>,
         pass: &Range<u32>,
-        scratch: &mut camera_samples::Scratch,
+        scratch: &mut camera_sampler::Scratch,
         out: &mut CameraSamples,
     ) {
         self.camera.samples(self.ranges(tile, pixels, pass), self.job.settings().sampling.seed, scratch, out);

@@ -8,7 +8,7 @@ use crate::film::accumulator::PixelAccumulator;
 use crate::film::light_layers::{LayerSample, LayerScratch};
 use crate::film::{FeatureSet, PixelBounds, PixelSample};
 use crate::integrators::CameraSamples;
-use crate::integrators::camera_samples::{CameraSampler, PixelSampleRange, Scratch};
+use crate::integrators::camera_sampler::{CameraSampler, PixelSampleRange, Scratch};
 use crate::integrators::{Integrator, PathStats, Tracer};
 use crate::scene::FilmSettings;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};

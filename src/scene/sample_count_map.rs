@@ -2,7 +2,7 @@
 
 use crate::film::PixelBounds;
 use crate::settings::SampleCounts;
-use lumiris_numbers::estimators::ris::choice::{Costs, counts};
+use lumiris_numbers::estimators::ris::sample_counts::{Costs, counts};
 
 /// M/N of every pixel, with equal time per estimate [Talbot 2005, §4.3; Talbot et al. 2005, Fig. 3].
 #[derive(Clone, Debug, PartialEq)]

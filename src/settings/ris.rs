@@ -1,6 +1,6 @@
 //! Settings of `ris`: proposals, strata and targets.
 
-use lumiris_numbers::estimators::ris::choice::Costs;
+use lumiris_numbers::estimators::ris::sample_counts::Costs;
 use strum::{EnumString, IntoStaticStr, VariantNames};
 
 /// Relative costs of a proposal, T1, and of a sample, T2: M/N = T2/T1 = 3 [Talbot 2005, Eq. 4.4]. The measured ratio of

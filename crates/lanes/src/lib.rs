@@ -5,7 +5,7 @@
 //! kernel at the level without vectors, `Level::fallback()`, which the feature `scalar` adds. Kernels contain no
 //! closures and no `map` over arrays: these would be compiled without vector instructions.
 //!
-//! Reading order: [`lane`], [`wide`], [`columns`], [`curve`], [`sampler`], [`light`], [`area`], [`environment`],
+//! Reading order: [`lane`], [`wide`], [`columns`], [`hilbert`], [`sampler`], [`light`], [`area`], [`environment`],
 //! [`kernels`], [`ris_weights`], [`camera`], [`hits`], [`triangles`], [`vertex`], [`connections`], [`light_tree`],
 //! [`sums`].
 
@@ -13,8 +13,8 @@ pub mod area;
 pub mod camera;
 pub mod columns;
 pub mod connections;
-pub mod curve;
 pub mod environment;
+pub mod hilbert;
 pub mod hits;
 pub mod kernels;
 pub mod lane;

@@ -3,7 +3,7 @@
 
 use crate::random::{Pcg32, RngExt, pcg32};
 use lumiris_numbers::estimators::ris::Draw;
-use lumiris_numbers::estimators::ris::choice::Moments;
+use lumiris_numbers::estimators::ris::sample_counts::Moments;
 use lumiris_numbers::estimators::stats::Welford;
 use lumiris_numbers::math::luminance;
 

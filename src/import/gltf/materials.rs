@@ -78,7 +78,7 @@ impl<'a> Materials<'a> {
     pub(super) fn read(&mut self, messages: &mut Messages<'_>) -> Result<(), GltfError> {
         let root = self.document.root();
         for place in root.key("materials").items().chain([root.key("default material")]) {
-            let look = self.look(&place, messages)?;
+            let look = self.appearance(&place, messages)?;
             self.looks.push(look);
         }
         Ok(())
@@ -97,7 +97,7 @@ impl<'a> Materials<'a> {
         BaseColor { factor, texture: pbr.key("baseColorTexture") }
     }
 
-    fn look(&mut self, place: &Place<'a>, messages: &mut Messages<'_>) -> Result<Look, GltfError> {
+    fn appearance(&mut self, place: &Place<'a>, messages: &mut Messages<'_>) -> Result<Look, GltfError> {
         for (name, message) in LEFT_OUT.iter().filter(|(name, _)| place.extension(name).exists()) {
             messages.warning(&place.extension(name), message);
         }

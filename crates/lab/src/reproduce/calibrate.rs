@@ -10,7 +10,7 @@ use super::method::Method;
 use super::{Observer, ReproduceError};
 use lumiris::lights::LightSamplerKind;
 use lumiris::settings::{SampleCounts, Strata};
-use lumiris_numbers::estimators::ris::choice::Costs;
+use lumiris_numbers::estimators::ris::sample_counts::Costs;
 
 /// Turns of a time measurement.
 const TURNS: u32 = 3;

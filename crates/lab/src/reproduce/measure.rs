@@ -18,7 +18,7 @@ use lumiris::planning::processor_time;
 use lumiris::planning::proposals::sample_count_map;
 use lumiris::render::{RenderError, RenderSettings, Rendering, render, thread_pool};
 use lumiris::scene::{AccelKind, RenderJob};
-use lumiris_numbers::estimators::ris::choice::Costs;
+use lumiris_numbers::estimators::ris::sample_counts::Costs;
 use lumiris_numbers::estimators::stats::{Welford, median, z_test};
 use lumiris_numbers::math::luminance;
 use serde::Serialize;

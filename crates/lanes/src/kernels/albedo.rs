@@ -1,4 +1,5 @@
-//! Tabulated directional albedos of GGX reflection, and the multiple scattering computed from them.
+//! Tabulated directional albedos of GGX reflection, and the multiple scattering computed from them. The albedo of a
+//! BSDF is `Bsdf::albedo_estimate`.
 //!
 //! E(μ) is the albedo, for a direction with cosine μ, of a surface whose microfacets reflect everything; E₅(μ) is the
 //! albedo for the reflectance (1 − wo·m)⁵. Schlick's reflectance F₀ + (F₉₀ − F₀)(1 − wo·m)⁵ has the albedo

@@ -3,8 +3,8 @@
 
 mod area;
 mod connections;
-mod curve;
 mod environment;
+mod hilbert;
 mod kernels;
 mod lane;
 mod light;

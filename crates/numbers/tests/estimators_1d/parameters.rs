@@ -1,7 +1,7 @@
 //! The optimal numbers of proposals and samples.
 
 use super::level;
-use lumiris_numbers::estimators::ris::choice::{
+use lumiris_numbers::estimators::ris::sample_counts::{
     Costs, Moments, MomentsEstimate, Variances, clamp_ratio, counts, counts_of_sets, length, optimal_ratio,
 };
 use lumiris_numbers::estimators::ris::{strata, stratified, with_replacement};

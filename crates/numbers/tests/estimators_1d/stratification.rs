@@ -1,6 +1,6 @@
 //! Strata compared with none, and methods to choose strata of equal weights.
 
-use lumiris_numbers::estimators::ris::choice::length;
+use lumiris_numbers::estimators::ris::sample_counts::length;
 use lumiris_numbers::estimators::ris::{strata, stratified, with_replacement};
 use lumiris_numbers::estimators::stats::Welford;
 use lumiris_test_support::integrals::{ALL, Integral, Proposals, fill, run};

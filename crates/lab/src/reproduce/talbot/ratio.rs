@@ -15,7 +15,7 @@ use super::report::method_json;
 use super::scenes::Which;
 use super::{Setup, portrait};
 use lumiris::settings::SampleCounts;
-use lumiris_numbers::estimators::ris::choice::{Costs, Variances, clamp_ratio, optimal_ratio};
+use lumiris_numbers::estimators::ris::sample_counts::{Costs, Variances, clamp_ratio, optimal_ratio};
 use serde_json::json;
 use std::time::{Duration, Instant};
 

@@ -19,12 +19,12 @@
 //! | [`reservoir`] | one of a stream | [Chao 1982] |
 //! | [`strata`] | the strata: equal counts or equal weights | thesis 4.5.2.1, 4.5.2.2 |
 //! | [`control`] | estimated visibility as a control variate | |
-//! | [`choice`] | numbers of proposals and samples | thesis (4.3), (4.4); paper (2), (3) |
+//! | [`sample_counts`] | numbers of proposals and samples | thesis (4.3), (4.4); paper (2), (3) |
 
-pub mod choice;
 pub mod control;
 pub mod draw;
 pub mod reservoir;
+pub mod sample_counts;
 pub mod strata;
 
 pub use draw::{Draw, stratified, systematic, weight, with_replacement};

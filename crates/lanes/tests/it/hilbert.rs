@@ -1,6 +1,6 @@
-//! Tests of `lumiris_lanes::curve`.
+//! Tests of `lumiris_lanes::hilbert`.
 
-use lumiris_lanes::curve::*;
+use lumiris_lanes::hilbert::*;
 use lumiris_numbers::math::hash::pcg4d;
 use lumiris_test_support::assert_chi_squared;
 
