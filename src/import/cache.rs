@@ -5,13 +5,14 @@
 //! dropped when the next one has been loaded ([`FileCache::end_scene`]), so memory holds the content of two scenes at
 //! most. Text of scene files is not cached, since it changes between scenes.
 //!
-//! If the textures of a scene exceed a memory limit, the largest of them are stored in tiles of a temporary file
+//! If the textures of a scene exceed their memory limit, or the memory that a limit of the process leaves, the largest of them are stored in tiles of a temporary file
 //! ([`crate::imaging::tiles`]), and all others in memory. At least half of the limit remains for the tiles in use. With a
 //! folder for textures ([`super::texture_cache`]), all are read by tiles of its files.
 
 use super::face_maps::{FaceMapRequest, load_face_map};
 use super::images::{ImageChannels, ImageEncoding, ImageRequest, RgbImage, load_map, load_rgb, load_tiled_map};
 use super::measured::{MeasuredError, load_tables};
+use super::memory::{MemoryAccount, MemoryLimit};
 use super::texture_cache::TextureCache;
 use super::volumes::{Volume, VolumeRequest, VolumeUse, load_volume};
 use crate::bsdfs::MeasuredTables;
@@ -21,12 +22,16 @@ use crate::imaging::{ColorEncoding, FaceMap, Filter, MipMap, Wrap};
 use lumiris_formats::nanovdb::NanoError;
 use lumiris_formats::ply::{PlyError, PlyMesh, read_ply};
 use lumiris_formats::ptex::PtexError;
+use rayon::prelude::*;
 use std::collections::HashMap;
 use std::io;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use std::time::SystemTime;
+
+/// Minimum memory of tiles of textures for which a scene is rendered (bytes).
+const MIN_TILES: u64 = 8 << 20;
 
 /// Identifies the state of a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -113,6 +118,10 @@ pub struct FileCache {
     shared: AtomicU64,
     /// Maximum memory of the textures of a scene (bytes).
     texture_memory: OnceLock<u64>,
+    /// Limit of the process.
+    memory: OnceLock<MemoryLimit>,
+    /// True after the first scene.
+    has_ended: AtomicBool,
     /// Folder of textures for later runs.
     texture_cache: OnceLock<Arc<TextureCache>>,
     /// Held while a texture is read into tiles: one at a time, since the whole texture is in memory meanwhile.
@@ -128,6 +137,37 @@ pub struct TexturePlan {
     is_tiled: Vec<bool>,
 }
 
+fn sum(sizes: &[u64]) -> u64 {
+    sizes.iter().fold(0, |sum, &bytes| sum.saturating_add(bytes))
+}
+
+/// A limit of the memory of textures, if those of these `sizes` exceed the `left` memory, but fit by tiles.
+fn texture_room(sizes: &[u64], left: u64) -> Option<u64> {
+    // A texture is in memory as a whole while it is divided into tiles
+    let largest = sizes.iter().copied().max().unwrap_or(0);
+    let room = left.saturating_sub(largest);
+    (sum(sizes) > left && room >= MIN_TILES).then_some(room)
+}
+
+/// Textures to be stored in tiles: if all exceed the limit, the largest ones, until the others take half of it.
+fn in_tiles(sizes: &[u64], limit: u64) -> Vec<bool> {
+    let mut is_tiled = vec![false; sizes.len()];
+    let mut in_memory = sum(sizes);
+    if in_memory <= limit {
+        return is_tiled;
+    }
+    let mut by_size: Vec<usize> = (0..sizes.len()).collect();
+    by_size.sort_by_key(|&i| (std::cmp::Reverse(sizes[i]), i));
+    for i in by_size {
+        if in_memory <= limit / 2 {
+            break;
+        }
+        is_tiled[i] = true;
+        in_memory -= sizes[i];
+    }
+    is_tiled
+}
+
 impl FileCache {
     /// A cache for several scenes.
     pub fn keeping() -> Self {
@@ -137,6 +177,24 @@ impl FileCache {
     /// Limits the memory of the textures of each scene (bytes). The first call is effective, later ones are ignored.
     pub fn limit_textures(&self, bytes: u64) {
         self.texture_memory.get_or_init(|| bytes);
+    }
+
+    /// Refuses the first scene if it exceeds the limit, and stores textures in tiles where it fits only so, unless their
+    /// memory is limited already. Later scenes have the same limit of textures. The first call is effective, later ones
+    /// are ignored.
+    pub fn limit_memory(&self, limit: MemoryLimit) {
+        self.memory.get_or_init(|| limit);
+    }
+
+    /// The limit of the process for the next scene, if there is one.
+    pub fn memory_limit(&self) -> Option<&MemoryLimit> {
+        // Content of a scene before would count twice
+        self.memory.get().filter(|_| !self.has_ended.load(Ordering::Relaxed))
+    }
+
+    /// An error message if the scene exceeds the limit of the process.
+    pub fn refusal(&self, account: &MemoryAccount) -> Option<String> {
+        account.refusal(self.memory_limit()?)
     }
 
     /// Keeps textures in a folder for later runs. The first call is effective, later ones are ignored. Returns `Err` if
@@ -152,33 +210,38 @@ impl FileCache {
         self.texture_cache.get().map_or_else(Vec::new, |cache| cache.take_warnings())
     }
 
-    /// Plans the storage of the images of `requests`, by the sizes in their headers.
+    /// Plans the storage of the images of `requests`, by the sizes in their headers, and adds it to the account.
     ///
     /// Returns `Err` if the temporary file cannot be created.
-    pub fn plan_textures<'a>(&self, requests: impl Iterator<Item = &'a ImageRequest>) -> io::Result<TexturePlan> {
-        let limit = self.texture_memory.get();
+    pub fn plan_textures(&self, requests: &[&ImageRequest], account: &mut MemoryAccount) -> io::Result<TexturePlan> {
+        let (given, memory) = (self.texture_memory.get().copied(), self.memory_limit());
         if self.texture_cache.get().is_some() {
-            let store = TileStore::new(limit.copied().unwrap_or(u64::MAX))?;
-            return Ok(TexturePlan { store: Some(Arc::new(store)), is_tiled: Vec::new() });
+            // Its files are not opened
+            let capacity = given.or_else(|| Some(account.left(memory?))).unwrap_or(u64::MAX);
+            let store = Some(Arc::new(TileStore::new(capacity)?));
+            return Ok(TexturePlan { store, is_tiled: Vec::new() });
         }
-        let Some(&limit) = limit else { return Ok(TexturePlan::default()) };
-        // Coarser levels add a third. An unreadable image counts as 0; reading it reports the error
-        let pyramid = |request: &ImageRequest| texture_bytes(&request.path).map_or(0, |b| b.saturating_add(b / 3));
-        let bytes: Vec<u64> = requests.map(pyramid).collect();
-        let mut in_memory = bytes.iter().fold(0_u64, |sum, &b| sum.saturating_add(b));
-        if in_memory <= limit {
+        if given.is_none() && memory.is_none() {
             return Ok(TexturePlan::default());
         }
-        let mut by_size: Vec<usize> = (0..bytes.len()).collect();
-        by_size.sort_by_key(|&i| (std::cmp::Reverse(bytes[i]), i));
-        let mut is_tiled = vec![false; bytes.len()];
-        for i in by_size {
-            if in_memory <= limit / 2 {
-                break;
-            }
-            is_tiled[i] = true;
-            in_memory -= bytes[i];
+
+        // Coarser levels add a third. An unreadable image counts as 0; reading it reports the error
+        let size = |request: &&ImageRequest| texture_bytes(&request.path).map_or(0, |b| b.saturating_add(b / 3));
+        let sizes: Vec<u64> = requests.par_iter().map(size).collect();
+        let room = || texture_room(&sizes, account.left(memory?));
+        let limit = given.or_else(|| room().map(|room| *self.texture_memory.get_or_init(|| room))).unwrap_or(u64::MAX);
+        let is_tiled = in_tiles(&sizes, limit);
+
+        // Account
+        let mut in_memory = 0_u64;
+        for ((request, &bytes), _) in requests.iter().zip(&sizes).zip(&is_tiled).filter(|(_, is_tiled)| !**is_tiled) {
+            account.add(request.path.display().to_string(), bytes);
+            in_memory = in_memory.saturating_add(bytes);
         }
+        if !is_tiled.contains(&true) {
+            return Ok(TexturePlan::default());
+        }
+        account.add("tiles of textures", (limit - in_memory).min(sum(&sizes) - in_memory));
         Ok(TexturePlan { store: Some(Arc::new(TileStore::new(limit - in_memory)?)), is_tiled })
     }
 
@@ -242,6 +305,7 @@ impl FileCache {
 
     /// Ends a scene: drops content that it did not use, and returns the numbers of files that it read and shared.
     pub fn end_scene(&self) -> FileCounts {
+        self.has_ended.store(true, Ordering::Relaxed);
         self.meshes.drop_unused();
         self.maps.drop_unused();
         self.images.drop_unused();

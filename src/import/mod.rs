@@ -5,7 +5,8 @@
 //! [`LoadOptions`], and returns a [`Loaded`] scene.
 //!
 //! The files themselves are parsed by the crate `lumiris_formats`. User input never panics: problems are collected,
-//! with their source locations, in [`lumiris_formats::diagnostic::Diagnostics`].
+//! with their source locations, in [`lumiris_formats::diagnostic::Diagnostics`]. A scene that exceeds a limit of memory is
+//! refused before its files are read ([`memory`]).
 
 pub mod cache;
 pub mod face_maps;
@@ -17,6 +18,7 @@ mod load;
 mod load_options;
 mod loaded;
 pub mod measured;
+pub mod memory;
 pub mod pbrt;
 pub mod resources;
 pub mod texture_cache;

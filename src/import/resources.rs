@@ -2,6 +2,7 @@
 
 use super::cache::{FileCache, TexturePlan};
 use super::images::ImageRequest;
+use super::memory::MemoryAccount;
 use crate::imaging::MipMap;
 use crate::imaging::oiio::ImageError;
 use crate::textures::ImageId;
@@ -11,6 +12,9 @@ use rayon::prelude::*;
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+
+/// Advice for a scene that does not fit into memory.
+pub const MEMORY_HELP: &str = "`--memory-limit SIZE|off` sets another limit, --texture-memory a limit of textures";
 
 /// A request for a file, and the source position of its first use.
 #[derive(Debug)]
@@ -71,13 +75,19 @@ impl Resources {
         self.requests.list().iter().map(|request| request.file.path.as_path())
     }
 
-    /// Reads all images, in the order of their ids; errors go to `d`.
-    pub fn load(&self, files: &FileCache, d: &mut Diagnostics) -> Vec<Arc<MipMap>> {
+    /// Reads all images, in the order of their ids; errors go to `d`. `None` if the scene does not fit into memory
+    /// together with what `account` has.
+    pub fn load(&self, files: &FileCache, mut account: MemoryAccount, d: &mut Diagnostics) -> Option<Vec<Arc<MipMap>>> {
         let requests = self.requests.list();
-        let plan = files.plan_textures(requests.iter().map(|request| &request.file)).unwrap_or_else(|error| {
+        let wanted: Vec<&ImageRequest> = requests.iter().map(|request| &request.file).collect();
+        let plan = files.plan_textures(&wanted, &mut account).unwrap_or_else(|error| {
             d.error_without_place(format!("there is no temporary file for tiles of textures: {error}"));
             TexturePlan::default()
         });
+        if let Some(refusal) = files.refusal(&account) {
+            d.error_without_place(refusal).help(MEMORY_HELP);
+            return None;
+        }
         let numbered = requests.par_iter().enumerate();
         let loaded: Vec<_> = numbered.map(|(i, request)| files.planned_map(&plan, i, &request.file)).collect();
         for warning in files.take_texture_warnings() {
@@ -90,7 +100,7 @@ impl Resources {
                 Err(error) => report(&error, &file.path, *span, d),
             }
         }
-        maps
+        Some(maps)
     }
 }
 

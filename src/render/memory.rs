@@ -10,7 +10,7 @@ use super::render_settings::RenderSettings;
 use super::tiles::replica_choice;
 use crate::direct::Estimator;
 use crate::film::BAND;
-use crate::imaging::oiio::{ROWS_AT_ONCE, is_loaded};
+use crate::imaging::oiio::{ROWS_AT_ONCE, library_bytes};
 use crate::integrators::light_layers;
 use crate::planning::preparation::thread_pool;
 use crate::scene::RenderJob;
@@ -45,8 +45,7 @@ const FITTED: [usize; 2] = [240, 13];
 const READ: usize = 144 + 24;
 const CHANNELS: usize = 16 * 4;
 const CHANNELS_OF_LAYER: usize = 3 * 4;
-/// Bytes of OpenImageIO with its dependencies, and of a thread with its batches.
-const LIBRARIES: u64 = 118 << 20;
+/// Bytes of a thread with its batches.
 const THREAD: u64 = 8 << 20;
 
 /// The outputs of a job that affect its memory.
@@ -90,13 +89,12 @@ pub fn predict(job: &RenderJob, wanted: &Wanted<'_>) -> Prediction {
     let pixels = bounds.area() as f64;
     let whole = if wanted.is_denoised { DENOISED } else { 0.0 } + wanted.cryptomattes.len() as f64 * IDS;
     let width = bounds.width() as usize;
-    let libraries = if is_loaded() { 0 } else { LIBRARIES };
     let channels = CHANNELS + light_layers::count(job) * CHANNELS_OF_LAYER;
     let band = (BAND as usize + 2) * READ * threads + 2 * ROWS_AT_ONCE * channels;
     Prediction {
         film: (pixels * (share * of_sums(job, render) + whole)) as u64,
         output: (width * (band + of_corrected_rows(job))) as u64,
-        fixed: libraries + THREAD * threads as u64 + job.world.scene.textures.store().map_or(0, |s| s.capacity()),
+        fixed: library_bytes() + THREAD * threads as u64 + job.world.scene.textures.store().map_or(0, |s| s.capacity()),
     }
 }
 

@@ -290,12 +290,22 @@ pub fn read_headers(path: &Path) -> Result<Vec<PartHeader>, ImageError> {
 /// Memory of the colours of an image as a texture (bytes), without coarser levels: one byte per 8-bit value, four for
 /// others. Reads no pixels.
 pub fn texture_bytes(path: &Path) -> Result<u64, ImageError> {
+    let (texels, bytes) = texels_and_bytes(path)?;
+    Ok(texels.saturating_mul(bytes))
+}
+
+/// Number of texels of an image. Reads no pixels.
+pub fn image_texels(path: &Path) -> Result<u64, ImageError> {
+    Ok(texels_and_bytes(path)?.0)
+}
+
+/// Number of texels of an image, and bytes of each as a texture.
+fn texels_and_bytes(path: &Path) -> Result<(u64, u64), ImageError> {
     let (input, layer) = Input::open_colors(path)?;
     let spec = input.spec().map_err(|failure| read_failure(path, failure))?;
     let [width, height] = [spec.width, spec.height].map(|n| u64::try_from(n).unwrap_or(0));
     let bytes = if spec.format == sys::OIIO_FORMAT_U8 { 1 } else { 4 };
-    let channels = layer.channels.as_slice().len() as u64;
-    Ok(width.saturating_mul(height).saturating_mul(channels * bytes))
+    Ok((width.saturating_mul(height), layer.channels.as_slice().len() as u64 * bytes))
 }
 
 /// The error of a failed read.

@@ -16,6 +16,7 @@ use crate::imaging::oiio::ImageError;
 use crate::import::LoadOptions;
 use crate::import::cache::FileCache;
 use crate::import::images::RgbImage;
+use crate::import::memory::{MemoryAccount, ShapeSize};
 use crate::import::resources::report;
 use crate::lights::{
     AlphaMask, DistantLight, Emission, EmissionImage, EnvironmentFilter, EnvironmentMap, EnvironmentMapping, Light,
@@ -29,7 +30,7 @@ use glam::Vec3A;
 use lumiris_formats::gltf::{Document, GltfError, Place};
 use lumiris_numbers::math::origin::{near_origin, rebased};
 use lumiris_numbers::math::{Affine3A, Bounds3, DAffine3, DVec3, Rgb, Vec3};
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -159,8 +160,10 @@ impl<'a> Assembly<'a> {
         files: &FileCache,
         messages: &mut Messages<'_>,
     ) -> Option<Scene> {
+        let mut account = if files.memory_limit().is_some() { self.account() } else { MemoryAccount::default() };
+        account.reserve_image(view.film.bounds.area());
         let textures = &mut self.materials.textures;
-        textures.set.images = textures.resources.load(files, messages.diagnostics);
+        textures.set.images = textures.resources.load(files, account, messages.diagnostics)?;
         if messages.diagnostics.has_errors() {
             return None;
         }
@@ -179,6 +182,26 @@ impl<'a> Assembly<'a> {
             choices,
             origin: self.origin,
         })
+    }
+
+    /// The memory that the geometry will take, whose arrays are in memory.
+    fn account(&self) -> MemoryAccount {
+        let set = &self.set;
+        let mut group_of = vec![None; set.geometries.len()];
+        for (i, group) in set.groups.iter().enumerate() {
+            group.geometries.iter().for_each(|&geometry| group_of[geometry as usize] = Some(i));
+        }
+        let emitting: HashSet<GeometryId> = self.emitters.iter().map(|emitter| emitter.geometry).collect();
+        let size = |(i, geometry): (usize, &Geometry)| ShapeSize {
+            name: Some(self.surfaces[i].name.to_string()),
+            bytes: 0,
+            primitives: if let Shape::Mesh(mesh) = &geometry.shape { mesh.triangle_count() as u64 } else { 0 },
+            emits: emitting.contains(&(i as GeometryId)),
+            group: group_of[i],
+        };
+        let mut account = MemoryAccount::now();
+        account.add_geometry(set.geometries.iter().enumerate().map(size), set.groups.len(), set.instances.len());
+        account
     }
 
     /// The requested scene, or the default of the file.
@@ -211,7 +234,7 @@ impl<'a> Assembly<'a> {
         if let Some(path) = &self.options.environment {
             environment(path, files, messages);
         }
-        self.materials.textures.resources.load(files, messages.diagnostics);
+        self.materials.textures.resources.load(files, MemoryAccount::default(), messages.diagnostics);
     }
 
     /// Adds all meshes, once for every pose.

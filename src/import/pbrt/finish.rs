@@ -13,7 +13,7 @@ use crate::geometry::GeometrySet;
 use crate::imaging::oiio::ImageError;
 use crate::import::cache::FileCache;
 use crate::import::images::RgbImage;
-use crate::import::resources::report;
+use crate::import::resources::{MEMORY_HELP, report};
 use crate::lights::{AlphaMask, Emission, EmissionImage, LightSet, LightSetBuilder};
 use crate::materials::MaterialSet;
 use crate::media::{Medium, MediumSet};
@@ -53,7 +53,9 @@ impl Builder<'_> {
         // Read all files even after errors, so that one run reports all missing ones
         let mut shapes = std::mem::take(&mut self.shapes);
         self.place_single_objects(&mut shapes);
-        let Contents { images, meshes: MeshFiles { meshes, made }, materials } = self.read_files(&mut shapes, files, d);
+        let pixels = options.as_ref().map_or(0, |options| options.film.bounds.area());
+        let Contents { images, meshes: MeshFiles { meshes, made }, materials } =
+            self.read_files(&mut shapes, pixels, files, d)?;
 
         // Put their contents in place
         self.textures.images = images.textures;
@@ -96,17 +98,30 @@ impl Builder<'_> {
         Some(Finished { scene, settings, given })
     }
 
-    /// Reads all files but volumes, and makes the shapes of those that need no textures.
-    fn read_files<'a>(&self, shapes: &mut [ShapeDesc], files: &'a FileCache, d: &mut Diagnostics) -> Contents<'a> {
+    /// Reads all files but volumes, and makes the shapes of those that need no textures. `None` if the scene does not fit
+    /// into memory.
+    fn read_files<'a>(
+        &self,
+        shapes: &mut [ShapeDesc],
+        pixels: usize,
+        files: &'a FileCache,
+        d: &mut Diagnostics,
+    ) -> Option<Contents<'a>> {
+        let mut account = self.geometry_account(shapes, files);
+        account.reserve_image(pixels);
+        if let Some(refusal) = files.refusal(&account) {
+            d.error_without_place(refusal).help(MEMORY_HELP);
+            return None;
+        }
         let (wanted, origin) = (ImageFiles::of(self), self.origin);
         let (entries, textures) = (self.materials.clone(), &self.textures);
 
         // Images first: while one thread loads the image library, the others process meshes and coats
         let (images, (meshes, materials)) = rayon::join(
-            || wanted.read(files, d),
+            || wanted.read(files, account, d),
             || rayon::join(|| MeshFiles::read(shapes, files, origin), || MaterialSet::new(entries, textures)),
         );
-        Contents { images, meshes, materials }
+        Some(Contents { images: images?, meshes, materials })
     }
 
     fn add_environments(&mut self, images: Vec<Result<Arc<RgbImage>, ImageError>>, d: &mut Diagnostics) {

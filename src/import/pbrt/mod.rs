@@ -25,6 +25,7 @@ pub mod materials;
 mod measured;
 pub mod media;
 mod media_presets;
+mod memory;
 pub mod options;
 mod principled;
 mod ptex;

@@ -65,7 +65,7 @@ pub(super) struct SceneArgs {
     #[arg(skip)]
     pub frame: Option<FrameOf>,
     /// Memory for the textures of the scene, such as 2GB, or `off`. The rest is read by tiles from a temporary file (in
-    /// TMPDIR). Images are bit-identical [default: off]
+    /// TMPDIR). Images are bit-identical [default: off, unless only this way the scene fits --memory-limit]
     #[arg(long, value_name = "SIZE", value_parser = parse_limit)]
     pub texture_memory: Option<MemoryLimit>,
     /// Folder that keeps textures in tiles, so that later runs load them at once. Missing ones are added, changed files
@@ -163,8 +163,8 @@ pub(super) struct RenderArgs {
     /// Write times and counts of every stage
     #[arg(long, value_name = "FILE.json")]
     pub stats: Option<PathBuf>,
-    /// Memory limit of the process, such as 24GB, or `off`. A render that would exceed it is refused before it starts
-    /// [default: the memory of the machine and its control groups]
+    /// Memory limit of the process, such as 24GB, or `off`. A scene that would exceed it is refused before its files are
+    /// read, and an image before it is rendered [default: the memory of the machine and its control groups]
     #[arg(long, value_name = "SIZE", value_parser = parse_limit)]
     pub memory_limit: Option<MemoryLimit>,
     /// Print no progress, only warnings and errors

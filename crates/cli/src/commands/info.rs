@@ -2,11 +2,11 @@
 
 use super::args::SceneArgs;
 use super::info_file::facts_of_file;
-use super::memory::{most_taken, taken};
 use super::progress;
 use super::settings::{Setup, load_job};
 use clap::Args;
 use lumiris::geometry::Shape;
+use lumiris::import::memory::{peak_resident, resident};
 use lumiris::lights::Light;
 use lumiris::render::RenderSettings;
 use lumiris::render::memory::{Wanted, predict};
@@ -111,7 +111,7 @@ fn facts(job: &RenderJob) -> Value {
             "texture_bytes_in_tiles": scene.textures.store().map_or(0, |s| s.counts().stored),
             "texture_tiles_at_most_bytes": scene.textures.store().map_or(0, |s| s.capacity()),
             "accel_bytes": accel.bytes, "accel_peak_bytes": accel.peak_bytes,
-            "taken_bytes": taken(), "most_taken_bytes": most_taken(),
+            "taken_bytes": resident(), "most_taken_bytes": peak_resident(),
             "predicted_with_all_layers": predicted(job, true),
             "predicted_without_layers": predicted(job, false),
         },
@@ -128,7 +128,7 @@ fn predicted(job: &RenderJob, has_layers: bool) -> Value {
     let prediction = predict(job, &Wanted { render: &render, cryptomattes: &[], is_denoised: false });
     let pixels = job.world.scene.film.bounds.area().max(1) as u64;
     json!({
-        "bytes": prediction.bytes(), "peak_bytes": most_taken().max(taken() + prediction.bytes()),
+        "bytes": prediction.bytes(), "peak_bytes": peak_resident().max(resident() + prediction.bytes()),
         "film_bytes": prediction.film, "film_bytes_per_pixel": prediction.film / pixels,
         "output_bytes": prediction.output, "fixed_bytes": prediction.fixed,
     })

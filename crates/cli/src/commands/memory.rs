@@ -2,6 +2,7 @@
 
 use super::progress;
 use anyhow::bail;
+use lumiris::import::memory::{MemoryLimit as Limit, kibibytes, peak_resident, resident, size};
 use lumiris::render::memory::Prediction;
 use lumiris::settings::Value;
 use lumiris::settings::value::Kind;
@@ -29,16 +30,20 @@ pub(super) fn parse_limit(text: &str) -> Result<MemoryLimit, String> {
     }
 }
 
-/// Formats bytes as MiB or GiB.
-pub(super) fn size(bytes: u64) -> String {
-    let (unit, shift) = if bytes < 1 << 30 { ("MiB", 20) } else { ("GiB", 30) };
-    format!("{:.1} {unit}", bytes as f64 / f64::from(1 << shift))
+/// The limit of this process: the given one, or else the memory of the machine and its control groups.
+pub(super) fn limit(given: Option<MemoryLimit>) -> Option<Limit> {
+    match given {
+        Some(MemoryLimit::Off) => None,
+        Some(MemoryLimit::Bytes(bytes)) => Some(Limit { bytes, origin: "--memory-limit allows".to_owned() }),
+        None => available()
+            .map(|(bytes, origin)| Limit { bytes: resident() + bytes, origin: format!("there is ({origin})") }),
+    }
 }
 
 /// Refuses an image that does not fit in memory.
 pub(super) fn check(limit: Option<MemoryLimit>, prediction: &Prediction) -> anyhow::Result<()> {
     // Warn if loading exceeded the limit
-    let (taken, most) = (taken(), most_taken());
+    let (taken, most) = (resident(), peak_resident());
     if let Some(MemoryLimit::Bytes(bytes)) = limit
         && bytes < most
     {
@@ -49,15 +54,7 @@ pub(super) fn check(limit: Option<MemoryLimit>, prediction: &Prediction) -> anyh
         ));
     }
 
-    // Find the limit
-    let (limit, origin) = match limit {
-        Some(MemoryLimit::Off) => return Ok(()),
-        Some(MemoryLimit::Bytes(bytes)) => (bytes, "--memory-limit allows".to_owned()),
-        None => match available() {
-            Some((bytes, origin)) => (taken + bytes, format!("there is ({origin})")),
-            None => return Ok(()),
-        },
-    };
+    let Some(Limit { bytes: limit, origin }) = self::limit(limit) else { return Ok(()) };
 
     // Compare it with the need
     let needed = taken + prediction.bytes();
@@ -76,20 +73,6 @@ pub(super) fn check(limit: Option<MemoryLimit>, prediction: &Prediction) -> anyh
     Ok(())
 }
 
-/// Resident memory of this process (bytes); 0 if unknown.
-pub(super) fn taken() -> u64 {
-    of_process("VmRSS:")
-}
-
-/// Peak resident memory of this process (bytes); 0 if unknown.
-pub(super) fn most_taken() -> u64 {
-    of_process("VmHWM:")
-}
-
-fn of_process(name: &str) -> u64 {
-    fs::read_to_string("/proc/self/status").ok().and_then(|text| kibibytes(&text, name)).unwrap_or(0)
-}
-
 /// Available memory (bytes) with its source: the machine's, or less if a control group limits it.
 fn available() -> Option<(u64, String)> {
     let text = fs::read_to_string("/proc/meminfo").ok()?;
@@ -99,12 +82,6 @@ fn available() -> Option<(u64, String)> {
         Some((left, format!("the control group {}", folder.display())))
     });
     groups.chain([machine]).min_by_key(|(bytes, _)| *bytes)
-}
-
-/// The value of a line such as `MemAvailable:  123 kB`.
-fn kibibytes(text: &str, name: &str) -> Option<u64> {
-    let line = text.lines().find_map(|line| line.strip_prefix(name))?;
-    Some(line.split_whitespace().next()?.parse::<u64>().ok()? * 1024)
 }
 
 /// Folders of this process's control group (version 2) and of its ancestors.

@@ -100,6 +100,7 @@ impl Session {
             check_denoise(args, &args.output)?;
         }
         args.stats.as_deref().map_or(Ok(()), check_writable)?;
+        memory::limit(args.memory_limit).into_iter().for_each(|limit| files.limit_memory(limit));
         let denoiser = args.denoise.open(args.scene.threads)?;
         let watch = Watch::start(&args.watch.places()?, progress::say)?;
         if let Some(address) = watch.page {

@@ -49,8 +49,10 @@ pub(super) fn load_scene(
     check_scene(args)?;
     let _loading = interrupt::during(format!("loading {}", args.name()));
     progress::stage(&format!("reading {}", args.name()), None);
-    if let Some(MemoryLimit::Bytes(bytes)) = args.texture_memory {
-        files.limit_textures(bytes);
+    match args.texture_memory {
+        Some(MemoryLimit::Bytes(bytes)) => files.limit_textures(bytes),
+        Some(MemoryLimit::Off) => files.limit_textures(u64::MAX),
+        None => {}
     }
     if let Some(folder) = &args.texture_cache {
         files.cache_textures(folder).with_context(|| format!("--texture-cache {}", folder.display()))?;

@@ -13,6 +13,7 @@ mod interrupt;
 mod light_groups;
 mod looks;
 mod lost_output;
+mod memory;
 mod messages;
 mod outputs;
 mod parts;

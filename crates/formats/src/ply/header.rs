@@ -1,7 +1,7 @@
 //! The header of a PLY file: its encoding, and the layout of its elements.
 
-use super::PlyError;
 use super::stream::{MAX_FILL, Stream};
+use super::{PlyError, PlySize};
 
 /// Maximum number of header lines, and therefore of elements and properties.
 const MAX_LINES: u64 = 10_000;
@@ -126,6 +126,34 @@ impl Header {
     /// The table with a name.
     pub(super) fn element(&self, name: &str) -> Option<&Element> {
         self.elements.iter().find(|e| e.name == name)
+    }
+
+    /// The size of the mesh, where `available` bytes follow the header, if that is known.
+    pub(super) fn size(&self, available: Option<u64>) -> PlySize {
+        let Some(vertices) = self.element("vertex") else { return PlySize::default() };
+        let floats = [&["x"][..], &["nx"], &["u", "s", "texture_u", "texture_s"]].map(|names| {
+            let has_any = names.iter().any(|name| vertices.scalar(name).is_some());
+            u64::from(has_any)
+        });
+        let vertex_bytes = 12 * floats[0] + 12 * floats[1] + 8 * floats[2];
+
+        // Corners of faces, by the size of a binary file
+        let faces = self.element("face");
+        let count = faces.map_or(0, |faces| faces.count);
+        let corners = faces.zip(available).and_then(|(faces, available)| {
+            let list = &faces.properties[faces.indices()?];
+            let rows = self.elements.iter().map(|e| e.count.saturating_mul(e.min_stride() as u64));
+            let fixed = rows.fold(0, u64::saturating_add);
+            let is_only_list =
+                self.elements.iter().flat_map(|e| &e.properties).filter(|p| p.list.is_some()).count() == 1;
+            let is_binary = self.encoding != Encoding::Ascii;
+            (is_binary && is_only_list).then(|| available.saturating_sub(fixed) / list.ty.size() as u64)
+        });
+        let triangles = corners.map_or(count, |corners| corners.saturating_sub(count.saturating_mul(2)).max(count));
+        PlySize {
+            bytes: vertices.count.saturating_mul(vertex_bytes).saturating_add(triangles.saturating_mul(12)),
+            triangles,
+        }
     }
 
     /// Fails if the rows cannot fit into `available` bytes, so that nothing is allocated for false counts.

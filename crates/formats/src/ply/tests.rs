@@ -681,3 +681,33 @@ fn damaged_files_never_panic() {
     }
     assert!((1..24_000).contains(&accepted), "{accepted}");
 }
+
+#[test]
+fn the_size_of_a_mesh_is_known_from_its_header() {
+    let head = |format: &str| {
+        format!(
+            "ply\nformat {format} 1.0\nelement vertex 5\nproperty float x\nproperty float y\nproperty float z\n\
+             property float nx\nelement face 2\nproperty list uchar int vertex_indices\nend_header\n"
+        )
+        .into_bytes()
+    };
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.ply");
+    let size = |bytes: &[u8]| {
+        std::fs::write(&path, bytes).unwrap();
+        ply_size(&path).unwrap()
+    };
+    // A quadrilateral and a triangle
+    let mut binary = head("binary_little_endian");
+    binary.extend([0; 5 * 16 + 1 + 4 * 4 + 1 + 3 * 4]);
+    assert_eq!(size(&binary), PlySize { bytes: 5 * 24 + 3 * 12, triangles: 3 });
+    // The corners in text and in compressed files are not known
+    let mut gzip = GzEncoder::new(Vec::new(), Compression::fast());
+    gzip.write_all(&binary).unwrap();
+    let at_least = PlySize { bytes: 5 * 24 + 2 * 12, triangles: 2 };
+    let text = [&head("ascii")[..], &b"0 0 0 0\n".repeat(5), b"4 0 1 2 3\n3 0 1 2\n"].concat();
+    assert_eq!([size(&text), size(&gzip.finish().unwrap())], [at_least; 2]);
+    // Counts that the file cannot have
+    std::fs::write(&path, head("ascii")).unwrap();
+    assert!(ply_size(&path).is_err());
+}
