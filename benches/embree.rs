@@ -5,6 +5,9 @@
 //! The scene is generated; `lumiris bench` does the same with the rays of a scene file.
 #![allow(clippy::print_stdout, missing_docs)]
 
+#[path = "support/sphere.rs"]
+mod sphere;
+
 use lumiris::accel::embree::bare::Bare;
 use lumiris::accel::embree::{EmbreeAccel, EmbreeError};
 use lumiris::accel::{Accel, Coherence, Hit, RayBatch};
@@ -13,7 +16,7 @@ use lumiris_bench::stages::{Pair, RayCase};
 use lumiris_numbers::math::ray::offset_origin;
 use lumiris_numbers::math::{Frame, Ray, Vec3, warp};
 use lumiris_test_support::random::{RngExt, pcg32};
-use std::f32::consts::{PI, TAU};
+use sphere::displaced_sphere;
 use std::sync::Arc;
 
 const WIDTH: u32 = 8;
@@ -22,23 +25,9 @@ const SIDE: usize = 1024;
 const BATCH: usize = 4096;
 const RUNS: u32 = 9;
 
-/// A latitude–longitude sphere with ripples, about `triangles` triangles.
-fn displaced_sphere(triangles: usize) -> TriangleMesh {
-    let rows = ((triangles / 4) as f32).sqrt() as u32;
-    let columns = rows * 2;
-    let point = |i: u32, j: u32| {
-        let (theta, phi) = (PI * (j as f32 + 0.5) / (rows as f32 + 1.0), TAU * (i % columns) as f32 / columns as f32);
-        let n = Vec3::new(theta.sin() * phi.cos(), theta.sin() * phi.sin(), theta.cos());
-        n * (1.0 + 0.05 * (n.x * 37.0).sin() * (n.y * 41.0).sin() * (n.z * 31.0).sin())
-    };
-    let positions = (0..=rows).flat_map(|j| (0..columns).map(move |i| point(i, j))).collect();
-    let quad = |i: u32, j: u32| {
-        let (i1, a) = ((i + 1) % columns, j * columns);
-        let b = a + columns;
-        [[a + i, b + i, b + i1], [a + i, b + i1, a + i1]]
-    };
-    let indices = (0..rows).flat_map(|j| (0..columns).flat_map(move |i| quad(i, j))).collect();
-    TriangleMesh::new(positions, indices).expect("indices are in range")
+/// A sphere with ripples, of about `triangles` triangles.
+fn rippled_sphere(triangles: usize) -> TriangleMesh {
+    displaced_sphere(triangles, |n| 1.0 + 0.05 * (n.x * 37.0).sin() * (n.y * 41.0).sin() * (n.z * 31.0).sin())
 }
 
 /// Camera rays in tiles of 4 by 4 pixels.
@@ -94,7 +83,7 @@ fn print(case: Option<RayCase>) {
 fn main() -> Result<(), EmbreeError> {
     // Scene
     let thousands = std::env::args().skip(1).find_map(|a| a.parse::<usize>().ok()).unwrap_or(1000);
-    let mesh = Shape::Mesh(displaced_sphere(thousands * 1000));
+    let mesh = Shape::Mesh(rippled_sphere(thousands * 1000));
     let shape = Geometry { shape: mesh, alpha: None, visibility: Visibility::ALL };
     let root = Group { geometries: vec![0] };
     let set = Arc::new(GeometrySet { geometries: vec![shape], root, ..GeometrySet::default() });

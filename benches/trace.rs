@@ -3,33 +3,24 @@
 //! `cargo bench --bench trace -- [triangles in thousands, default 1000] [rays in thousands, default 1000]`
 #![allow(clippy::print_stdout, missing_docs)]
 
+#[path = "support/sphere.rs"]
+mod sphere;
+
 use lumiris::accel::{Accel, Bvh, Coherence, Hit, RayBatch};
 use lumiris::geometry::{Geometry, GeometrySet, Group, Shape, TriangleMesh, Visibility};
 use lumiris_numbers::math::ray::offset_origin;
 use lumiris_numbers::math::{Frame, Ray, Vec3, warp};
 use lumiris_test_support::random::{RngExt, pcg32};
-use std::f32::consts::{PI, TAU};
+use sphere::displaced_sphere;
 use std::sync::Arc;
 use std::time::Instant;
 
-/// A latitude–longitude sphere with ripples, about `triangles` triangles.
-fn displaced_sphere(triangles: usize) -> TriangleMesh {
-    let rows = ((triangles / 4) as f32).sqrt() as u32;
-    let columns = rows * 2;
-    let point = |i: u32, j: u32| {
-        let (theta, phi) = (PI * (j as f32 + 0.5) / (rows as f32 + 1.0), TAU * (i % columns) as f32 / columns as f32);
-        let n = Vec3::new(theta.sin() * phi.cos(), theta.sin() * phi.sin(), theta.cos());
+/// A sphere with ripples, of about `triangles` triangles.
+fn rippled_sphere(triangles: usize) -> TriangleMesh {
+    displaced_sphere(triangles, |n| {
         let ripple = (n.x * 37.0).sin() * (n.y * 41.0).sin() * (n.z * 31.0).sin();
-        n * (1.0 + 0.05 * ripple + 0.01 * ((n.x * 250.0).sin() * (n.z * 230.0).cos()))
-    };
-    let positions = (0..=rows).flat_map(|j| (0..columns).map(move |i| point(i, j))).collect();
-    let quad = |i: u32, j: u32| {
-        let (i1, a) = ((i + 1) % columns, j * columns);
-        let b = a + columns;
-        [[a + i, b + i, b + i1], [a + i, b + i1, a + i1]]
-    };
-    let indices = (0..rows).flat_map(|j| (0..columns).flat_map(move |i| quad(i, j))).collect();
-    TriangleMesh::new(positions, indices).expect("indices are in range")
+        1.0 + 0.05 * ripple + 0.01 * ((n.x * 250.0).sin() * (n.z * 230.0).cos())
+    })
 }
 
 fn camera_rays(count: usize) -> RayBatch {
@@ -84,7 +75,7 @@ fn main() {
     // Scene
     let numbers: Vec<usize> = std::env::args().filter_map(|a| a.parse().ok()).collect();
     let thousands = |i: usize| numbers.get(i).copied().unwrap_or(1000) * 1000;
-    let shape = Shape::Mesh(displaced_sphere(thousands(0)));
+    let shape = Shape::Mesh(rippled_sphere(thousands(0)));
     let set = Arc::new(GeometrySet {
         geometries: vec![Geometry { shape, alpha: None, visibility: Visibility::ALL }],
         root: Group { geometries: vec![0] },

@@ -16,7 +16,7 @@ use lumiris::planning::allocation::complete_for_noise;
 use lumiris::planning::preparation::{complete_for_time, pilot_deadline};
 use lumiris::planning::{PlanError, Preparation, prepare};
 use lumiris::render::cryptomatte::{Cryptomatte, cryptomattes};
-use lumiris::render::output::{self, Aov};
+use lumiris::render::output::{self, Aov, NamedImages};
 use lumiris::render::parts::{Asked, PartError, Stored};
 use lumiris::render::{Continuation, Progress, RenderError, RenderSettings, Rendering, resume};
 use lumiris::render::{FilmFile, Storage};
@@ -89,7 +89,6 @@ struct Request {
 }
 
 /// Layers by their names.
-type NamedImages = Vec<(String, Image)>;
 
 /// Results of a rendering.
 struct Done {
@@ -324,6 +323,7 @@ impl Request {
             spp: job.pixel_samples.as_ref().map_or(job.settings().sampling.spp, |of_pixels| of_pixels.spp),
             with_replicas: needs(|aov| *aov == Aov::Variance),
             with_features: needs(|aov| aov.is_feature()),
+            with_light_layers: self.parts.file.is_some() || needs(|aov| *aov == Aov::LightGroups),
             ..self.render
         }
     }

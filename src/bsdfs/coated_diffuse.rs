@@ -156,7 +156,7 @@ impl<'a> CoatedDiffuse<'a> {
         if self.interface.is_specular() {
             return 0.0;
         }
-        self.p_interface(wo) * coated::interface(&self.params(), wo.into(), wi.into()).0
+        self.p_interface(wo) * coated::interface(&self.params(), wo.into(), wi.into()).pdf
     }
 
     /// Samples the interface or the cosine lobe, in proportion to the albedos.

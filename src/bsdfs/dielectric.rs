@@ -3,9 +3,9 @@
 use super::kernel::{KernelBsdf, of_drawn};
 use super::lobe::BsdfSample;
 use super::microfacet::TrowbridgeReitz;
-use lumiris_lanes::kernels;
 use lumiris_lanes::kernels::dielectric::Interface;
 pub use lumiris_lanes::kernels::dielectric::{Select, Transport};
+use lumiris_lanes::kernels::{self, GreyValue};
 use lumiris_numbers::math::Vec3;
 
 /// Interface between the outside (+z) and a dielectric (−z).
@@ -31,13 +31,13 @@ impl Dielectric {
 
     /// Value without cosine (1/sr); 0 if specular.
     pub fn value(&self, wo: Vec3, wi: Vec3, transport: Transport) -> f32 {
-        let (f_cos, _) = self.interface().evaluate(wo.into(), wi.into(), Select::All, transport);
+        let GreyValue { f_cos, .. } = self.interface().evaluate(wo.into(), wi.into(), Select::All, transport);
         if wi.z == 0.0 { 0.0 } else { f_cos / wi.z.abs() }
     }
 
     /// Density of [`Self::sample_select`] per steradian; 0 if specular.
     pub fn pdf_select(&self, wo: Vec3, wi: Vec3, select: Select) -> f32 {
-        self.interface().evaluate(wo.into(), wi.into(), select, Transport::Radiance).1
+        self.interface().evaluate(wo.into(), wi.into(), select, Transport::Radiance).pdf
     }
 
     /// [`Self::sample`] restricted to the selected lobes.

@@ -25,7 +25,7 @@ pub struct Refraction {
 /// Refraction of `w` at a surface with normal `n`. `None` for total internal reflection.
 #[inline]
 pub fn refract(w: Vec3, n: Vec3, eta: f32) -> Option<Refraction> {
-    let (refracted, inverse, passes) = fresnel::refract(w.into(), n.into(), eta);
+    let fresnel::Refracted { wi: refracted, inverse_eta: inverse, passes } = fresnel::refract(w.into(), n.into(), eta);
     passes.then(|| Refraction { w: refracted.into(), eta: 1.0 / inverse })
 }
 

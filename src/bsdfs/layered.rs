@@ -271,7 +271,8 @@ impl Layered {
         let (wi, lobe) = if uc < lobes.interface {
             if self.top.is_specular() {
                 let wi = Vec3::new(-wo.x, -wo.y, wo.z);
-                let (f, lobe) = (self.mirror_albedo(wo.z) / wi.z, Lobe::SPECULAR | Lobe::REFLECTION);
+                let f = self.mirror_albedo(wo.z) / wi.z;
+                let lobe = Lobe::SPECULAR | Lobe::REFLECTION;
                 return Some(BsdfSample { f, wi: wi * flip, pdf: lobes.interface, lobe, eta: 1.0 });
             }
             (reflect(wo, self.top.distribution.sample_m(wo, u)), Lobe::GLOSSY)

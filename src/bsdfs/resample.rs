@@ -48,7 +48,8 @@ pub fn resample(
         let p_hat = s.f.luminance() * bsdf.cos(s.wi);
         reservoir.offer((s, p_hat), p_hat / s.pdf);
     }
-    let ((s, p_hat), sum) = reservoir.into_kept()?;
+    let sum = reservoir.sum();
+    let (s, p_hat) = reservoir.into_kept()?;
     let weight = (sum / (f64::from(proposals) * f64::from(p_hat))) as f32;
     weight.is_finite().then_some(Resampled { f: s.f, wi: s.wi, weight, lobe: s.lobe, eta: s.eta })
 }

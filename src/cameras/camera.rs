@@ -248,8 +248,8 @@ impl Camera {
         }
     }
 
-    /// A batch generator of rays and their common origin; `None` if the camera has a lens or moves.
-    pub fn pinhole(&self) -> Option<(Pinhole, Vec3)> {
+    /// A batch generator of rays; `None` if the camera has a lens or moves.
+    pub fn pinhole(&self) -> Option<Pinhole> {
         let Camera::Perspective { base, screen_window, tan_half_fov, lens } = self else { return None };
         let [world_from_camera] = &*base.world_from_camera else { return None };
         let pinhole = Pinhole {
@@ -258,8 +258,9 @@ impl Camera {
             screen_window: *screen_window,
             tan_half_fov: *tan_half_fov,
             pixel_area: base.pixel_area(screen_window),
+            origin: world_from_camera.transform_point3(Vec3::ZERO),
         };
-        (lens.radius <= 0.0).then(|| (pinhole, world_from_camera.transform_point3(Vec3::ZERO)))
+        (lens.radius <= 0.0).then_some(pinhole)
     }
 
     /// The ray of the raster point `film_xy`, through the point `u_lens` of the lens, at `time` (0 to 1).
@@ -446,7 +447,8 @@ mod tests {
         ] {
             for (film, t) in [([3.0, 5.0], 0.5), ([150.0, 70.0], 4.0), ([100.0, 50.0], 1e4)] {
                 let CameraRay { ray, spread, width0, .. } = camera.ray(Vec2::from(film), [0.5; 2], 0.5);
-                let (width, along) = (camera.pixel_width(ray.at(t), ray.time), width0 + spread * t);
+                let width = camera.pixel_width(ray.at(t), ray.time);
+                let along = width0 + spread * t;
                 assert!((width / along - 1.0).abs() < 2e-3, "{camera:?} {film:?} {t}: {width} {along}");
             }
             let behind = camera.pixel_width(Vec3::ONE - placement.transform_vector3(Vec3::Z), 0.5);
@@ -459,7 +461,7 @@ mod tests {
         let placement =
             Affine3A::from_rotation_translation(lumiris_numbers::math::Quat::from_rotation_y(0.7), Vec3::ONE);
         let camera = Camera::perspective(placement, 50.0, [-1.5, 2.0, -1.0, 0.9], [200, 100], 0.0, 1e6);
-        let (pinhole, o) = camera.pinhole().unwrap();
+        let pinhole = camera.pinhole().unwrap();
         let (x, y): (Vec<f32>, Vec<f32>) = (0..64).map(|i| (i as f32 * 3.3 - 1.0, i as f32 * 1.7)).unzip();
         let (mut d, mut spread) = ([0, 1, 2].map(|_| vec![0.0; 64]), vec![0.0; 64]);
         let mut rays = PinholeRays { d: d.each_mut().map(|d| &mut d[..]), spread: &mut spread };
@@ -467,7 +469,7 @@ mod tests {
         for i in 0..64 {
             let single = camera.ray(Vec2::new(x[i], y[i]), [0.5; 2], 0.0);
             near(Vec3::new(d[0][i], d[1][i], d[2][i]), single.ray.d);
-            assert!(o == single.ray.o && (spread[i] - single.spread).abs() < 1e-6 * single.spread);
+            assert!(pinhole.origin == single.ray.o && (spread[i] - single.spread).abs() < 1e-6 * single.spread);
         }
         let lens = Lens { radius: 0.3, focal_distance: 4.0 };
         assert!(perspective(placement, 50.0, lens).pinhole().is_none());
@@ -478,7 +480,8 @@ mod tests {
     fn placements_move_and_mirror() {
         let mirror =
             Affine3A::from_translation(Vec3::new(1.0, 2.0, 3.0)) * Affine3A::from_scale(Vec3::new(-1.0, 1.0, 1.0));
-        let (a, b) = (perspective(mirror, 40.0, PINHOLE), perspective(Affine3A::IDENTITY, 40.0, PINHOLE));
+        let a = perspective(mirror, 40.0, PINHOLE);
+        let b = perspective(Affine3A::IDENTITY, 40.0, PINHOLE);
         let p = Vec2::new(30.0, 20.0);
         let (ra, rb) = (a.ray(p, [0.5; 2], 0.5), b.ray(p, [0.5; 2], 0.5));
         near(ra.ray.d, rb.ray.d * Vec3::new(-1.0, 1.0, 1.0));
@@ -526,7 +529,8 @@ mod tests {
             for i in 0..20_000 {
                 let p = Vec2::new(i as f32 * 0.01, 30.0);
                 let at_focus = |ray: &Ray| {
-                    let (o, d) = (inverse.transform_point3(ray.o), inverse.transform_vector3(ray.d));
+                    let o = inverse.transform_point3(ray.o);
+                    let d = inverse.transform_vector3(ray.d);
                     o + d * ((4.0 - o.z) / d.z)
                 };
                 let ray = camera.ray(p, stream.random::<[f32; 2]>(), 0.5).ray;

@@ -352,7 +352,8 @@ fn paraxial(elements: &[LensElement]) -> [f64; 4] {
             m = [m[0] + e.thickness * m[2], m[1] + e.thickness * m[3], m[2], m[3]];
         }
         if e.curvature_radius != 0.0 {
-            let (from, to) = (e.eta.max(1.0), if i == 0 { 1.0 } else { elements[i - 1].eta.max(1.0) });
+            let from = e.eta.max(1.0);
+            let to = if i == 0 { 1.0 } else { elements[i - 1].eta.max(1.0) };
             let power = (to - from) / (to * e.curvature_radius);
             m = [m[0], m[1], m[2] * from / to + power * m[0], m[3] * from / to + power * m[1]];
         }

@@ -68,9 +68,9 @@ impl Components {
         // Zero-valued and failed samples
         for (mixture, sums) in self.mixtures.iter().zip(self.sums.chunks_mut(len)) {
             for (component, &count) in mixture.zero_valued[..m].iter().enumerate().filter(|(_, count)| **count > 0) {
-                equations.add_zeros(sums, (component, mixture.zero_column(component)), count);
+                equations.add_zeros(sums, component, mixture.zero_column(component), count);
             }
-            equations.add_zeros(sums, (0, 0.0), mixture.failed);
+            equations.add_zeros(sums, 0, 0.0, mixture.failed);
         }
     }
 

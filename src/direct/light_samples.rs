@@ -3,7 +3,7 @@
 use super::candidates::{Candidate, SampleAllocation, SampledBy};
 use super::domain;
 use super::point::ShadingPoint;
-use crate::lights::{LeAndPdf, LightCtx, LightId, LightSample};
+use crate::lights::{LeAndPdf, LightCtx, SampleOfLight};
 use crate::scene::RenderJob;
 
 /// Draws the light samples of a point, with lights chosen by the light sampler. Returns the number of samples.
@@ -18,19 +18,19 @@ pub(super) fn draw(
     for i in 0..n {
         let [u_choice, u0, u1] = point.stream.split(domain::LIGHT, n, i).draw::<3>();
         let drawn = job.lights.sample(&point.light_ctx(), u_choice, [u0, u1]);
-        records.extend(drawn.and_then(|(light, sample)| light_candidate(job, index, point, allocation, light, sample)));
+        records.extend(drawn.and_then(|drawn| light_candidate(job, index, point, allocation, drawn)));
     }
     n
 }
 
 /// A light sample. If the light is infinite, the radiance is the sum of all infinite lights, and the density the sum of
 /// their densities.
-pub(super) fn with_infinite(job: &RenderJob, ctx: &LightCtx, light: LightId, mut sample: LightSample) -> LightSample {
-    let lights = &job.lights;
-    if lights.infinite.len() > 1 && lights.infinite.contains(&light) {
+pub(super) fn with_infinite(job: &RenderJob, ctx: &LightCtx, mut drawn: SampleOfLight) -> SampleOfLight {
+    let (lights, sample) = (&job.lights, &mut drawn.sample);
+    if lights.infinite.len() > 1 && lights.infinite.contains(&drawn.light) {
         LeAndPdf { le: sample.li, pdf: sample.pdf } = lights.infinite_in_direction(ctx, sample.wi);
     }
-    sample
+    drawn
 }
 
 /// The candidate of a light sample, whose density includes the choice of the light; `None` if its integrand is zero.
@@ -39,16 +39,14 @@ pub(super) fn light_candidate(
     index: u32,
     point: &ShadingPoint<'_>,
     allocation: &SampleAllocation,
-    light: LightId,
-    sample: LightSample,
+    drawn: SampleOfLight,
 ) -> Option<Candidate> {
     // Nearby, no other technique would sample the emission of media: it is left to the next segment of the path
-    if job.lights.medium_of(light).is_some() {
+    if job.lights.medium_of(drawn.light).is_some() {
         return None;
     }
     // Infinite lights overlap: all of them contribute to a direction
-    let sample = with_infinite(job, &point.light_ctx(), light, sample);
-    unshadowed_candidate(index, point, allocation, light, sample)
+    unshadowed_candidate(index, point, allocation, with_infinite(job, &point.light_ctx(), drawn))
 }
 
 /// The candidate of a light sample without other infinite lights. Its density includes the choice of the light. `None`
@@ -57,10 +55,10 @@ pub(super) fn unshadowed_candidate(
     index: u32,
     point: &ShadingPoint<'_>,
     allocation: &SampleAllocation,
-    light: LightId,
-    sample: LightSample,
+    drawn: SampleOfLight,
 ) -> Option<Candidate> {
     // Unshadowed integrand
+    let SampleOfLight { light, sample } = drawn;
     let f_cos = point.bsdf.f(point.wo, sample.wi) * point.bsdf.cos(sample.wi);
     let f = f_cos * sample.li;
     if f.is_black() || !(sample.pdf > 0.0) {

@@ -15,8 +15,8 @@ use super::domain;
 use super::light_samples::light_candidate;
 use super::point::ShadingPoint;
 use crate::bsdfs::MAX_LOBES;
+use crate::lights::SampleOfLight;
 use crate::lights::mixture_groups::MAX_GROUPS;
-use crate::lights::{LightId, LightSample};
 use crate::scene::RenderJob;
 use lumiris_numbers::estimators::ocv::MAX_COMPONENTS;
 use lumiris_numbers::math::Vec3;
@@ -105,11 +105,11 @@ impl Mixture {
         point: &ShadingPoint<'_>,
         allocation: &SampleAllocation,
         group: usize,
-        drawn: Option<(LightId, LightSample)>,
+        drawn: Option<SampleOfLight>,
     ) -> Option<Candidate> {
-        let candidate = drawn.and_then(|(light, sample)| {
-            let c = light_candidate(job, index, point, allocation, light, sample)?;
-            Some(Candidate { group: group as u8, p_lobe: self.p_lobe(point, sample.wi, c.p_bsdf), ..c })
+        let candidate = drawn.and_then(|drawn| {
+            let c = light_candidate(job, index, point, allocation, drawn)?;
+            Some(Candidate { group: group as u8, p_lobe: self.p_lobe(point, drawn.sample.wi, c.p_bsdf), ..c })
         });
         if candidate.is_none() {
             self.zero_valued[self.component(group)] += 1;

@@ -11,7 +11,7 @@
 use super::candidates::Candidate;
 use super::point::ShadingPoint;
 use crate::lights::sample_columns::{ChosenLight, LightSamples, NO_LIGHT, Scratch};
-use crate::lights::{LightId, LightRun, LightSample};
+use crate::lights::{LightRun, SampleOfLight};
 use crate::scene::RenderJob;
 use crate::settings::{ProposalPoints, Target};
 use lumiris_lanes::columns::{Column, Columns3, padded};
@@ -104,9 +104,9 @@ impl ProposalColumns {
     }
 
     /// A light sample; `None` if it failed.
-    pub fn light_sample(&self, proposal: usize) -> Option<(LightId, LightSample)> {
+    pub fn light_sample(&self, proposal: usize) -> Option<SampleOfLight> {
         let sample = self.samples.get(proposal, self.p.vec3(proposal))?;
-        Some((self.chosen[proposal].light, sample))
+        Some(SampleOfLight { light: self.chosen[proposal].light, sample })
     }
 
     /// Σ c·V̂ over the proposals of a point; `bsdf_samples` are its BSDF samples.

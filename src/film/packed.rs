@@ -231,7 +231,8 @@ fn pack_squares(sums: &[PixelAccumulator], value: impl Fn(&PixelAccumulator) -> 
         digits.iter_mut().zip(v).for_each(|(all, limb)| *all |= limb);
     }
     let [low, middle, high] = digits;
-    let (below, above) = (u128::from(low) | u128::from(middle) << 64, u128::from(middle) | u128::from(high) << 64);
+    let below = u128::from(low) | u128::from(middle) << 64;
+    let above = u128::from(middle) | u128::from(high) << 64;
     let zeros = if below == 0 { 128 + high.trailing_zeros().min(63) } else { below.trailing_zeros() };
     let end = if above == 0 { 64 - low.leading_zeros() } else { 192 - above.leading_zeros() };
     if end.saturating_sub(zeros) <= SQUARE_DIGITS {

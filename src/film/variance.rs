@@ -103,7 +103,8 @@ impl Film {
         let around = rows.start.saturating_sub(1).max(self.bounds.y0)..(rows.end + 1).min(self.bounds.y1);
         let width = self.bounds.width() as usize;
         let before = (rows.start - around.start) as usize * width;
-        let (top, size) = (around.start - self.bounds.y0, self.bounds.width().max(self.bounds.height()));
+        let top = around.start - self.bounds.y0;
+        let size = self.bounds.width().max(self.bounds.height());
         self.read_rows(around, pixels);
         let values = pixels.iter().map(|p| p.variance_of_mean().iter().sum()).collect();
         Surroundings { width, before, top: top.into(), unit: LEVELS / f64::from(size.max(1)), values }

@@ -23,21 +23,29 @@ pub(super) struct ReplicaVariance {
 #[derive(Clone, Debug)]
 pub(super) enum VarianceScale {
     One(f64),
-    /// Coordinates below `at` in the dimension belong to the first part.
-    Two {
-        dimension: usize,
-        at: f64,
-        parts: Box<[VarianceScale; 2]>,
-    },
+    Two { split: Split, parts: Box<[VarianceScale; 2]> },
+}
+
+/// A split of a set: positions whose coordinate is below `at` belong to the first part.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Split {
+    dimension: usize,
+    at: f64,
+}
+
+impl Split {
+    fn is_first(&self, position: &Position) -> bool {
+        position[self.dimension] < self.at
+    }
 }
 
 impl VarianceScale {
     pub(super) fn of(replicas: Vec<ReplicaVariance>) -> Self {
-        if let Some((dimension, at)) = middle(&replicas) {
-            let (below, above): (Vec<_>, Vec<_>) = replicas.iter().copied().partition(|r| r.position[dimension] < at);
+        if let Some(split) = middle(&replicas) {
+            let (below, above): (Vec<_>, Vec<_>) = replicas.iter().copied().partition(|r| split.is_first(&r.position));
             if below.len().min(above.len()) >= MIN_MEMBERS / 2 {
                 let parts = Box::new([below, above].map(VarianceScale::of));
-                return VarianceScale::Two { dimension, at, parts };
+                return VarianceScale::Two { split, parts };
             }
         }
         let sum = |value: fn(&ReplicaVariance) -> f64| replicas.iter().map(value).sum::<f64>();
@@ -48,15 +56,13 @@ impl VarianceScale {
     pub(super) fn factor(&self, position: &Position) -> f64 {
         match self {
             VarianceScale::One(factor) => *factor,
-            VarianceScale::Two { dimension, at, parts } => {
-                parts[usize::from(position[*dimension] >= *at)].factor(position)
-            }
+            VarianceScale::Two { split, parts } => parts[usize::from(!split.is_first(position))].factor(position),
         }
     }
 }
 
-/// The longest dimension of a set of replicas, and its middle; `None` if the set is not to be split.
-fn middle(replicas: &[ReplicaVariance]) -> Option<(usize, f64)> {
+/// The split in the middle of the longest dimension of a set of replicas; `None` if the set is not to be split.
+fn middle(replicas: &[ReplicaVariance]) -> Option<Split> {
     if replicas.len() < 2 * MIN_MEMBERS {
         return None;
     }
@@ -67,6 +73,6 @@ fn middle(replicas: &[ReplicaVariance]) -> Option<(usize, f64)> {
     };
     let extents = [0, 1, 2].map(extent);
     let length = |dimension: &usize| extents[*dimension][1] - extents[*dimension][0];
-    let longest = (0..3).max_by(|a, b| length(a).total_cmp(&length(b))).filter(|d| length(d) > 0.0)?;
-    Some((longest, 0.5 * (extents[longest][0] + extents[longest][1])))
+    let dimension = (0..3).max_by(|a, b| length(a).total_cmp(&length(b))).filter(|d| length(d) > 0.0)?;
+    Some(Split { dimension, at: 0.5 * (extents[dimension][0] + extents[dimension][1]) })
 }

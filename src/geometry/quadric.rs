@@ -368,7 +368,8 @@ mod tests {
     /// The first intersection by marching along the ray in f64 and bisecting.
     fn reference(quadric: &Quadric, ray: &Ray) -> Option<f64> {
         let m = quadric.local_from_group.as_daffine3();
-        let (o, d) = (m.transform_point3(ray.o.as_dvec3()), m.transform_vector3(ray.d.as_dvec3()));
+        let o = m.transform_point3(ray.o.as_dvec3());
+        let d = m.transform_vector3(ray.d.as_dvec3());
         let implicit = |p: DVec3| match quadric.kind {
             QuadricKind::Sphere { radius, .. } => p.length_squared() - f64::from(radius).powi(2),
             QuadricKind::Cylinder { radius, .. } => p.truncate().length_squared() - f64::from(radius).powi(2),
@@ -415,7 +416,8 @@ mod tests {
         for k in 0..600 {
             let quadric = placed(kinds()[k % 6], random_placement(&mut s));
             let to_group = |p: Vec3| quadric.group_from_local.transform_point3(p);
-            let (o, target) = (to_group(random_point(&mut s) * 3.0), to_group(random_point(&mut s) * 1.5));
+            let o = to_group(random_point(&mut s) * 3.0);
+            let target = to_group(random_point(&mut s) * 1.5);
             let ray = Ray { o, d: target - o, t_max: f32::INFINITY, time: 0.0 };
             assert_eq!(quadric.distance(&ray), quadric.intersect(&ray).map(|hit| hit.t));
             match (quadric.intersect(&ray), reference(&quadric, &ray)) {

@@ -28,7 +28,7 @@ const IMAGE_NAMES: [&str; 10] =
 impl ColorLayer {
     /// Order of preference as the image; 0 is the best.
     fn rank(&self) -> u8 {
-        let last = self.name.rsplit('.').next().unwrap_or_default().to_ascii_lowercase();
+        let last = last_of(&self.name).to_ascii_lowercase();
         match () {
             () if self.name.is_empty() => 0,
             () if IMAGE_NAMES.contains(&last.as_str()) => 1,
@@ -43,14 +43,18 @@ impl ColorLayer {
 
     /// True if `--layer` with this name selects the layer: its whole name, or the part after the last dot.
     fn is_called(&self, wanted: &str) -> bool {
-        let last = self.name.rsplit('.').next().unwrap_or_default();
-        self.name.eq_ignore_ascii_case(wanted) || last.eq_ignore_ascii_case(wanted)
+        self.name.eq_ignore_ascii_case(wanted) || last_of(&self.name).eq_ignore_ascii_case(wanted)
     }
 }
 
-/// The part of a channel name before the last dot, and the part after it.
-fn split(channel: &str) -> (&str, &str) {
-    channel.rsplit_once('.').unwrap_or(("", channel))
+/// The part of a channel name before the last dot.
+fn layer_of(channel: &str) -> &str {
+    channel.rsplit_once('.').map_or("", |(layer, _)| layer)
+}
+
+/// The part of a name after the last dot.
+fn last_of(name: &str) -> &str {
+    name.rsplit_once('.').map_or(name, |(_, last)| last)
 }
 
 /// Position of a colour component among red, green and blue.
@@ -70,7 +74,7 @@ fn is_alpha(name: &str) -> bool {
 
 /// Position of the opacity channel of a layer in a part.
 fn alpha_of(header: &PartHeader, layer: &str) -> Option<usize> {
-    header.channels.iter().map(|channel| split(channel)).position(|(name, last)| name == layer && is_alpha(last))
+    header.channels.iter().position(|channel| layer_of(channel) == layer && is_alpha(last_of(channel)))
 }
 
 /// All colour layers of a file, in file order.
@@ -80,7 +84,7 @@ pub fn color_layers(parts: &[PartHeader]) -> Vec<ColorLayer> {
     for (part, header) in parts.iter().enumerate() {
         let mut names: Vec<&str> = Vec::new();
         for channel in &header.channels {
-            let (name, _) = split(channel);
+            let name = layer_of(channel);
             if !names.contains(&name) {
                 names.push(name);
             }
@@ -90,7 +94,7 @@ pub fn color_layers(parts: &[PartHeader]) -> Vec<ColorLayer> {
         for name in names {
             let mut rgb = [None; 3];
             for (position, channel) in header.channels.iter().enumerate() {
-                if let (true, Some(c)) = (split(channel).0 == name, component(split(channel).1)) {
+                if let (true, Some(c)) = (layer_of(channel) == name, component(last_of(channel))) {
                     rgb[c] = rgb[c].or(Some(position));
                 }
             }
@@ -115,7 +119,7 @@ pub fn choose(parts: &[PartHeader], wanted: Option<&str>) -> Result<ColorLayer, 
     let channels =
         || parts.iter().enumerate().flat_map(|(p, h)| h.channels.iter().enumerate().map(move |(c, n)| (p, c, n)));
     let grey = |(part, c, name): (usize, usize, &String)| {
-        let alpha = alpha_of(&parts[part], split(name).0);
+        let alpha = alpha_of(&parts[part], layer_of(name));
         ColorLayer { part, name: name.clone(), channels: ColorChannels::Grey(c), alpha }
     };
     if let Some(wanted) = wanted {
@@ -123,7 +127,7 @@ pub fn choose(parts: &[PartHeader], wanted: Option<&str>) -> Result<ColorLayer, 
         let single = || channels().find(|(.., n)| n.eq_ignore_ascii_case(wanted)).map(grey);
         return found.or_else(single).ok_or_else(|| {
             let mut names: Vec<&str> = layers.iter().map(ColorLayer::title).collect();
-            names.extend(channels().map(|(.., n)| n.as_str()).filter(|n| component(split(n).1).is_none()));
+            names.extend(channels().map(|(.., n)| n.as_str()).filter(|n| component(last_of(n)).is_none()));
             format!("has no layer `{wanted}`; it has {}", names.join(", "))
         });
     }
@@ -137,7 +141,7 @@ pub fn choose(parts: &[PartHeader], wanted: Option<&str>) -> Result<ColorLayer, 
         return Err(format!("has several images, none of which is plain R G B: {}", names.join(", ")));
     }
     let luminance = channels().find(|(.., n)| n.eq_ignore_ascii_case("y"));
-    let first = || channels().find(|(.., n)| !is_alpha(split(n).1)).or_else(|| channels().next());
+    let first = || channels().find(|(.., n)| !is_alpha(last_of(n))).or_else(|| channels().next());
     luminance.or_else(first).map(grey).ok_or_else(|| "has no channels".to_owned())
 }
 

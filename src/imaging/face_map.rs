@@ -172,7 +172,8 @@ fn with_levels<T: Copy>(
                 for c in 0..channels {
                     // A single row or column counts twice
                     let at = |dx: usize, dy: usize| {
-                        let (x, y) = ((2 * x + dx).min(fine_columns - 1), (2 * y + dy).min(fine_rows - 1));
+                        let x = (2 * x + dx).min(fine_columns - 1);
+                        let y = (2 * y + dy).min(fine_rows - 1);
                         read(out[finer + (y * fine_columns + x) * channels + c])
                     };
                     let mean = 0.25 * (at(0, 0) + at(1, 0) + (at(0, 1) + at(1, 1)));
@@ -274,7 +275,8 @@ mod tests {
                 for uv in [[0.01, 0.02], [0.99, 0.03], [0.5, 0.98], [0.97, 0.96], [0.4, 0.7], [0.02, 0.5]] {
                     let at = Vec2::from(turned(uv, turn(i, j)));
                     let (a, b) = ((4 * j + i) as u32, Vec2::splat(width));
-                    let (is, should) = (mixed.value(a, Vec2::from(uv), b).r, straight.value(a, at, b).r);
+                    let is = mixed.value(a, Vec2::from(uv), b).r;
+                    let should = straight.value(a, at, b).r;
                     assert!((is - should).abs() < 1e-5, "face {i}, {j} at {uv:?}, width {width}: {is} for {should}");
                     if width == 0.0 {
                         largest = largest.max((should - landscape([i as f32 + at.x, j as f32 + at.y])).abs());

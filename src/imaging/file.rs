@@ -43,6 +43,9 @@ pub enum ImageError {
     },
 }
 
+/// Texts with names, such as metadata.
+pub type TextEntries = Vec<(String, String)>;
+
 /// Limits for reading an image.
 #[derive(Clone, Copy, Debug)]
 pub struct ReadLimits {

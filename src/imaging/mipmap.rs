@@ -86,6 +86,17 @@ pub enum Filter {
     Ewa,
 }
 
+/// How lookups find and filter texels, and the encoding of these.
+#[derive(Clone, Copy, Debug)]
+pub struct Lookup {
+    /// Texels beyond the edges.
+    pub wrap: Wrap,
+    /// Filter.
+    pub filter: Filter,
+    /// Encoding of the image.
+    pub encoding: ColorEncoding,
+}
+
 /// A pyramid of an image of one or three channels.
 #[derive(Clone, Debug)]
 pub struct MipMap {
@@ -102,18 +113,15 @@ impl MipMap {
     /// without channels is one black pixel.
     pub fn new(image: &Image, wrap: Wrap, filter: Filter, encoding: ColorEncoding) -> Self {
         match image.color_channels() {
-            Some(channels) => Self::of_channels(image, channels.as_slice(), (wrap, filter, encoding)),
+            Some(channels) => Self::of_channels(image, channels.as_slice(), Lookup { wrap, filter, encoding }),
             None => Self::constant(0.0, wrap, filter),
         }
     }
 
     /// The pyramid of one or three channels with the given positions and encoding. If all values are multiples of 1/255
     /// in 0..1, as read from 8 bits, they are stored as bytes. An image without pixels is one black pixel.
-    pub fn of_channels(
-        image: &Image,
-        positions: &[usize],
-        (wrap, filter, encoding): (Wrap, Filter, ColorEncoding),
-    ) -> Self {
+    pub fn of_channels(image: &Image, positions: &[usize], lookup: Lookup) -> Self {
+        let Lookup { wrap, filter, encoding } = lookup;
         // An empty image is black
         let (width, height) = (image.width, image.height);
         if width == 0 || height == 0 {
@@ -138,7 +146,7 @@ impl MipMap {
     pub fn of_file(
         file: FilePyramid,
         channels: Vec<usize>,
-        (wrap, filter, encoding): (Wrap, Filter, ColorEncoding),
+        Lookup { wrap, filter, encoding }: Lookup,
         store: Option<&Arc<TileStore>>,
     ) -> Result<Self, ImageError> {
         let (table, count) = (Box::new(encoding.byte_table()), channels.len());
@@ -183,11 +191,10 @@ impl MipMap {
             for columns in &columns {
                 for c in 0..self.channels {
                     let mut sum = 0.0_f64;
-                    for &(row, row_weight) in &rows {
-                        for &(column, weight) in columns {
-                            sum += f64::from(
-                                row_weight * weight * source.texel([column, row], c, self.channels, &self.table),
-                            );
+                    for row in &rows {
+                        for column in columns {
+                            let texel = source.texel([column.pixel, row.pixel], c, self.channels, &self.table);
+                            sum += f64::from(row.fraction * column.fraction * texel);
                         }
                     }
                     values.push(sum as f32);
@@ -263,7 +270,9 @@ impl MipMap {
     /// Bilinear interpolation between the pixel centres of level `index`.
     pub fn bilinear(&self, index: usize, st: Vec2) -> Rgb {
         let level = &self.levels[index];
-        let ((x, dx), (y, dy)) = (floor(st.x * level.size.x - 0.5), floor(st.y * level.size.y - 0.5));
+        let at = st * level.size - Vec2::splat(0.5);
+        let corner = Vec2::new(floor(at.x), floor(at.y));
+        let (x, y) = (saturated(corner.x), saturated(corner.y));
         let [a, b, c, d] = match self.wrap.axes() {
             Some([of_x, of_y]) => {
                 let [x0, x1] = [x, x + 1].map(|x| of_x.pixel(x, level.width as i64) as usize);
@@ -272,12 +281,13 @@ impl MipMap {
             }
             None => [[x, y], [x + 1, y], [x, y + 1], [x + 1, y + 1]].map(|[x, y]| self.texel(index, x, y)),
         };
-        a.lerp(b, dx).lerp(c.lerp(d, dx), dy)
+        let d_at = at - corner;
+        a.lerp(b, d_at.x).lerp(c.lerp(d, d_at.x), d_at.y)
     }
 
     fn nearest(&self, level: usize, st: Vec2) -> Rgb {
         let at = st * self.levels[level].size;
-        self.texel(level, floor(at.x).0, floor(at.y).0)
+        self.texel(level, saturated(floor(at.x)), saturated(floor(at.y)))
     }
 
     /// Removes whole periods from `st` if the image repeats and they would leave few bits of an f32 for the fraction.
@@ -321,28 +331,39 @@ impl MipMap {
     }
 }
 
-/// ⌊v⌋ and v − ⌊v⌋.
+/// ⌊v⌋.
 #[inline]
-fn floor(v: f32) -> (i64, f32) {
+fn floor(v: f32) -> f32 {
     /// All floats from here on are integers.
     const WHOLE: f32 = (1 << 23) as f32;
     // Adding and subtracting rounds. Without SSE 4.1, `f32::floor` is a function call with branches that are hard to
     // predict. A cast to an integer and back would depend on the previous lookup: x86 keeps the rest of the register
     let large = WHOLE.copysign(v);
     let near = (v + large) - large;
-    let floor = if v.abs() < WHOLE { near - if near > v { 1.0 } else { 0.0 } } else { v };
-    // The cast saturates, so that absurd or non-finite coordinates wrap somewhere instead of overflowing
-    (i64::from(floor as i32), v - floor)
+    if v.abs() < WHOLE { near - if near > v { 1.0 } else { 0.0 } } else { v }
 }
 
-/// Source pixels that overlap pixel `i` of `n`, over a source of `m` pixels, with their fractions of its area.
-fn overlaps(i: usize, n: usize, m: usize) -> Vec<(usize, f32)> {
+/// The integer `v`, saturated to 32 bits, so that absurd or non-finite coordinates wrap somewhere instead of
+/// overflowing.
+#[inline]
+fn saturated(v: f32) -> i64 {
+    i64::from(v as i32)
+}
+
+/// A source pixel that overlaps a pixel, and its fraction of the area.
+struct Overlap {
+    pixel: usize,
+    fraction: f32,
+}
+
+/// Overlaps of pixel `i` of `n` over a source of `m` pixels.
+fn overlaps(i: usize, n: usize, m: usize) -> Vec<Overlap> {
     // In units of 1/n source pixels all edges are integers
     let (start, end) = (i * m, (i + 1) * m);
     (start / n..end.div_ceil(n))
-        .map(|j| {
-            let overlap = end.min((j + 1) * n) - start.max(j * n);
-            (j, overlap as f32 / m as f32)
+        .map(|pixel| {
+            let overlap = end.min((pixel + 1) * n) - start.max(pixel * n);
+            Overlap { pixel, fraction: overlap as f32 / m as f32 }
         })
         .collect()
 }
@@ -440,11 +461,7 @@ mod tests {
         for i in 0..60_000_u32 {
             for v in [f32::from_bits(i << 16), -f32::from_bits(i << 16), i as f32 * 0.25 - 7000.0].map(|v| v + 0.0) {
                 let whole = v.floor();
-                let (floor, rest) = floor(v);
-                assert!(
-                    floor == i64::from(whole as i32) && rest.to_bits() == (v - whole).to_bits() || v.is_nan(),
-                    "{v}"
-                );
+                assert!(floor(v) == whole || v.is_nan(), "{v}");
             }
         }
     }

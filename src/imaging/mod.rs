@@ -28,6 +28,7 @@ pub mod view_transform;
 pub use channels::{ColorChannels, IMAGE_LAYER, Layer, layers};
 pub use color::ColorEncoding;
 pub use face_map::FaceMap;
+pub use file::TextEntries;
 pub use image::Image;
-pub use mipmap::{AxisWrap, Filter, MipMap, Wrap};
+pub use mipmap::{AxisWrap, Filter, Lookup, MipMap, Wrap};
 pub use view_transform::ViewTransform;

@@ -179,14 +179,18 @@ impl TileStore {
         self.capacity.min(self.levels.read().unwrap_or_else(PoisonError::into_inner).end)
     }
 
-    /// Appends to the temporary file by `write`. Returns the file, and the position where the new bytes begin.
-    pub(super) fn append(&self, write: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> io::Result<(Arc<File>, u64)> {
+    /// The temporary file.
+    pub(super) fn temporary(&self) -> Arc<File> {
+        Arc::clone(&self.temporary)
+    }
+
+    /// Appends to the temporary file by `write`. Returns the position where the new bytes begin.
+    pub(super) fn append(&self, write: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> io::Result<u64> {
         let mut end = self.end.lock().unwrap_or_else(PoisonError::into_inner);
         let mut out = BufWriter::new(WriteAt { file: &self.temporary, position: *end });
         write(&mut out)?;
         out.flush()?;
-        let begin = std::mem::replace(&mut *end, out.get_ref().position);
-        Ok((Arc::clone(&self.temporary), begin))
+        Ok(std::mem::replace(&mut *end, out.get_ref().position))
     }
 
     /// Adds a level with `tiles` tiles of `tile_bytes` each, which `read` reads on demand. Returns the key of the first
@@ -341,13 +345,13 @@ mod tests {
     #[test]
     fn what_is_appended_begins_where_the_last_complete_append_ended() {
         let store = TileStore::new(1 << 20).unwrap();
-        let begins = [3, 5].map(|len| store.append(|out| out.write_all(&vec![len; usize::from(len)])).unwrap().1);
+        let begins = [3, 5].map(|len| store.append(|out| out.write_all(&vec![len; usize::from(len)])).unwrap());
         assert_eq!(begins, [0, 3]);
         let failed = store.append(|out| out.write_all(&[9; 100_000]).and(Err(io::Error::other("no"))));
         assert!(failed.is_err());
-        let (file, begin) = store.append(|out| out.write_all(b"x")).unwrap();
+        let begin = store.append(|out| out.write_all(b"x")).unwrap();
         let mut byte = [0];
-        file.read_exact_at(&mut byte, begin).unwrap();
+        store.temporary().read_exact_at(&mut byte, begin).unwrap();
         assert_eq!((begin, byte), (8, *b"x"));
     }
 }

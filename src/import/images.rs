@@ -1,9 +1,9 @@
 //! Image files as scenes ask for them, and how they are read.
 
 use crate::imaging::color_layers::ColorLayer;
-use crate::imaging::oiio::{self, FilePyramid, ImageError, ReadImage, ReadLimits};
+use crate::imaging::oiio::{self, FilePyramid, ImageError, ReadColors, ReadImage, ReadLimits};
 use crate::imaging::tiles::TileStore;
-use crate::imaging::{ColorChannels, ColorEncoding, Filter, MipMap, Wrap};
+use crate::imaging::{ColorChannels, ColorEncoding, Filter, Lookup, MipMap, Wrap};
 use crate::textures::Udim;
 use lumiris_formats::color_space::{Chromaticities, Colored, is_rec709, rec709_from};
 use lumiris_formats::names::nfc;
@@ -154,7 +154,7 @@ pub(super) fn into_tiles(map: MipMap, request: &ImageRequest, store: &Arc<TileSt
 
 /// The pyramid of an image, computed.
 pub(super) fn image_map(request: &ImageRequest) -> Result<MipMap, ImageError> {
-    let (mut read, layer) = oiio::read_colors(&request.path, &ReadLimits::default())?;
+    let ReadColors { mut read, layer } = oiio::read_colors(&request.path, &ReadLimits::default())?;
     Ok(map_of(&mut read, &layer, request))
 }
 
@@ -165,7 +165,7 @@ pub fn all_maps(path: &Path, encoding: ImageEncoding) -> Result<Vec<MipMap>, Ima
         let reason = "has all levels already".to_owned();
         return Err(ImageError::Unreadable { path: path.to_owned(), reason });
     }
-    let (mut read, layer) = oiio::read_colors(path, &ReadLimits::default())?;
+    let ReadColors { mut read, layer } = oiio::read_colors(path, &ReadLimits::default())?;
     let (wrap, filter) = (Wrap::default(), Filter::default());
     let request = |channels| ImageRequest { path: path.to_owned(), channels, encoding, wrap, filter };
     // Colours last, because they may be converted in place
@@ -189,8 +189,8 @@ fn map_of(read: &mut ReadImage, layer: &ColorLayer, request: &ImageRequest) -> M
         }
     }
     let Meaning { channels, encoding } = meaning(&resolved, layer, read.encoding);
-    let how = (request.wrap, request.filter, encoding);
-    channels.map_or_else(|| without_channels(request), |channels| MipMap::of_channels(&read.image, &channels, how))
+    let lookup = Lookup { wrap: request.wrap, filter: request.filter, encoding };
+    channels.map_or_else(|| without_channels(request), |channels| MipMap::of_channels(&read.image, &channels, lookup))
 }
 
 /// The pyramid that a file holds.
@@ -204,8 +204,8 @@ pub(super) fn map_of_levels(
     let is_opaque = |a| file.level(small, &[a]).is_ok_and(|level| level.iter().all(|&alpha| alpha >= 1.0));
     let request = &request.resolved(file.layer(), is_opaque);
     let Meaning { channels, encoding } = meaning(request, file.layer(), file.encoding());
-    let how = (request.wrap, request.filter, encoding);
-    channels.map_or_else(|| Ok(without_channels(request)), |channels| MipMap::of_file(file, channels, how, store))
+    let lookup = Lookup { wrap: request.wrap, filter: request.filter, encoding };
+    channels.map_or_else(|| Ok(without_channels(request)), |channels| MipMap::of_file(file, channels, lookup, store))
 }
 
 /// The requested channels of an image.
@@ -243,7 +243,7 @@ fn without_channels(request: &ImageRequest) -> MipMap {
 
 /// Reads an image as linear RGB, rows from the top, with its size.
 pub fn load_rgb(path: &Path) -> Result<RgbImage, ImageError> {
-    let (read, layer) = oiio::read_colors(path, &ReadLimits::default())?;
+    let ReadColors { read, layer } = oiio::read_colors(path, &ReadLimits::default())?;
     let image = &read.image;
     let channels = match layer.channels {
         ColorChannels::Rgb(rgb) => rgb,

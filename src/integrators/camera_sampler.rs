@@ -11,8 +11,8 @@ use lumiris_lanes::columns::{Column, Columns3, padded, reserve};
 use lumiris_lanes::level;
 use lumiris_lanes::sampler::{self, Below};
 use lumiris_numbers::estimators::ocv::block_of;
+use lumiris_numbers::math::Vec2;
 use lumiris_numbers::math::hash::pcg4d;
-use lumiris_numbers::math::{Vec2, Vec3};
 use lumiris_numbers::samplers::{SampleStream, SamplerKind};
 use std::ops::Range;
 
@@ -36,8 +36,8 @@ pub struct CameraSampler<'a> {
     shared: Option<&'a PixelSamples>,
     /// True if the scene or the camera moves.
     has_motion: bool,
-    /// Pinhole camera that makes many rays at once, with its origin.
-    pinhole: Option<(Pinhole, Vec3)>,
+    /// Pinhole camera that makes many rays at once.
+    pinhole: Option<Pinhole>,
     direct: DirectNumbers,
     /// Sample counts, unless chosen per pixel.
     sample_counts: SampleCounts,
@@ -103,7 +103,8 @@ impl<'a> CameraSampler<'a> {
         };
 
         // Sample counts that vary between pixels
-        let (filter, sample_counts) = (scene.film.filter.sampler(), settings.integrator.sample_counts());
+        let filter = scene.film.filter.sampler();
+        let sample_counts = settings.integrator.sample_counts();
         let shared = job.pixel_samples.as_ref().filter(|_| reuse::edge(job) > 1 || light_paths::per_sample(job) > 0.0);
         let is_chosen = settings.integrator.ris.proposals == Proposals::Optimal;
         let count_map = job.sample_count_map.as_ref().filter(|_| is_chosen);
@@ -132,7 +133,7 @@ impl<'a> CameraSampler<'a> {
     ) {
         out.clear();
         // Other cameras make their rays one by one
-        let Some((pinhole, o)) = &self.pinhole else {
+        let Some(pinhole) = &self.pinhole else {
             for PixelSampleRange { fit, pixel, samples } in pixels {
                 out.extend(samples.map(|sample| CameraSample { fit, ..self.sample(pixel, sample, seed) }));
             }
@@ -148,7 +149,7 @@ impl<'a> CameraSampler<'a> {
         pinhole.rays(level(), [&x[..len], &y[..len]], &mut rays);
         out.spread.extend_from_slice(&spread[..n]);
         out.width0.resize(n, 0.0);
-        out.rays.extend_from(*o, d.get(n));
+        out.rays.extend_from(pinhole.origin, d.get(n));
         self.set_pixels(seed, scratch, out);
     }
 

@@ -115,7 +115,8 @@ impl PathTracer {
         if self.search.layers.are_kept() {
             let segments = self.direct.segments();
             for (i, s) in self.direct.outcomes().enumerate().filter(|(_, s)| s.is_free) {
-                let (path, p) = (path(s.point as usize), points[s.point as usize].light_ctx().p);
+                let path = path(s.point as usize);
+                let p = points[s.point as usize].light_ctx().p;
                 let wi = segments.get(i).d.normalize_or_zero();
                 self.search.layers.add(&job.lights, path.sample, s.light, p, wi, path.beta * s.unshadowed);
             }

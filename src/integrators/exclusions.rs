@@ -204,25 +204,32 @@ impl Feature {
         self.is_wanted(job, s) && !(is_optional && conflict(job, s, self).is_some())
     }
 
-    /// For an integrator, estimator or target: the word for its kind, its name, and all features of the same kind.
-    fn choice(self) -> Option<(&'static str, &'static str, Vec<Feature>)> {
+    /// The choice among integrators, estimators or targets; `None` for other features.
+    fn choice(self) -> Option<Choice> {
         fn all<T: VariantNames + std::str::FromStr>(of: fn(T) -> Feature) -> Vec<Feature> {
             T::VARIANTS.iter().filter_map(|name| name.parse().ok()).map(of).collect()
         }
         match self {
-            F::Integrator(kind) => Some(("integrator", kind.into(), all(F::Integrator))),
-            F::Estimator(kind) => Some(("estimator", kind.into(), all(F::Estimator))),
-            F::Target(target) => Some(("target", target.into(), all(F::Target))),
+            F::Integrator(x) => Some(Choice { kind: "integrator", name: x.into(), all: all(F::Integrator) }),
+            F::Estimator(x) => Some(Choice { kind: "estimator", name: x.into(), all: all(F::Estimator) }),
+            F::Target(x) => Some(Choice { kind: "target", name: x.into(), all: all(F::Target) }),
             _ => None,
         }
     }
 }
 
+/// One of several features of a kind.
+struct Choice {
+    kind: &'static str,
+    name: &'static str,
+    all: Vec<Feature>,
+}
+
 impl fmt::Display for Conflict {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Some((kind, name, all)) = self.by.choice() else { return f.write_str(self.why) };
+        let Some(Choice { kind, name, all }) = self.by.choice() else { return f.write_str(self.why) };
         let others = all.into_iter().filter(|&other| between(self.feature, other).is_none());
-        let others: Vec<_> = others.filter_map(|other| Some(other.choice()?.1)).collect();
+        let others: Vec<_> = others.filter_map(|other| Some(other.choice()?.name)).collect();
         let verb = if others.len() == 1 { "does" } else { "do" };
         write!(f, "the {kind} {name} {}; {} {verb}", self.why, joined(&others))
     }

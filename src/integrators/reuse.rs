@@ -298,7 +298,8 @@ impl Group {
     /// for each second vertex.
     fn share(&mut self, k: usize, len: usize, shares: &mut Shares) {
         let member = self.connecting[k];
-        let (own, vertex) = (member as usize - self.begin, shares.members[member as usize].vertex);
+        let own = member as usize - self.begin;
+        let vertex = shares.members[member as usize].vertex;
         let g = &self.g[k * len..][..len];
         let mut count = 0;
         for (i, (other, &g)) in shares.members[self.begin..].iter().zip(g).enumerate() {

@@ -89,7 +89,8 @@ impl Scatter {
     /// Resamples M proposals at vertices whose BSDFs can only be evaluated.
     fn resample(&mut self, how: &Continuation<'_>, vertices: &Vertices<'_>) {
         for (i, bsdf) in vertices.bsdfs.iter().enumerate().filter(|(_, bsdf)| bsdf.bsdf.is_only_evaluated()) {
-            let (stream, count) = (vertices.streams.get(i), how.settings.bsdf_proposals.max(1));
+            let stream = vertices.streams.get(i);
+            let count = how.settings.bsdf_proposals.max(1);
             let proposal = |k| stream.split(domain::BSDF, count, k).draw::<3>();
             let [u_choice] = stream.domain(domain::RESAMPLE).draw::<1>();
             let BsdfSamples { wi, f_cos, pdf, lobe, eta } = &mut self.samples;

@@ -19,11 +19,11 @@
 
 use super::kinds::area::AreaLight;
 use super::light::Light;
-use super::light_sample::{EmissionSample, EmittingPoint, Sphere};
+use super::light_sample::{EmissionSample, EmittingPoint};
 use lumiris_numbers::math::warp::{
     pdf_uniform_sphere, sample_cosine_hemisphere, sample_uniform_disk_concentric, sample_uniform_sphere,
 };
-use lumiris_numbers::math::{Frame, ONE_MINUS_EPSILON, Rgb, Vec3};
+use lumiris_numbers::math::{Frame, ONE_MINUS_EPSILON, Rgb, Sphere, Vec3};
 use std::f32::consts::PI;
 
 impl Light {

@@ -16,10 +16,10 @@
 use super::choice::set::LightSet;
 use super::kinds::area::{AreaLight, AreaShape};
 use super::light::Light;
-use super::light_sample::{LightId, Sphere, SurfacePoint};
+use super::light_sample::{LightId, SurfacePoint};
 use crate::geometry::GeometryId;
 use glam::DVec3;
-use lumiris_numbers::math::{Rgb, Vec3, sqr};
+use lumiris_numbers::math::{Rgb, Sphere, Vec3, sqr};
 use std::f32::consts::PI;
 
 /// Distance from the plane of a flat light, relative to its extent, below which the light counts as edge-on: rounding
@@ -193,6 +193,7 @@ mod tests {
     use crate::geometry::{Quadric, QuadricKind, Shape, TriangleMesh};
     use crate::lights::{
         DistantLight, Emission, EmissionImage, JobLights, LightCtx, LightHit, LightSamplerKind, LightSetBuilder,
+        SampleOfLight,
     };
     use lumiris_numbers::math::warp::sample_uniform_sphere;
     use lumiris_numbers::math::{Affine3A, Bounds3, Vec2};
@@ -266,7 +267,7 @@ mod tests {
             let mut moments = Moments::default();
             for _ in 0..count {
                 let sample = sampling.sample(&ctx, stream.random::<f32>(), stream.random::<[f32; 2]>());
-                moments.add(sample.map_or(0.0, |(light, s)| {
+                moments.add(sample.map_or(0.0, |SampleOfLight { light, sample: s }| {
                     let l = if set.infinite.contains(&light) {
                         known.environment()
                     } else {

@@ -69,6 +69,15 @@ pub struct LightSample {
     pub is_delta: bool,
 }
 
+/// A light and a direction sampled towards it.
+#[derive(Clone, Copy, Debug)]
+pub struct SampleOfLight {
+    /// The light.
+    pub light: LightId,
+    /// The direction; its density includes the choice of the light.
+    pub sample: LightSample,
+}
+
 /// Radiance from a direction, and the density of sampling that direction.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LeAndPdf {
@@ -90,15 +99,6 @@ pub struct SurfacePoint {
     pub p: Vec3,
     /// Unit normal on the illuminated or visible side.
     pub n: Vec3,
-}
-
-/// A sphere.
-#[derive(Clone, Copy, Debug)]
-pub struct Sphere {
-    /// Centre.
-    pub center: Vec3,
-    /// Radius (m).
-    pub radius: f32,
 }
 
 /// The intersection of a ray in direction wi with a light.

@@ -41,7 +41,7 @@ pub use kinds::volume_light::VolumeLight;
 pub use layers::LightLayers;
 pub use light::Light;
 pub use light_sample::{
-    EmissionSample, EmittingPoint, LeAndPdf, LightCtx, LightHit, LightId, LightSample, Sphere, SurfacePoint,
+    EmissionSample, EmittingPoint, LeAndPdf, LightCtx, LightHit, LightId, LightSample, SampleOfLight, SurfacePoint,
 };
 pub use tree::branch_table::BranchTable;
 pub use tree::branches::Branches;
@@ -52,4 +52,5 @@ pub use visibility::learned_visibility::{self, LearnedVisibility};
 pub use visibility::visibility_cache::{self, PathCount, PhotonCount, PrimaryPhoton, VisibilityCache};
 pub use visibility::visibility_cache_sampler::VisibilityCacheSampler;
 
+pub use lumiris_numbers::math::Sphere;
 pub use lumiris_numbers::math::light_bound::GlossyLobe;

@@ -11,9 +11,8 @@
 //!
 //! `integrators/vertex_search.rs` samples the wavelength of a path at its first dispersive surface.
 
-use lumiris_formats::spectra::{Spectrum, white_responses};
+use lumiris_formats::spectra::{Spectrum, WHITE_RANGE, white_responses};
 use lumiris_numbers::math::{PiecewiseConstant1D, Rgb};
-use std::ops::RangeInclusive;
 use std::sync::OnceLock;
 
 /// Difference of indices below which a material does not disperse.
@@ -37,11 +36,11 @@ struct White {
 fn white() -> &'static White {
     static WHITE: OnceLock<White> = OnceLock::new();
     WHITE.get_or_init(|| {
-        let (lambda, responses) = white_responses();
+        let responses = white_responses();
         let means: Vec<f32> = responses.iter().map(|r| r.average()).collect();
         let weight = |(r, &mean): (&Rgb, &f32)| if mean > 0.0 { *r / mean } else { Rgb::BLACK };
         let weights = responses.iter().zip(&means).map(weight).collect();
-        White { first: *lambda.start() as f32, density: PiecewiseConstant1D::new(&means), weights }
+        White { first: *WHITE_RANGE.start() as f32, density: PiecewiseConstant1D::new(&means), weights }
     })
 }
 
@@ -77,8 +76,7 @@ impl Dispersion {
     /// The dispersion of a spectrum of indices, which is extended by its end values; `None` if it is constant or not
     /// positive.
     pub fn new(eta: &Spectrum) -> Option<Self> {
-        let (lambda, _): (RangeInclusive<u32>, _) = white_responses();
-        let eta: Vec<f32> = lambda.map(|l| eta.at_clamped(l as f32)).collect();
+        let eta: Vec<f32> = WHITE_RANGE.map(|l| eta.at_clamped(l as f32)).collect();
         let (min, max) = eta.iter().fold((f32::INFINITY, 0.0_f32), |(a, b), &e| (a.min(e), b.max(e)));
         (min > 0.0 && max.is_finite() && max - min > LEAST_DIFFERENCE).then_some(Dispersion { eta })
     }

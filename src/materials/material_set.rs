@@ -203,7 +203,8 @@ impl MaterialSet {
                 // A coat without a scattering medium has a closed form with a table; all others are random walks
                 let base = t.albedo(reflectance);
                 if let (Some(table), true) = (self.coat_of[id as usize], t.albedo(coat.albedo).is_black()) {
-                    let (table, distribution) = (&self.coats[table as usize], t.distribution(coat.roughness));
+                    let table = &self.coats[table as usize];
+                    let distribution = t.distribution(coat.roughness);
                     return Some(Bsdf::CoatedDiffuse(CoatedDiffuse::new(table, distribution, base, coat.max_depth)));
                 }
                 Bsdf::Layered(t.layered(Base::Diffuse(Diffuse { reflectance: base }), &coat))

@@ -22,7 +22,7 @@ pub fn shading_frame(entry: &MaterialEntry, textures: &TextureSet, hit: &Surface
 /// The tangent-space normal 2c − 1 of the map, in the frame of the hit.
 fn normal_mapped(map: NormalMap, textures: &TextureSet, hit: &SurfaceHit, ctx: &TextureContext) -> Frame {
     let image = &textures.images[map.image.image as usize];
-    let st = image.within_periods(map.image.mapping.map(ctx).0);
+    let st = image.within_periods(map.image.mapping.st(ctx));
     let c = image.bilinear(0, Vec2::new(st.x, 1.0 - st.y));
     let local = Vec3::from_array((c * 2.0).to_array()) - Vec3::ONE;
     let frame = Frame::from_xz(hit.dpdus, hit.ns);

@@ -206,7 +206,8 @@ impl Heterogeneous {
             let sigma_n = (sigma_a + sigma_s).map(|sigma_t| majorant - sigma_t);
             let carried = (weight * beta).map(f32::abs);
             let sum = |v: Rgb| v.r + v.g + v.b;
-            let (scattered, passed) = (sum(carried * sigma_s), sum(carried * sigma_n.map(f32::abs)));
+            let scattered = sum(carried * sigma_s);
+            let passed = sum(carried * sigma_n.map(f32::abs));
             let p = scattered / (scattered + passed);
             if !p.is_finite() {
                 return Flight { emitted, end: End::Through { weight: Rgb::BLACK } };

@@ -410,7 +410,8 @@ mod tests {
             assert!((f64::from(found) - expected).abs() < 1e-4, "{place}: {found}, not {expected}");
 
             // In a box around it
-            let (low, high) = ((p - 0.1 * random()).max(Vec3::ZERO), (p + 0.1 * random()).min(Vec3::ONE));
+            let low = (p - 0.1 * random()).max(Vec3::ZERO);
+            let high = (p + 0.1 * random()).min(Vec3::ONE);
             assert!(found <= samples.bound(low, high) + 1e-6);
         }
         // The bound is tight

@@ -367,7 +367,8 @@ fn box_sums(mut values: Vec<[f64; 2]>, width: usize, radius: usize) -> Vec<[f64;
             }))
             .collect();
         let sum = |i: usize| {
-            let (from, to) = (prefix[i.saturating_sub(radius)], prefix[(i + radius + 1).min(line.len())]);
+            let from = prefix[i.saturating_sub(radius)];
+            let to = prefix[(i + radius + 1).min(line.len())];
             [to[0] - from[0], to[1] - from[1]]
         };
         (0..line.len()).map(sum).collect()

@@ -7,7 +7,7 @@ use super::constants::{FACT_RAYS, LIGHT_SAMPLES};
 use crate::accel::{Coherence, RayBatch};
 use crate::bsdfs::Bsdf;
 use crate::integrators::camera_sampler::CameraSampler;
-use crate::lights::{LightCtx, LightId};
+use crate::lights::{LightCtx, LightId, SampleOfLight};
 use crate::scene::{RenderJob, SurfaceInteraction};
 use lumiris_numbers::math::hash::{pcg4d, unit_f32};
 use lumiris_numbers::math::ray::SEGMENT_END;
@@ -99,7 +99,8 @@ fn sky(job: &RenderJob, visible: &[SurfaceInteraction]) -> f64 {
         let n = normal(at);
         for k in 0..LIGHT_SAMPLES {
             let [choice, u, v, _] = pcg4d([i, SEED, 1, k]).map(unit_f32);
-            let Some((light, s)) = job.lights.sample(&LightCtx::on(at.surface.p, n), choice, [u, v]) else { continue };
+            let drawn = job.lights.sample(&LightCtx::on(at.surface.p, n), choice, [u, v]);
+            let Some(SampleOfLight { light, sample: s }) = drawn else { continue };
             segments.push(&Ray { o: at.origin(s.wi), d: s.wi, t_max: s.t * SEGMENT_END, time: 0.0 });
             let value = f64::from(s.li.luminance()) * f64::from(s.wi.dot(n).max(0.0)) / f64::from(s.pdf);
             found.push((job.world.scene.lights.lights[light as usize].is_infinite(), value));

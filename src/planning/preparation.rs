@@ -180,7 +180,8 @@ mod tests {
             }
         };
         Preparation { deadline: Some(Instant::now()), ..Preparation::default() }.until_deadline(ends);
-        let (stop, deadline) = (AtomicBool::new(true), Some(Instant::now() + Duration::from_secs(1000)));
+        let stop = AtomicBool::new(true);
+        let deadline = Some(Instant::now() + Duration::from_secs(1000));
         Preparation { deadline, stop: &stop, ..Preparation::default() }.until_deadline(ends);
         let result = Preparation { deadline, ..Preparation::default() }.until_deadline(|how| how.goes_on().is_ok());
         assert!(result, "work that is done is not told to stop");

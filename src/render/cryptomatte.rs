@@ -11,6 +11,7 @@
 use super::render_settings::RenderSettings;
 use crate::accel::{Coherence, Hit};
 use crate::film::{Film, PixelBounds};
+use crate::imaging::TextEntries;
 use crate::integrators::CameraSamples;
 use crate::integrators::camera_sampler::{CameraSampler, PixelSampleRange, Scratch};
 use crate::integrators::path::BATCH_PATHS;
@@ -47,7 +48,7 @@ pub struct Layer {
     /// Sorted by rows, then columns.
     tiles: Vec<LayerTile>,
     /// Metadata entries `cryptomatte/…`, with the names of all ids.
-    pub metadata: Vec<(String, String)>,
+    pub metadata: TextEntries,
 }
 
 /// 32-bit MurmurHash3 of a name.
@@ -96,7 +97,7 @@ impl Cryptomatte {
     }
 
     /// The metadata entries of the specification. The manifest is JSON, ordered by name.
-    fn metadata(self, hashes: &BTreeMap<String, u32>) -> Vec<(String, String)> {
+    fn metadata(self, hashes: &BTreeMap<String, u32>) -> TextEntries {
         let names: Vec<String> =
             hashes.iter().map(|(name, hash)| format!("{}:\"{hash:08x}\"", json_text(name))).collect();
         let key = format!("{:08x}", hash(self.layer()));

@@ -11,7 +11,6 @@ use super::tiles::replica_choice;
 use crate::direct::Estimator;
 use crate::film::BAND;
 use crate::imaging::oiio::{ROWS_AT_ONCE, library_bytes};
-use crate::integrators::light_layers;
 use crate::planning::preparation::thread_pool;
 use crate::scene::RenderJob;
 use lumiris_numbers::estimators::ocv::pixels::MARGIN;
@@ -89,7 +88,7 @@ pub fn predict(job: &RenderJob, wanted: &Wanted<'_>) -> Prediction {
     let pixels = bounds.area() as f64;
     let whole = if wanted.is_denoised { DENOISED } else { 0.0 } + wanted.cryptomattes.len() as f64 * IDS;
     let width = bounds.width() as usize;
-    let channels = CHANNELS + light_layers::count(job) * CHANNELS_OF_LAYER;
+    let channels = CHANNELS + render.light_layers(job).len() * CHANNELS_OF_LAYER;
     let band = (BAND as usize + 2) * READ * threads + 2 * ROWS_AT_ONCE * channels;
     Prediction {
         film: (pixels * (share * of_sums(job, render) + whole)) as u64,
@@ -122,7 +121,7 @@ fn of_sums(job: &RenderJob, render: &RenderSettings) -> f64 {
     }
 
     // Layers of light groups, as if each group lit all pixels
-    bytes += light_layers::count(job) as f64 * grown(LIGHT, LIGHT_DIGITS);
+    bytes += render.light_layers(job).len() as f64 * grown(LIGHT, LIGHT_DIGITS);
 
     // Control variates
     let estimator = Estimator::at_vertex(&job.settings().integrator, 0);

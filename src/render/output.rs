@@ -2,7 +2,7 @@
 
 use super::rendering::Rendering;
 use crate::film::{BAND, Film, PixelSums};
-use crate::imaging::{IMAGE_LAYER, Image};
+use crate::imaging::{IMAGE_LAYER, Image, TextEntries};
 use crate::scene::{FilmSettings, SampleCountMap};
 use crate::settings::Settings;
 use rayon::prelude::*;
@@ -189,8 +189,11 @@ pub fn channels(film: &Film, aovs: &[Aov], sample_count_map: Option<&SampleCount
     Channels { names: layers.names(), data: layers.rows(film.bounds.y0..film.bounds.y1) }
 }
 
+/// Images by the name of their layer.
+pub type NamedImages = Vec<(String, Image)>;
+
 /// The same values as one named image per AOV and light group, the image itself first.
-pub fn layers(film: &Film, aovs: &[Aov], sample_count_map: Option<&SampleCountMap>) -> Vec<(String, Image)> {
+pub fn layers(film: &Film, aovs: &[Aov], sample_count_map: Option<&SampleCountMap>) -> NamedImages {
     // Images of some channels, and of a light group
     let (width, height) = (film.bounds.width() as usize, film.bounds.height() as usize);
     let image = |has_image: bool, aovs: &[Aov]| {
@@ -240,7 +243,7 @@ fn ratio_values(map: &SampleCountMap, max: f32, pixel: usize) -> [f32; 5] {
 }
 
 /// Metadata entries on the progress of a rendering.
-pub fn progress_metadata(rendering: &Rendering) -> Vec<(String, String)> {
+pub fn progress_metadata(rendering: &Rendering) -> TextEntries {
     let entries = [
         ("complete", rendering.complete.to_string()),
         ("samples_done", rendering.film.summary().samples_text("per pixel")),
@@ -250,7 +253,7 @@ pub fn progress_metadata(rendering: &Rendering) -> Vec<(String, String)> {
 }
 
 /// Metadata entries `lumiris:…` of everything that the image depends on: settings and film.
-pub fn metadata(film: &FilmSettings, settings: &Settings) -> Vec<(String, String)> {
+pub fn metadata(film: &FilmSettings, settings: &Settings) -> TextEntries {
     let b = &film.bounds;
     let film = [
         ("filter", format!("{:?}", film.filter)),

@@ -2,6 +2,8 @@
 
 use super::tile_share::TileShare;
 use crate::direct::Estimator;
+use crate::integrators::light_layers;
+use crate::scene::RenderJob;
 use crate::settings::Settings;
 use std::time::Duration;
 
@@ -28,6 +30,8 @@ pub struct RenderSettings {
     pub with_replicas: bool,
     /// True if the film stores features of the first surfaces: albedo, normal, depth, material and object.
     pub with_features: bool,
+    /// True if the film stores the layers of light groups.
+    pub with_light_layers: bool,
 }
 
 impl Default for RenderSettings {
@@ -42,7 +46,15 @@ impl Default for RenderSettings {
             time_limit: None,
             with_replicas: false,
             with_features: true,
+            with_light_layers: true,
         }
+    }
+}
+
+impl RenderSettings {
+    /// Names of the light-group layers that the film stores.
+    pub(in crate::render) fn light_layers<'a>(&self, job: &'a RenderJob) -> &'a [String] {
+        if self.with_light_layers { light_layers::names(job) } else { &[] }
     }
 }
 

@@ -18,7 +18,7 @@ use crate::film::{FeatureSet, Film, FilmTile, PixelBounds};
 use crate::imaging::tiles::TileStore;
 use crate::integrators::camera_sampler::CameraSampler;
 use crate::integrators::cells::REPLICA_CELL;
-use crate::integrators::{PathStats, Statistics, light_layers, make_integrator, reuse};
+use crate::integrators::{PathStats, Statistics, make_integrator, reuse};
 use crate::planning::processor_time;
 use crate::scene::{FilmSettings, RenderJob};
 use rayon::prelude::*;
@@ -111,7 +111,7 @@ impl<'a> Run<'a> {
         // Trace passes. The integrator prepares for several of them at once
         while first < end && !self.stopped(first - begin) {
             let served = end.min(first.saturating_add(integrator.prepare(first)?));
-            let workers = Workers::new(&*integrator, self.features(), light_layers::count(self.job));
+            let workers = Workers::new(&*integrator, self.features(), self.settings.light_layers(self.job).len());
             while first < served && !self.stopped(first - begin) {
                 let length = self.next_pass(first - self.settings.first_sample, first - begin);
                 let samples = first..first.saturating_add(length).min(served);
@@ -248,14 +248,14 @@ impl<'a> Run<'a> {
         let replicas = replicas.map_or(Vec::new(), |choice| choice.of_tile(all, &bounds));
         let integrator = &self.job.settings().integrator;
         let fits = Estimator::at_vertex(integrator, 0).fits(self.job, bounds.area() + replicas.len());
-        let layers = Arc::new(PackedLayers::new(light_layers::count(self.job), bounds.area()));
+        let layers = Arc::new(PackedLayers::new(self.settings.light_layers(self.job).len(), bounds.area()));
         Tile { bounds, done: self.begin(), sums: Arc::new(PackedSums::new(bounds.area())), layers, replicas, fits }
     }
 
     /// The film of all tiles.
     fn film(&self, tiles: &[Tile]) -> Film {
         let FilmSettings { resolution, bounds, .. } = self.job.world.scene.film;
-        film(resolution, bounds, tiles, light_layers::names(self.job))
+        film(resolution, bounds, tiles, self.settings.light_layers(self.job))
     }
 
     /// Median noise of the image so far. The time that it takes is added to `times`.

@@ -132,7 +132,8 @@ impl AnyWorker<'_> {
             pixel_of.resize(first, fit);
         }
         for sum in tracer.light_layers().iter().flat_map(|layers| layers.entries()) {
-            let (pixel, radiance) = (pixel_of[sum.sample as usize], film.balanced(sum.radiance));
+            let pixel = pixel_of[sum.sample as usize];
+            let radiance = film.balanced(sum.radiance);
             light[sum.layer as usize].push(LayerSample { pixel, radiance });
         }
         self.times.film += start.elapsed();

@@ -55,35 +55,43 @@ impl Default for Mapping2d {
 }
 
 impl Mapping2d {
-    /// Texture coordinates (s, t), t upwards, and the filter width in them. The width is available for
-    /// [`Mapping2d::Uv`] and [`Mapping2d::Affine`] with the first texture coordinates; other lookups are not filtered.
-    /// Coordinates computed from positions may be large.
-    pub fn map(&self, ctx: &TextureContext) -> (DVec2, Vec2) {
+    /// Texture coordinates (s, t), t upwards. Coordinates computed from positions may be large.
+    pub fn st(&self, ctx: &TextureContext) -> DVec2 {
         match self {
             // Mappings of texture coordinates
-            Mapping2d::Uv { scale, delta } => ((*scale * ctx.uv + *delta).as_dvec2(), scale.abs() * ctx.uv_width),
-            Mapping2d::Affine { second: true, matrix, offset } => {
-                ((*matrix * ctx.uv1 + *offset).as_dvec2(), Vec2::ZERO)
-            }
-            Mapping2d::Affine { second: false, matrix, offset } => {
-                let width = Mat2::from_cols(matrix.x_axis.abs(), matrix.y_axis.abs()) * ctx.uv_width;
-                ((*matrix * ctx.uv + *offset).as_dvec2(), width)
+            Mapping2d::Uv { scale, delta } => (*scale * ctx.uv + *delta).as_dvec2(),
+            Mapping2d::Affine { second, matrix, offset } => {
+                (*matrix * if *second { ctx.uv1 } else { ctx.uv } + *offset).as_dvec2()
             }
             // Mappings of positions
             Mapping2d::Spherical { texture_from_world } => {
                 let w = texture_from_world.transform_point3(ctx.p).as_vec3().normalize_or(Vec3::Z);
                 let st = Vec2::new(w.z.clamp(-1.0, 1.0).acos() * FRAC_1_PI, warp::azimuth(w) / TAU);
-                (st.as_dvec2(), Vec2::ZERO)
+                st.as_dvec2()
             }
             Mapping2d::Cylindrical { texture_from_world } => {
                 let p = texture_from_world.transform_point3(ctx.p);
                 let turn = (PI + (p.y as f32).atan2(p.x as f32)) / TAU;
-                (DVec2::new(f64::from(turn), p.z), Vec2::ZERO)
+                DVec2::new(f64::from(turn), p.z)
             }
             Mapping2d::Planar { vs, vt, delta, texture_from_world } => {
                 let p = texture_from_world.transform_point3(ctx.p);
-                (delta.as_dvec2() + DVec2::new(p.dot(vs.as_dvec3()), p.dot(vt.as_dvec3())), Vec2::ZERO)
+                delta.as_dvec2() + DVec2::new(p.dot(vs.as_dvec3()), p.dot(vt.as_dvec3()))
             }
+        }
+    }
+
+    /// Filter width in (s, t) of mappings of the first texture coordinates; other lookups are not filtered.
+    pub fn width(&self, ctx: &TextureContext) -> Vec2 {
+        match self {
+            Mapping2d::Uv { scale, .. } => scale.abs() * ctx.uv_width,
+            Mapping2d::Affine { second: false, matrix, .. } => {
+                Mat2::from_cols(matrix.x_axis.abs(), matrix.y_axis.abs()) * ctx.uv_width
+            }
+            Mapping2d::Affine { second: true, .. }
+            | Mapping2d::Spherical { .. }
+            | Mapping2d::Cylindrical { .. }
+            | Mapping2d::Planar { .. } => Vec2::ZERO,
         }
     }
 }
@@ -107,7 +115,7 @@ impl CheckerboardMapping {
         let odd = |x: f64| x.floor().rem_euclid(2.0) == 1.0;
         match self {
             CheckerboardMapping::Squares(mapping) => {
-                let (st, _) = mapping.map(ctx);
+                let st = mapping.st(ctx);
                 odd(st.x) == odd(st.y)
             }
             CheckerboardMapping::Cubes { texture_from_world } => {
@@ -139,20 +147,21 @@ mod tests {
     fn mappings_have_their_formulas() {
         let shift = DAffine3::from_translation(DVec3::new(-1.0, 0.0, 0.0));
         let uv = Mapping2d::Uv { scale: Vec2::new(2.0, -3.0), delta: Vec2::new(0.5, 0.25) };
-        let (st, width) = uv.map(&at(Vec3::ZERO, Vec2::new(0.25, 0.5)));
+        let ctx = at(Vec3::ZERO, Vec2::new(0.25, 0.5));
+        let (st, width) = (uv.st(&ctx), uv.width(&ctx));
         assert!((st - DVec2::new(1.0, -1.25)).length() < 1e-6 && (width - Vec2::new(0.2, 0.6)).length() < 1e-6);
 
         let spherical = Mapping2d::Spherical { texture_from_world: shift };
-        let (st, _) = spherical.map(&at(Vec3::new(1.0, -5.0, 0.0), Vec2::ZERO));
+        let st = spherical.st(&at(Vec3::new(1.0, -5.0, 0.0), Vec2::ZERO));
         assert!((st - DVec2::new(0.5, 0.75)).length() < 1e-6, "{st}");
-        assert!(spherical.map(&at(Vec3::X, Vec2::ZERO)).0.is_finite());
+        assert!(spherical.st(&at(Vec3::X, Vec2::ZERO)).is_finite());
 
         let cylindrical = Mapping2d::Cylindrical { texture_from_world: shift };
-        let (st, _) = cylindrical.map(&at(Vec3::new(1.0, 2.0, 3.5), Vec2::ZERO));
+        let st = cylindrical.st(&at(Vec3::new(1.0, 2.0, 3.5), Vec2::ZERO));
         assert!((st - DVec2::new(0.75, 3.5)).length() < 1e-6, "{st}");
 
         let planar = Mapping2d::Planar { vs: Vec3::Y, vt: Vec3::Z * 2.0, delta: Vec2::ONE, texture_from_world: shift };
-        let (st, _) = planar.map(&at(Vec3::new(1.0, 2.0, 3.0), Vec2::ZERO));
+        let st = planar.st(&at(Vec3::new(1.0, 2.0, 3.0), Vec2::ZERO));
         assert!((st - DVec2::new(3.0, 7.0)).length() < 1e-6, "{st}");
     }
 
@@ -164,7 +173,7 @@ mod tests {
             let of = |o: DVec3| {
                 let texture_from_world = DAffine3::from_translation(o);
                 let (vs, vt, delta) = (Vec3::X, Vec3::Y, Vec2::ZERO);
-                let (st, _) = Mapping2d::Planar { vs, vt, delta, texture_from_world }.map(&p);
+                let st = Mapping2d::Planar { vs, vt, delta, texture_from_world }.st(&p);
                 (CheckerboardMapping::Cubes { texture_from_world }.is_even(&p), st - o.truncate())
             };
             let ((even, st), (even_far, st_far)) = (of(DVec3::ZERO), of(far));

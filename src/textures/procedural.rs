@@ -71,25 +71,25 @@ pub struct Bilerp<T> {
 }
 
 impl Octaves {
-    fn sum(&self, p: DVec3, of: impl Fn(f32) -> f32) -> (f32, f32) {
+    fn sum(&self, p: DVec3, of: impl Fn(f32) -> f32) -> f32 {
         let (mut sum, mut frequency, mut amplitude) = (0.0, 1.0, 1.0);
         for _ in 0..self.count {
             sum += amplitude * of(noise(p * f64::from(frequency)));
             frequency *= LACUNARITY;
             amplitude *= self.roughness;
         }
-        (sum, amplitude)
+        sum
     }
 
     /// Fractional Brownian motion at a point.
     pub fn fbm(&self, p: DVec3) -> f32 {
-        self.sum(p, |noise| noise).0
+        self.sum(p, |noise| noise)
     }
 
     /// Turbulence at a point. The mean of the next octave is added, as in pbrt.
     pub fn turbulence(&self, p: DVec3) -> f32 {
-        let (sum, next) = self.sum(p, f32::abs);
-        sum + next * MEAN_OF_NOISE
+        let next_amplitude = (0..self.count).fold(1.0, |amplitude, _| amplitude * self.roughness);
+        self.sum(p, f32::abs) + next_amplitude * MEAN_OF_NOISE
     }
 }
 
@@ -147,7 +147,7 @@ const DOT_RADIUS: f32 = 0.35;
 impl Dots {
     /// True inside a dot.
     pub fn is_inside(&self, ctx: &TextureContext) -> bool {
-        let (st, _) = self.mapping.map(ctx);
+        let st = self.mapping.st(ctx);
         let cell = (st + 0.5).floor();
         let noise_at = |dx: f64, dy: f64| noise(DVec3::new(cell.x + dx, cell.y + dy, 0.5));
         if noise_at(0.5, 0.5) <= 0.0 {
@@ -161,7 +161,7 @@ impl Dots {
 impl<T: Copy + std::ops::Add<Output = T> + std::ops::Mul<f32, Output = T>> Bilerp<T> {
     /// The value at a point.
     pub fn value(&self, ctx: &TextureContext) -> T {
-        let Vec2 { x, y } = self.mapping.map(ctx).0.as_vec2();
+        let Vec2 { x, y } = self.mapping.st(ctx).as_vec2();
         let [a, b, c, d] = self.corners;
         (a * (1.0 - x) + b * x) * (1.0 - y) + (c * (1.0 - x) + d * x) * y
     }

@@ -234,16 +234,16 @@ impl TextureSet {
 
     /// Value of an image at a point; black where there is no tile.
     pub fn image_value(&self, texture: &ImageTexture, ctx: &TextureContext) -> Rgb {
-        let (st, width) = texture.mapping.map(ctx);
+        let st = texture.mapping.st(ctx);
         let (image, st) = match texture.udim {
             Some(udim) => match self.udims[udim as usize].tile(st) {
-                Some(tile) => tile,
+                Some(image) => (image, Udim::within_tile(st)),
                 None => return Rgb::BLACK,
             },
             None => (texture.image, self.images[texture.image as usize].within_periods(st)),
         };
         // Images have t downwards
-        self.images[image as usize].lookup(Vec2::new(st.x, 1.0 - st.y), width)
+        self.images[image as usize].lookup(Vec2::new(st.x, 1.0 - st.y), texture.mapping.width(ctx))
     }
 
     /// Value of the face texture at a point.

@@ -31,7 +31,8 @@ fn set() -> (TextureSet, ImageTexture) {
 #[test]
 fn images_have_their_origin_at_the_lower_left() {
     let (mut set, image) = set();
-    let (rgb, float) = (set.add_rgb(RgbTexture::Image(image)), set.add_float(FloatTexture::Image(image)));
+    let rgb = set.add_rgb(RgbTexture::Image(image));
+    let float = set.add_float(FloatTexture::Image(image));
     assert_eq!(set.rgb(rgb, &at(0.25, 0.25)), Rgb::new(0.75, 0.0, 0.0));
     assert_eq!(set.rgb(rgb, &at(0.75, 0.75)), Rgb::new(0.0, 0.5, 1.5));
     assert!((set.float(float, &at(0.25, 0.25)) - 0.25).abs() < 1e-6);
@@ -41,7 +42,8 @@ fn images_have_their_origin_at_the_lower_left() {
 fn scale_comes_before_invert_and_colours_stay_positive() {
     let (mut set, image) = set();
     let texture = ImageTexture { scale: 2.0, invert: true, ..image };
-    let (rgb, float) = (set.add_rgb(RgbTexture::Image(texture)), set.add_float(FloatTexture::Image(texture)));
+    let rgb = set.add_rgb(RgbTexture::Image(texture));
+    let float = set.add_float(FloatTexture::Image(texture));
     assert_eq!(set.rgb(rgb, &at(0.75, 0.75)), Rgb::new(1.0, 0.0, 0.0));
     assert!((set.float(float, &at(0.25, 0.25)) - 0.5).abs() < 1e-6);
     assert_eq!(set.float(float, &at(0.75, 0.75)), 0.0);

@@ -34,14 +34,20 @@ impl Udim {
         self.tiles[index] = Some(image);
     }
 
-    /// The tile that contains a point (t upwards), and the point relative to the tile; `None` where there is no tile.
+    /// The tile that contains a point (t upwards); `None` where there is no tile.
     #[inline]
-    pub fn tile(&self, st: DVec2) -> Option<(ImageId, Vec2)> {
+    pub fn tile(&self, st: DVec2) -> Option<ImageId> {
         let corner = st.floor();
         let rows = self.tiles.len().div_ceil(COLUMNS) as f64;
         let is_inside = corner.x >= 0.0 && corner.x < COLUMNS as f64 && corner.y >= 0.0 && corner.y < rows;
         let index = is_inside.then(|| corner.x as usize + COLUMNS * corner.y as usize)?;
-        Some((*self.tiles.get(index)?.as_ref()?, (st - corner).as_vec2()))
+        *self.tiles.get(index)?
+    }
+
+    /// A point relative to its tile.
+    #[inline]
+    pub fn within_tile(st: DVec2) -> Vec2 {
+        (st - st.floor()).as_vec2()
     }
 }
 
@@ -55,11 +61,11 @@ mod tests {
         for (number, image) in [(1001, 7), (1002, 8), (1010, 9), (1011, 10)] {
             udim.set(number, image);
         }
-        let at = |x: f64, y: f64| udim.tile(DVec2::new(x, y)).map(|(image, _)| image);
+        let at = |x: f64, y: f64| udim.tile(DVec2::new(x, y));
         assert_eq!([at(0.0, 0.0), at(0.99, 0.99), at(1.0, 0.5), at(9.5, 0.5)], [Some(7), Some(7), Some(8), Some(9)]);
         assert_eq!([at(0.5, 1.0), at(1.5, 1.0), at(10.5, 0.5), at(-0.1, 0.5)], [Some(10), None, None, None]);
         assert_eq!([at(0.5, -0.1), at(0.5, 1e30), at(f64::NAN, 0.5), at(2.5, 0.5)], [None; 4]);
-        assert_eq!(udim.tile(DVec2::new(1.25, 0.75)).unwrap().1, Vec2::new(0.25, 0.75));
+        assert_eq!(Udim::within_tile(DVec2::new(1.25, 0.75)), Vec2::new(0.25, 0.75));
         assert!(!Udim::is_number(1000) && Udim::is_number(1001) && !Udim::is_number(10_000));
     }
 }

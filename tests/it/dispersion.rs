@@ -12,7 +12,7 @@ use lumiris::integrators::exclusions::{Feature, allows};
 use lumiris::lights::{EnvironmentFilter, EnvironmentMap, EnvironmentMapping};
 use lumiris::materials::Dispersion;
 use lumiris::scene::{AccelKind, RenderJob};
-use lumiris_formats::spectra::{Spectrum, white_responses};
+use lumiris_formats::spectra::{Spectrum, WHITE_RANGE, white_responses};
 use lumiris_numbers::math::{Rgb, Vec3};
 use std::path::Path;
 
@@ -59,9 +59,8 @@ fn load(folder: &Path, text: &str) -> RenderJob {
 /// ∫ of the responses times `of` over the index of refraction.
 fn over_wavelengths(of: impl Fn(f32) -> Rgb) -> [f64; 3] {
     let eta = Dispersion::new(&Spectrum::from_pairs(&[380.0, 1.8, 720.0, 1.2]).unwrap()).unwrap();
-    let (lambda, responses) = white_responses();
     let mut sum = [0.0; 3];
-    for (lambda, response) in lambda.zip(responses) {
+    for (lambda, response) in WHITE_RANGE.zip(white_responses()) {
         // A response is valid within half a nm of its wavelength
         for i in 0..32 {
             let value = of(eta.eta(lambda as f32 + (i as f32 + 0.5) / 32.0 - 0.5));

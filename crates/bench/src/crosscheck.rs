@@ -10,10 +10,10 @@
 use glam::DVec3;
 use lumiris::accel::{Accel, Coherence, Hit, RayBatch};
 use lumiris::geometry::Shape;
-use lumiris::lights::LightCtx;
+use lumiris::lights::{LightCtx, SampleOfLight};
 use lumiris::scene::{RenderJob, Scene};
 use lumiris_numbers::math::ray::{SEGMENT_END, offset_origin};
-use lumiris_numbers::math::{Ray, Vec2, Vec3, warp};
+use lumiris_numbers::math::{Ray, Sphere, Vec2, Vec3, warp};
 use lumiris_numbers::samplers::{SampleStream, SamplerKind};
 use serde::Serialize;
 
@@ -146,7 +146,7 @@ fn camera_rays(scene: &Scene, count: u32) -> RayBatch {
 
 fn random_rays(scene: &Scene, count: u32) -> RayBatch {
     let mut batch = RayBatch::default();
-    let (center, radius) = scene.geometry.world_bounds().bounding_sphere();
+    let Sphere { center, radius } = scene.geometry.world_bounds().bounding_sphere();
     for i in 0..count {
         let u = uniforms(Family::Random, i);
         let o = center + radius * warp::sample_uniform_sphere([u[0], u[1]]);
@@ -166,7 +166,7 @@ fn shadow_rays(job: &RenderJob, camera: &RayBatch, hits: &[Option<Hit>]) -> RayB
         let s = set.surface_hit_of_ray(hit.geometry, hit.primitive, hit.instance, hit.uv, &ray);
         let u = uniforms(Family::Shadow, i as u32);
         let ctx = LightCtx { ns: s.ns, ..LightCtx::on(s.p, s.n) };
-        let Some((_, sample)) = job.lights.sample(&ctx, u[0], [u[1], u[2]]) else { continue };
+        let Some(SampleOfLight { sample, .. }) = job.lights.sample(&ctx, u[0], [u[1], u[2]]) else { continue };
 
         // A segment to a point, or a ray to a light at infinity
         let o = offset_origin(s.p, s.p_error, s.n, sample.wi);
@@ -201,7 +201,7 @@ fn grazing_rays(scene: &Scene, camera: &RayBatch, hits: &[Option<Hit>]) -> RayBa
 fn edge_rays(scene: &Scene, count: u32) -> RayBatch {
     // Meshes
     let mut batch = RayBatch::default();
-    let (center, radius) = scene.geometry.world_bounds().bounding_sphere();
+    let Sphere { center, radius } = scene.geometry.world_bounds().bounding_sphere();
     let meshes: Vec<_> = scene
         .geometry
         .root

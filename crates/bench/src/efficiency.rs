@@ -106,7 +106,8 @@ pub fn measure_efficiency(
             let mut settings = case.settings;
             settings.sampling.seed = settings.sampling.seed.wrapping_add(seed);
             let start = processor_time::of_process();
-            let (image, plan) = image(job, settings, render_settings)?;
+            let plan = prepare_anew(job, settings, render_settings)?;
+            let image = image(job, render_settings)?;
             measured.cpu.push((processor_time::of_process() - start).as_secs_f64());
             measured.chosen.push(plan.chosen);
             measured.images.push(image);
@@ -168,7 +169,8 @@ pub fn first_look(
         settings.sampling.seed = settings.sampling.seed.wrapping_add(seeds);
         settings.sampling.spp = spp;
         let start = processor_time::of_process();
-        let (image, _) = image(job, settings, render_settings)?;
+        prepare_anew(job, settings, render_settings)?;
+        let image = image(job, render_settings)?;
         let cpu = (processor_time::of_process() - start).as_secs_f64();
         let errors = weights.errors(&[image]);
         Ok([&errors[0].relative, &errors[0].masked, &errors[0].squared].map(|e| e.iter().sum::<f64>() * cpu))
@@ -205,23 +207,34 @@ pub fn reference_image(
     settings: Settings,
     render_settings: &RenderSettings,
 ) -> Result<Colors, RenderError> {
-    let (image, _) = image(job, settings, render_settings)?;
+    prepare_anew(job, settings, render_settings)?;
+    let image = image(job, render_settings)?;
     Ok(image.into_iter().map(|color| color.map(|v| f64::from(v as f32))).collect())
 }
 
-/// Renders an image, with all preparation done anew. Also returns the choices.
-fn image(
+/// Prepares an image, with all choices made anew.
+fn prepare_anew(
     job: &mut RenderJob,
     settings: Settings,
     render_settings: &RenderSettings,
-) -> Result<(Colors, Plan), RenderError> {
+) -> Result<Plan, RenderError> {
     job.reset(settings);
-    let plan = prepare(job, &Preparation::on(render_settings.threads))?;
+    Ok(prepare(job, &Preparation::on(render_settings.threads))?)
+}
+
+/// Renders a prepared image.
+fn image(job: &RenderJob, render_settings: &RenderSettings) -> Result<Colors, RenderError> {
     let spp = job.pixel_samples.as_ref().map_or(job.settings().sampling.spp, |of_pixels| of_pixels.spp);
-    let render_settings =
-        RenderSettings { spp, with_features: false, with_replicas: false, time_limit: None, ..*render_settings };
+    let render_settings = RenderSettings {
+        spp,
+        with_features: false,
+        with_replicas: false,
+        with_light_layers: false,
+        time_limit: None,
+        ..*render_settings
+    };
     let rendering = render(job, &render_settings, &AtomicBool::new(false), &|_| ())?;
-    Ok((rendering.film.pixels().iter().map(PixelSums::mean).collect(), plan))
+    Ok(rendering.film.pixels().iter().map(PixelSums::mean).collect())
 }
 
 /// Renders the directly visible emission.
@@ -232,7 +245,8 @@ fn emission(job: &mut RenderJob, settings: &Settings, render_settings: &RenderSe
     settings.integrator.estimator = EstimatorKind::Mis;
     settings.integrator.light_sampler = LightSamplerKind::Power;
     settings.sampling.spp = EDGE_SPP;
-    Ok(image(job, settings, render_settings)?.0)
+    prepare_anew(job, settings, render_settings)?;
+    image(job, render_settings)
 }
 
 fn mean_of<'a>(images: impl Iterator<Item = &'a Colors> + Clone, area: usize) -> Colors {

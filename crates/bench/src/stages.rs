@@ -128,7 +128,7 @@ pub fn measure(mut job: RenderJob, settings: &BenchSettings) -> Result<Report, E
         stages: Vec::new(),
     };
     if settings.t1 {
-        (report.stages, report.t1) = stages(&job, &batches, settings.runs);
+        stages(&job, &batches, settings.runs, &mut report);
     }
     if !settings.intersect && !settings.t2 {
         return Ok(report);
@@ -164,8 +164,8 @@ fn record(job: &RenderJob, batches: &[CameraSamples]) -> Recording {
     tracer.take_recording()
 }
 
-/// Renders the batches several times, and returns the times of the stages.
-fn stages(job: &RenderJob, batches: &[CameraSamples], runs: u32) -> (Vec<Stage>, Option<Proposals>) {
+/// Renders the batches several times, and reports the times of the stages.
+fn stages(job: &RenderJob, batches: &[CameraSamples], runs: u32, report: &mut Report) {
     // Run, once without measuring
     let mut tracer = PathTracer::default();
     let mut out = Vec::new();
@@ -190,7 +190,7 @@ fn stages(job: &RenderJob, batches: &[CameraSamples], runs: u32) -> (Vec<Stage>,
     let (t1_light, t1_bsdf) = (of(&|r| r.1.direct.t1_light), of(&|r| r.1.direct.t1 - r.1.direct.t1_light));
     let stage = |name, seconds, items| Stage { name, seconds, items };
     // Stages
-    let stages = vec![
+    report.stages = vec![
         stage("camera rays", of(&|r| r.1.camera_time), last.camera_rays),
         stage("bounce rays", of(&|r| r.1.bounce_time), last.bounce_rays),
         stage("shade", of(&|r| r.1.shade_time), points),
@@ -203,13 +203,19 @@ fn stages(job: &RenderJob, batches: &[CameraSamples], runs: u32) -> (Vec<Stage>,
 
     // Proposals
     let per = |seconds: f64, count: u64| (count > 0).then(|| seconds * 1e9 / count as f64);
-    let proposals = Proposals {
+    report.t1 = Some(Proposals {
         light_proposals: direct.light_proposals,
         bsdf_proposals,
         light_nanoseconds: per(t1_light, direct.light_proposals),
         bsdf_nanoseconds: per(t1_bsdf, bsdf_proposals),
-    };
-    (stages, Some(proposals))
+    });
+}
+
+/// A traced batch.
+struct Traced {
+    time: Duration,
+    /// Rays that hit something.
+    hits: usize,
 }
 
 /// The renderer's tracer and the bare loop over the same scene.
@@ -255,12 +261,12 @@ impl Pair {
         let mut hits = Vec::new();
         let ours = |rays: &RayBatch| {
             let time = time(|| self.accel.intersect(rays, coherence, &mut hits));
-            Ok((time, hits.iter().flatten().count()))
+            Ok(Traced { time, hits: hits.iter().flatten().count() })
         };
         let bare = |rays: &RayBatch| {
             let mut packed = Packed::first(rays, width)?;
             let time = time(|| self.bare.trace(&mut packed, coherent));
-            Ok((time, packed.hits()))
+            Ok(Traced { time, hits: packed.hits() })
         };
         self.compare(name, width, batches, ours, bare)
     }
@@ -276,12 +282,12 @@ impl Pair {
         let mut occluded = Vec::new();
         let ours = |rays: &RayBatch| {
             let time = time(|| accel.occluded(rays, Coherence::Packets, &mut occluded));
-            Ok((time, occluded.iter().filter(|&&o| o).count()))
+            Ok(Traced { time, hits: occluded.iter().filter(|&&o| o).count() })
         };
         let bare = |rays: &RayBatch| {
             let mut packed = Packed::any(rays, width)?;
             let time = time(|| self.bare.trace(&mut packed, false));
-            Ok((time, packed.hits()))
+            Ok(Traced { time, hits: packed.hits() })
         };
         self.compare(name, width, batches, ours, bare)
     }
@@ -293,14 +299,14 @@ impl Pair {
         name: &'static str,
         width: u32,
         batches: &[RayBatch],
-        mut ours: impl FnMut(&RayBatch) -> Result<(Duration, usize), EmbreeError>,
-        mut bare: impl FnMut(&RayBatch) -> Result<(Duration, usize), EmbreeError>,
+        mut ours: impl FnMut(&RayBatch) -> Result<Traced, EmbreeError>,
+        mut bare: impl FnMut(&RayBatch) -> Result<Traced, EmbreeError>,
     ) -> Result<Option<RayCase>, EmbreeError> {
-        type Trace<'a> = &'a mut dyn FnMut(&RayBatch) -> Result<(Duration, usize), EmbreeError>;
+        type Trace<'a> = &'a mut dyn FnMut(&RayBatch) -> Result<Traced, EmbreeError>;
         let turn = |trace: Trace<'_>| -> Result<(Vec<f64>, usize), EmbreeError> {
             let (mut seconds, mut all_hits) = (Vec::with_capacity(batches.len()), 0);
             for batch in batches {
-                let (time, hits) = trace(black_box(&batch.clone()))?;
+                let Traced { time, hits } = trace(black_box(&batch.clone()))?;
                 seconds.push(time.as_secs_f64());
                 all_hits += hits;
             }

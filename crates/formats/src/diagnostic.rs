@@ -309,8 +309,7 @@ fn entry(diagnostic: &Diagnostic, sources: &SourceMap) -> Entry {
     let (binary, text): (Vec<_>, Vec<_>) = diagnostic.labels.iter().partition(|l| sources.is_binary(l.span.file));
     let labels = text.into_iter().enumerate().map(|(i, label)| {
         let style = if i == 0 { codespan::LabelStyle::Primary } else { codespan::LabelStyle::Secondary };
-        let (id, range) = excerpts.add(sources, label.span);
-        codespan::Label::new(style, id, range).with_message(&label.message)
+        excerpts.add(sources, label.span, style).with_message(&label.message)
     });
     let labels: Vec<_> = labels.collect();
     let severity = match diagnostic.severity {
@@ -355,8 +354,8 @@ struct Excerpt {
 struct Excerpts(Vec<Excerpt>);
 
 impl Excerpts {
-    /// Adds the excerpt of `span` and returns its id and the marked range in it.
-    fn add(&mut self, sources: &SourceMap, span: Span) -> (usize, Range<usize>) {
+    /// Adds the excerpt of `span`. Returns a label of the marked range in it.
+    fn add(&mut self, sources: &SourceMap, span: Span, style: codespan::LabelStyle) -> codespan::Label<usize> {
         let bytes = sources.bytes(span.file);
         let start = (span.start as usize).min(bytes.len());
         let line_start = bytes[..start].iter().rposition(|&b| b == b'\n').map_or(0, |i| i + 1);
@@ -370,7 +369,7 @@ impl Excerpts {
         let range = before.len()..before.len() + marked.len();
         let key = (span.file, from);
         if let Some(id) = self.0.iter().position(|e| e.key == key && e.text.len() >= range.end) {
-            return (id, range);
+            return codespan::Label::new(style, id, range);
         }
         let location = sources.locate(Span { start: from as u32, ..span });
         let text = before + &marked + &clean(&bytes[end.min(to)..to]);
@@ -379,7 +378,7 @@ impl Excerpts {
             Position::Byte(byte) => (1, byte),
         };
         self.0.push(Excerpt { name: location.name, text, line, first_column, key });
-        (self.0.len() - 1, range)
+        codespan::Label::new(style, self.0.len() - 1, range)
     }
 }
 

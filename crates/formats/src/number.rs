@@ -15,6 +15,15 @@ pub enum NumberError {
     Overflow,
 }
 
+/// A value at the start of some bytes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Parsed<T> {
+    /// The value.
+    pub value: T,
+    /// Number of its bytes.
+    pub length: usize,
+}
+
 const POWERS: [f64; 23] = [
     1e0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9, 1e10, 1e11, 1e12, 1e13, 1e14, 1e15, 1e16, 1e17, 1e18, 1e19, 1e20,
     1e21, 1e22,
@@ -26,34 +35,34 @@ pub fn is_delimiter(byte: u8) -> bool {
     matches!(byte, b' ' | b'\n' | b'\r' | b'\t' | b'[' | b']' | b'"' | b'#')
 }
 
-/// Reads the number at the start of `bytes`; returns it and its length. The number ends at a delimiter.
+/// Reads the number at the start of `bytes`. It ends at a delimiter.
 #[inline]
-pub fn parse_f32(bytes: &[u8]) -> Result<(f32, usize), NumberError> {
-    let (value, length) = scan(bytes)?;
+pub fn parse_f32(bytes: &[u8]) -> Result<Parsed<f32>, NumberError> {
+    let Parsed { value, length } = scan(bytes)?;
     if let Some(value) = value {
         // The midpoint of two f32 has exactly this tail; midpoints of f32 subnormals have it at other positions.
         let is_middle = value.to_bits() & 0x1fff_ffff == 0x1000_0000;
         if !is_middle && (value == 0.0 || (1e-37..1e38).contains(&value.abs())) {
-            return Ok((value as f32, length));
+            return Ok(Parsed { value: value as f32, length });
         }
     }
-    slow::<f32>(&bytes[..length]).map(|value| (value, length))
+    slow::<f32>(&bytes[..length]).map(|value| Parsed { value, length })
 }
 
 /// As [`parse_f32`] in f64 precision, within the range of f32.
 #[inline]
-pub fn parse_f64(bytes: &[u8]) -> Result<(f64, usize), NumberError> {
-    let (value, length) = scan(bytes)?;
+pub fn parse_f64(bytes: &[u8]) -> Result<Parsed<f64>, NumberError> {
+    let Parsed { value, length } = scan(bytes)?;
     let value = match value {
         Some(value) => value,
         None => slow::<f64>(&bytes[..length])?,
     };
-    if (value as f32).is_finite() { Ok((value, length)) } else { Err(NumberError::Overflow) }
+    if (value as f32).is_finite() { Ok(Parsed { value, length }) } else { Err(NumberError::Overflow) }
 }
 
-/// The number at the start of `bytes` and its length; `None` unless it is the nearest f64 after one operation.
+/// The number at the start of `bytes`; `None` unless it is the nearest f64 after one operation.
 #[inline]
-fn scan(bytes: &[u8]) -> Result<(Option<f64>, usize), NumberError> {
+fn scan(bytes: &[u8]) -> Result<Parsed<Option<f64>>, NumberError> {
     let mut i = 0;
     let negative = bytes.first() == Some(&b'-');
     if negative || bytes.first() == Some(&b'+') {
@@ -81,9 +90,9 @@ fn scan(bytes: &[u8]) -> Result<(Option<f64>, usize), NumberError> {
         return Err(NumberError::Malformed);
     }
     if let Some(b'e' | b'E') = bytes.get(i) {
-        let (power, length) = parse_exponent(&bytes[i + 1..])?;
-        exponent = exponent.saturating_add(power);
-        i += 1 + length;
+        let power = parse_exponent(&bytes[i + 1..])?;
+        exponent = exponent.saturating_add(power.value);
+        i += 1 + power.length;
     }
     if bytes.get(i).is_some_and(|&b| !is_delimiter(b)) {
         return Err(NumberError::Malformed);
@@ -91,9 +100,9 @@ fn scan(bytes: &[u8]) -> Result<(Option<f64>, usize), NumberError> {
     if digits <= 19 && mantissa < 1 << 53 && exponent.unsigned_abs() <= 22 {
         let power = POWERS[exponent.unsigned_abs() as usize];
         let value = if exponent < 0 { mantissa as f64 / power } else { mantissa as f64 * power };
-        return Ok((Some(if negative { -value } else { value }), i));
+        return Ok(Parsed { value: Some(if negative { -value } else { value }), length: i });
     }
-    Ok((None, i))
+    Ok(Parsed { value: None, length: i })
 }
 
 #[inline]
@@ -102,7 +111,7 @@ fn digit_at(bytes: &[u8], i: usize) -> Option<u64> {
     (digit <= 9).then_some(u64::from(digit))
 }
 
-fn parse_exponent(bytes: &[u8]) -> Result<(i32, usize), NumberError> {
+fn parse_exponent(bytes: &[u8]) -> Result<Parsed<i32>, NumberError> {
     let negative = bytes.first() == Some(&b'-');
     let start = usize::from(negative || bytes.first() == Some(&b'+'));
     let mut i = start;
@@ -111,7 +120,10 @@ fn parse_exponent(bytes: &[u8]) -> Result<(i32, usize), NumberError> {
         power = (power * 10 + digit as i32).min(100_000);
         i += 1;
     }
-    if i == start { Err(NumberError::Malformed) } else { Ok((if negative { -power } else { power }, i)) }
+    if i == start {
+        return Err(NumberError::Malformed);
+    }
+    Ok(Parsed { value: if negative { -power } else { power }, length: i })
 }
 
 #[cold]
@@ -120,9 +132,9 @@ fn slow<T: FromStr + Copy + Into<f64>>(text: &[u8]) -> Result<T, NumberError> {
     if value.into().is_finite() { Ok(value) } else { Err(NumberError::Overflow) }
 }
 
-/// Reads the integer at the start of `bytes`; returns it and its length. It ends at a delimiter.
+/// Reads the integer at the start of `bytes`. It ends at a delimiter.
 #[inline]
-pub fn parse_i32(bytes: &[u8]) -> Result<(i32, usize), NumberError> {
+pub fn parse_i32(bytes: &[u8]) -> Result<Parsed<i32>, NumberError> {
     let negative = bytes.first() == Some(&b'-');
     let start = usize::from(negative || bytes.first() == Some(&b'+'));
     let mut i = start;
@@ -135,14 +147,14 @@ pub fn parse_i32(bytes: &[u8]) -> Result<(i32, usize), NumberError> {
         return Err(NumberError::Malformed);
     }
     let value = if negative { -value } else { value };
-    i32::try_from(value).map(|v| (v, i)).map_err(|_| NumberError::Overflow)
+    i32::try_from(value).map(|value| Parsed { value, length: i }).map_err(|_| NumberError::Overflow)
 }
 
 /// The numbers of a text file, separated by blanks or commas, with comments after `#`.
 pub fn numbers_of_text(text: &str) -> Result<Vec<f32>, String> {
     let words = text.lines().flat_map(|line| line.split('#').next().unwrap_or("").split([' ', '\t', '\r', ',']));
     let number = |word: &str| match parse_f32(word.as_bytes()) {
-        Ok((value, length)) if length == word.len() => Ok(value),
+        Ok(Parsed { value, length }) if length == word.len() => Ok(value),
         _ => Err(format!("`{}` is no number", word.chars().take(40).collect::<String>())),
     };
     words.filter(|word| !word.is_empty()).map(number).collect()
@@ -175,7 +187,7 @@ mod tests {
             "1e-400",
         ] {
             let expected: f32 = text.parse().unwrap();
-            let (value, length) = parse_f32(text.as_bytes()).unwrap();
+            let Parsed { value, length } = parse_f32(text.as_bytes()).unwrap();
             assert_eq!(value.to_bits(), expected.to_bits(), "{text}");
             assert_eq!(length, text.len());
         }
@@ -188,7 +200,7 @@ mod tests {
 
     #[test]
     fn whole_numbers_are_range_checked() {
-        assert_eq!(parse_i32(b"-2147483648]"), Ok((i32::MIN, 11)));
+        assert_eq!(parse_i32(b"-2147483648]"), Ok(Parsed { value: i32::MIN, length: 11 }));
         assert_eq!(parse_i32(b"2147483648"), Err(NumberError::Overflow));
         assert_eq!(parse_i32(b"99999999999999999999999999"), Err(NumberError::Overflow));
         assert_eq!(parse_i32(b"1.5"), Err(NumberError::Malformed));
@@ -201,7 +213,7 @@ mod tests {
             let value = f32::from_bits(bits);
             prop_assume!(value.is_finite());
             for text in [format!("{value}"), format!("{value:e}"), format!("{:.9e}", f64::from(value))] {
-                let (parsed, _) = parse_f32(text.as_bytes()).unwrap();
+                let parsed = parse_f32(text.as_bytes()).unwrap().value;
                 prop_assert_eq!(parsed.to_bits(), value.to_bits(), "{}", text);
             }
         }
@@ -211,9 +223,9 @@ mod tests {
             let text = format!("{mantissa}e{exponent}");
             let expected: f32 = text.parse().unwrap();
             match parse_f32(text.as_bytes()) {
-                Ok((value, _)) => {
+                Ok(Parsed { value, .. }) => {
                     prop_assert_eq!(value.to_bits(), expected.to_bits());
-                    let (value, _) = parse_f64(text.as_bytes()).unwrap();
+                    let value = parse_f64(text.as_bytes()).unwrap().value;
                     prop_assert_eq!(value.to_bits(), text.parse::<f64>().unwrap().to_bits());
                 }
                 Err(error) => {
@@ -228,9 +240,9 @@ mod tests {
             let mut text = format!("{digits:08}");
             text.insert(point.min(text.len()), '.');
             let expected: f32 = text.parse().unwrap();
-            prop_assert_eq!(parse_f32(text.as_bytes()).unwrap().0.to_bits(), expected.to_bits());
+            prop_assert_eq!(parse_f32(text.as_bytes()).unwrap().value.to_bits(), expected.to_bits());
             let expected: f64 = text.parse().unwrap();
-            prop_assert_eq!(parse_f64(text.as_bytes()).unwrap().0.to_bits(), expected.to_bits());
+            prop_assert_eq!(parse_f64(text.as_bytes()).unwrap().value.to_bits(), expected.to_bits());
         }
 
         #[test]

@@ -30,7 +30,9 @@ impl Destination {
     /// Fails for a file without write permission, for a folder, and if the parent folder does not exist.
     pub fn of(path: &Path) -> io::Result<Destination> {
         let wrong = |kind, text: &str| Err(io::Error::new(kind, text));
-        let (target, is_descriptor) = followed(path)?;
+        let target = followed(path)?;
+        // Only links of processes are not followed
+        let is_descriptor = target.is_symlink();
         let earlier = target.metadata().ok();
         match &earlier {
             Some(earlier) if earlier.is_dir() => return wrong(ErrorKind::IsADirectory, "is a folder"),
@@ -106,15 +108,15 @@ fn folder_of(path: &Path) -> &Path {
     path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
 
-/// The end of the chain of symbolic links from `path`, whether it exists or not. True for an open file of a process,
-/// such as `/dev/stdout`, which has no name to be replaced.
-fn followed(path: &Path) -> io::Result<(PathBuf, bool)> {
+/// The end of the chain of symbolic links from `path`, whether it exists or not. An open file of a process, such as
+/// `/dev/stdout`, has no name to be replaced: its link in `/proc` is the end.
+fn followed(path: &Path) -> io::Result<PathBuf> {
     let mut path = path.to_owned();
     for _ in 0..MAX_LINKS {
-        let Ok(next) = path.read_link() else { return Ok((path, false)) };
+        let Ok(next) = path.read_link() else { return Ok(path) };
         let folder = folder_of(&path).canonicalize()?;
         if folder.starts_with("/proc") {
-            return Ok((path, true));
+            return Ok(path);
         }
         path = folder.join(next);
     }

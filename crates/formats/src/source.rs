@@ -67,33 +67,46 @@ struct SourceFile {
     bytes: Arc<Vec<u8>>,
     /// Line and column, from 0, of every byte at a multiple of [`STEP`], since a file with a single line may have many
     /// diagnostics.
-    positions: OnceLock<Vec<(usize, usize)>>,
+    positions: OnceLock<Vec<TextPosition>>,
 }
 
 /// Distance of cached positions (bytes).
 const STEP: usize = 4096;
 
-/// Advances a line and a column, from 0, over bytes of text; a column is a character.
-fn advance((line, column): (usize, usize), bytes: &[u8]) -> (usize, usize) {
-    let rest = bytes.iter().rposition(|&b| b == b'\n').map_or(bytes, |i| &bytes[i + 1..]);
-    let column = if rest.len() == bytes.len() { column } else { 0 };
-    let starts_character = |b: &&u8| **b & 0xc0 != 0x80;
-    (line + bytes.iter().filter(|&&b| b == b'\n').count(), column + rest.iter().filter(starts_character).count())
+/// Line and column, from 0; a column is a character.
+#[derive(Clone, Copy, Debug, Default)]
+struct TextPosition {
+    line: usize,
+    column: usize,
+}
+
+impl TextPosition {
+    /// The position after some more bytes of text.
+    fn after(self, bytes: &[u8]) -> Self {
+        let rest = bytes.iter().rposition(|&b| b == b'\n').map_or(bytes, |i| &bytes[i + 1..]);
+        let column = if rest.len() == bytes.len() { self.column } else { 0 };
+        let starts_character = |b: &&u8| **b & 0xc0 != 0x80;
+        TextPosition {
+            line: self.line + bytes.iter().filter(|&&b| b == b'\n').count(),
+            column: column + rest.iter().filter(starts_character).count(),
+        }
+    }
 }
 
 impl SourceFile {
-    /// Line and column of a byte, from 0.
-    fn position(&self, at: usize) -> (usize, usize) {
+    /// Position of a byte.
+    fn position(&self, at: usize) -> TextPosition {
         let positions = self.positions.get_or_init(|| {
             let blocks = self.bytes.chunks_exact(STEP);
-            let next = |position: &mut (usize, usize), block: &[u8]| {
-                *position = advance(*position, block);
+            let start = TextPosition::default();
+            let next = |position: &mut TextPosition, block: &[u8]| {
+                *position = position.after(block);
                 Some(*position)
             };
-            [(0, 0)].into_iter().chain(blocks.scan((0, 0), next)).collect()
+            [start].into_iter().chain(blocks.scan(start, next)).collect()
         });
         let at = at.min(self.bytes.len());
-        advance(positions[at / STEP], &self.bytes[at / STEP * STEP..at])
+        positions[at / STEP].after(&self.bytes[at / STEP * STEP..at])
     }
 }
 
@@ -161,9 +174,17 @@ impl SourceMap {
             return Location { name, position: Position::Byte(span.start as usize) };
         }
         let file = self.files.get(span.file as usize);
-        let (line, column) = file.map_or((0, 0), |file| file.position(span.start as usize));
+        let TextPosition { line, column } = file.map(|file| file.position(span.start as usize)).unwrap_or_default();
         Location { name, position: Position::Text { line: line + 1, column: column + 1 } }
     }
+}
+
+/// Opens a file. Opening a pipe would block, and reading a folder gives an unclear message: both are errors.
+pub(crate) fn open_regular(path: &Path) -> io::Result<File> {
+    if !std::fs::metadata(path)?.is_file() {
+        return Err(io::Error::new(io::ErrorKind::InvalidInput, "is not a regular file"));
+    }
+    File::open(path)
 }
 
 /// Reads a whole file of at most [`MAX_BYTES`], decompressing gzip.

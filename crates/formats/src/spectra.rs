@@ -149,16 +149,18 @@ fn sellmeier(b: &[f64; 3], c: &[f64; 3], lambda: f64) -> f64 {
     (1.0 + b.iter().zip(c).map(|(b, c)| b * squared / (squared - c)).sum::<f64>()).sqrt()
 }
 
-/// Responses of the Rec.709 channels to white light (D65) at each nm of a range, without negative parts; each channel
-/// sums to 1.
-pub fn white_responses() -> (std::ops::RangeInclusive<u32>, &'static [Rgb]) {
+/// Wavelengths (nm) of [`white_responses`].
+pub const WHITE_RANGE: std::ops::RangeInclusive<u32> = LAMBDA_MIN..=LAMBDA_MAX;
+
+/// Responses of the Rec.709 channels to white light (D65) at each nm of [`WHITE_RANGE`], without negative parts; each
+/// channel sums to 1.
+pub fn white_responses() -> &'static [Rgb] {
     static RESPONSES: OnceLock<Vec<Rgb>> = OnceLock::new();
-    let responses = RESPONSES.get_or_init(|| {
+    RESPONSES.get_or_init(|| {
         let all: Vec<[f64; 3]> = d65_observer().map(|xyz| to_rgb(xyz).map(|c| c.max(0.0))).collect();
         let sum = all.iter().fold([0.0; 3], |sum, &c| add(sum, c));
         all.iter().map(|c| rgb([0, 1, 2].map(|i| c[i] / sum[i]))).collect()
-    });
-    (LAMBDA_MIN..=LAMBDA_MAX, responses)
+    })
 }
 
 /// Colour matching functions and illuminant over the integration range.
@@ -358,30 +360,39 @@ const COS_75: f64 = 0.258_819_045_102_520_76;
 const COSINES: [f64; 6] =
     [1.0, std::f64::consts::FRAC_1_SQRT_2, 0.5, 0.342_020_143_325_668_7, COS_75, 0.087_155_742_747_658_17];
 
+/// Optical constants of a conductor.
+#[derive(Clone, Copy, Debug)]
+pub struct Conductor<T> {
+    /// Index of refraction.
+    pub eta: T,
+    /// Absorption.
+    pub k: T,
+}
+
 /// Optical constants per channel with which an RGB renderer reproduces the reflectance of the measured spectra.
 ///
 /// The reflectance spectrum is integrated to RGB under D65 at 0° and at 75°. For each channel this pair is matched
 /// exactly if a pair (η, k) exists. The red of copper decreases more steeply towards grazing angles than any (η, k)
 /// allows: then the maximum relative difference between 0° and 85° is minimised. Saturated metals leave the gamut (the
 /// red of gold is 1.02); values above 1 are clipped.
-pub fn conductor_rgb(eta: &Spectrum, k: &Spectrum) -> (Rgb, Rgb) {
+pub fn conductor_rgb(eta: &Spectrum, k: &Spectrum) -> Conductor<Rgb> {
     let reflectance = |cos: f64| {
         under_d65(|l| fresnel_conductor(cos, f64::from(eta.at_clamped(l)), f64::from(k.at_clamped(l)).max(0.0)))
     };
     let (reflectances, grazing) = (COSINES.map(reflectance), reflectance(COS_75));
     let typical = under_d65(|l| f64::from(eta.at_clamped(l)));
-    let pairs = [0, 1, 2].map(|c| {
+    let channels = [0, 1, 2].map(|c| {
         let channel = reflectances.map(|r| r[c].clamp(1e-5, 0.9999));
         fit_conductor(channel[0], grazing[c], typical[c]).unwrap_or_else(|| nearest_conductor(channel))
     });
-    (rgb(pairs.map(|p| p.0)), rgb(pairs.map(|p| p.1)))
+    Conductor { eta: rgb(channels.map(|c| c.eta)), k: rgb(channels.map(|c| c.k)) }
 }
 
 /// The (η, k) whose reflectances at [`COSINES`] have the smallest maximum relative difference to the given ones.
-fn nearest_conductor(reflectances: [f64; 6]) -> (f64, f64) {
+fn nearest_conductor(reflectances: [f64; 6]) -> Conductor<f64> {
     const ETAS: i32 = 120;
     const NORMALS: i32 = 80;
-    let (mut best, mut min) = ((1.0, 0.0), f64::INFINITY);
+    let (mut best, mut min) = (Conductor { eta: 1.0, k: 0.0 }, f64::INFINITY);
     for i in 0..=ETAS {
         // η from 0.02 to 20, and the reflectance at 0° within ±4 % of the given one.
         let eta = 0.02 * 1000f64.powf(f64::from(i) / f64::from(ETAS));
@@ -391,7 +402,7 @@ fn nearest_conductor(reflectances: [f64; 6]) -> (f64, f64) {
             let error = |(cos, r): (f64, f64)| (fresnel_conductor(cos, eta, k) / r - 1.0).abs();
             let largest = COSINES.into_iter().zip(reflectances).map(error).fold(0.0, f64::max);
             if largest < min {
-                (best, min) = ((eta, k), largest);
+                (best, min) = (Conductor { eta, k }, largest);
             }
         }
     }
@@ -406,7 +417,7 @@ fn k_of(normal: f64, eta: f64) -> f64 {
 
 /// The (η, k) nearest to the index `typical` with the reflectances `normal` at 0° and `grazing` at 75°; `None` if there
 /// is none.
-fn fit_conductor(normal: f64, grazing: f64, typical: f64) -> Option<(f64, f64)> {
+fn fit_conductor(normal: f64, grazing: f64, typical: f64) -> Option<Conductor<f64>> {
     const STEPS: i32 = 400;
     let root = normal.sqrt();
     // k is real in this interval.
@@ -430,7 +441,7 @@ fn fit_conductor(normal: f64, grazing: f64, typical: f64) -> Option<(f64, f64)> 
             best = Some(a);
         }
     }
-    best.map(|eta| (eta, k_of(normal, eta)))
+    best.map(|eta| Conductor { eta, k: k_of(normal, eta) })
 }
 
 #[cfg(test)]
@@ -446,11 +457,11 @@ mod tests {
     fn conductors_whose_tables_end_inside_the_visible_range_stay_finite() {
         for metal in ["MgO", "TiO2", "CuZn", "Ag"] {
             let curve = |what: &str| Spectrum::named(&format!("metal-{metal}-{what}")).unwrap();
-            let (eta, k) = conductor_rgb(&curve("eta"), &curve("k"));
+            let Conductor { eta, k } = conductor_rgb(&curve("eta"), &curve("k"));
             assert!(eta.is_finite() && k.is_finite() && eta.r > 0.0, "{metal}: {eta:?} {k:?}");
         }
         // Magnesium oxide is a clear crystal of index 1.74, for any form of its table.
-        let (eta, k) =
+        let Conductor { eta, k } =
             conductor_rgb(&Spectrum::named("metal-MgO-eta").unwrap(), &Spectrum::named("metal-MgO-k").unwrap());
         let f0 = fresnel_conductor(1.0, f64::from(eta.g), f64::from(k.g));
         assert!((f0 - (0.74_f64 / 2.74).powi(2)).abs() < 0.01, "{f0}");
@@ -497,7 +508,7 @@ mod tests {
         for metal in ["Ag", "Al", "Au", "Cu", "CuZn"] {
             let table = |q: &str| Spectrum::named(&format!("metal-{metal}-{q}")).unwrap();
             let (eta_table, k_table) = (table("eta"), table("k"));
-            let (eta, k) = conductor_rgb(&eta_table, &k_table);
+            let Conductor { eta, k } = conductor_rgb(&eta_table, &k_table);
             let reflectance =
                 |cos: f64| under_d65(|l| fresnel_conductor(cos, f64::from(eta_table.at(l)), f64::from(k_table.at(l))));
             let (normal, grazing) = (reflectance(1.0), reflectance(COS_75));
@@ -514,7 +525,7 @@ mod tests {
                 assert!(at_normal < tolerance && at_grazing < tolerance, "{metal} {c}: {at_normal} {at_grazing}");
             }
         }
-        let (eta, k) =
+        let Conductor { eta, k } =
             conductor_rgb(&Spectrum::named("metal-Au-eta").unwrap(), &Spectrum::named("metal-Au-k").unwrap());
         let gold = [0, 1, 2].map(|c| fresnel_conductor(1.0, f64::from(eta[c]), f64::from(k[c])) as f32);
         assert!(gold[0] > 0.95 && gold[1] > 0.65 && gold[2] < 0.45, "{gold:?}");

@@ -74,21 +74,27 @@ fn powers(lambda: u32) -> DVec3 {
     DVec3::new(t * t, t, 1.0)
 }
 
-/// Converts CIE XYZ relative to the white of the colour space, by component, to CIELAB, with the derivative.
-fn cielab(relative: DVec3) -> (DVec3, DMat3) {
-    const DELTA: f64 = 6.0 / 29.0;
+/// (6/29)³ and below, the cube root of CIELAB is linear.
+const DELTA: f64 = 6.0 / 29.0;
+
+/// Converts CIE XYZ relative to the white of the colour space, by component, to CIELAB.
+fn cielab(relative: DVec3) -> DVec3 {
     let cube_root = |t: f64| {
-        if t > DELTA * DELTA * DELTA {
-            let root = t.cbrt();
-            (root, 1.0 / (3.0 * root * root))
-        } else {
-            (t / (3.0 * DELTA * DELTA) + 4.0 / 29.0, 1.0 / (3.0 * DELTA * DELTA))
-        }
+        if t > DELTA * DELTA * DELTA { t.cbrt() } else { t / (3.0 * DELTA * DELTA) + 4.0 / 29.0 }
     };
     let [x, y, z] = relative.to_array().map(cube_root);
-    let lab = DVec3::new(116.0 * y.0 - 16.0, 500.0 * (x.0 - y.0), 200.0 * (y.0 - z.0));
+    DVec3::new(116.0 * y - 16.0, 500.0 * (x - y), 200.0 * (y - z))
+}
+
+/// Derivative of [`cielab`].
+fn cielab_derivative(relative: DVec3) -> DMat3 {
+    let slope = |t: f64| {
+        let root = if t > DELTA * DELTA * DELTA { t.cbrt() } else { DELTA };
+        1.0 / (3.0 * root * root)
+    };
+    let [x, y, z] = relative.to_array().map(slope);
     let columns = [[0.0, 500.0, 0.0], [116.0, -500.0, 200.0], [0.0, 0.0, -200.0]].map(DVec3::from_array);
-    (lab, DMat3::from_cols(columns[0] * x.1, columns[1] * y.1, columns[2] * z.1))
+    DMat3::from_cols(columns[0] * x, columns[1] * y, columns[2] * z)
 }
 
 /// Evaluates the colour of a spectrum and its derivatives by the coefficients.
@@ -116,7 +122,7 @@ impl Fit {
     /// Difference to `target` in CIELAB.
     fn residual(&self, c: DVec3, target: DVec3) -> DVec3 {
         let shown: DVec3 = self.weights.iter().zip(&self.powers).map(|(w, p)| *w * sigmoid(c.dot(*p))).sum();
-        cielab(shown).0 - target
+        cielab(shown) - target
     }
 
     /// Derivative of [`Fit::residual`] by the coefficients.
@@ -128,12 +134,12 @@ impl Fit {
             let slope = *w * sigmoid_derivative(x);
             derivative += DMat3::from_cols(slope * p.x, slope * p.y, slope * p.z);
         }
-        cielab(shown).1 * derivative
+        cielab_derivative(shown) * derivative
     }
 
     /// Levenberg-Marquardt iteration from `c` to the coefficients with the colour `rgb`.
     fn solve(&self, mut c: DVec3, rgb: DVec3) -> DVec3 {
-        let target = cielab(self.relative_from_rgb * rgb).0;
+        let target = cielab(self.relative_from_rgb * rgb);
         let mut residual = self.residual(c, target);
         let mut damping = 1e-6;
         for _ in 0..NEWTON_STEPS {
@@ -175,7 +181,7 @@ fn fit(rgb: DVec3) -> DVec3 {
 
 #[cfg(test)]
 mod tests {
-    use super::super::spectra::{conductor_rgb, fresnel_conductor, to_rgb};
+    use super::super::spectra::{Conductor, conductor_rgb, fresnel_conductor, to_rgb};
     use super::*;
 
     /// The colour of the product of D65 and `f` in a spectral renderer.
@@ -307,7 +313,7 @@ mod tests {
     fn fitted_copper_is_within_one_percent_of_its_spectra_at_all_angles() {
         let curve = |rgb: [f32; 3]| unbounded_spectrum(Rgb::from_array(rgb));
         let (eta_curve, k_curve) = (curve([0.200_438, 0.924_033, 1.102_212]), curve([3.912_949, 2.452_848, 2.142_188]));
-        let (eta, k) = conductor_rgb(&eta_curve, &k_curve);
+        let Conductor { eta, k } = conductor_rgb(&eta_curve, &k_curve);
         for degrees in (0..=85).step_by(5) {
             let cos = f64::from(degrees).to_radians().cos();
             let by_spectra = shown(|l| fresnel_conductor(cos, f64::from(eta_curve.at(l)), f64::from(k_curve.at(l))));

@@ -2,7 +2,7 @@
 
 use super::lane::{F, LANES, Vec3s, load, store};
 use fearless_simd::{Level, Simd, dispatch, prelude::*};
-use lumiris_numbers::math::{Mat3, Vec2};
+use lumiris_numbers::math::{Mat3, Vec2, Vec3};
 
 /// A perspective camera without a lens.
 #[derive(Clone, Copy, Debug)]
@@ -17,9 +17,11 @@ pub struct Pinhole {
     pub tan_half_fov: f32,
     /// Area of a pixel on the screen.
     pub pixel_area: f32,
+    /// Origin of all rays in world space.
+    pub origin: Vec3,
 }
 
-/// Rays of a [`Pinhole`], all with the same origin. Slices have the same length, a multiple of [`LANES`].
+/// Rays of a [`Pinhole`]. Slices have the same length, a multiple of [`LANES`].
 #[derive(Debug)]
 pub struct PinholeRays<'a> {
     /// Unit directions.

@@ -9,6 +9,7 @@ use super::light::LightLanes;
 use super::wide::{sin_cos_quadrant, sin_cos_turns};
 use fearless_simd::{Level, Simd, dispatch, f32x4, f32x8, prelude::*};
 use lumiris_numbers::math::distribution::{Running, STEP, clamped};
+use lumiris_numbers::math::elementary::SinCos;
 use lumiris_numbers::math::sphere_map::{self, pdf_equal_area_square_to_sphere};
 use lumiris_numbers::math::{Mat3, ONE_MINUS_EPSILON, TexelDistribution};
 use std::f32::consts::{PI, TAU};
@@ -103,8 +104,8 @@ impl Along {
     }
 
     #[inline(always)]
-    fn lanes<S: Simd>(&self, simd: S, i: usize) -> (F<S>, I<S>) {
-        (load(simd, &self.place, i), I::from_slice(simd, &self.texel[i..i + LANES]))
+    fn texels<S: Simd>(&self, simd: S, i: usize) -> I<S> {
+        I::from_slice(simd, &self.texel[i..i + LANES])
     }
 }
 
@@ -129,16 +130,23 @@ impl Lookups {
     }
 }
 
-/// A direction before the rotation, and the density (1/sr) of a uniform point of the square.
+/// A direction of a point of the square.
+struct Mapped<S: Simd> {
+    /// The direction before the rotation.
+    w: Vec3s<S>,
+    /// Density (1/sr) of a uniform point.
+    density: F<S>,
+}
+
 #[inline(always)]
-fn equal_area<S: Simd>(x: F<S>, y: F<S>) -> (Vec3s<S>, F<S>) {
+fn equal_area<S: Simd>(x: F<S>, y: F<S>) -> Mapped<S> {
     let simd = x.token();
     let one = F::splat(simd, 1.0);
     let (u, v) = (x * 2.0 - one, y * 2.0 - one);
     let signed_distance = one - (u.abs() + v.abs());
     let r = one - signed_distance.abs();
     let a = or_zero(r.simd_gt(F::splat(simd, 0.0)), (v.abs() - u.abs()) / r);
-    let (sin_phi, cos_phi) = sin_cos_quadrant(a.max(-1.0).min(1.0));
+    let SinCos { sin: sin_phi, cos: cos_phi } = sin_cos_quadrant(a.max(-1.0).min(1.0));
     let r2 = r * r;
     let sin_theta = r * safe_sqrt(F::splat(simd, 2.0) - r2);
     let w = Vec3s {
@@ -146,16 +154,16 @@ fn equal_area<S: Simd>(x: F<S>, y: F<S>) -> (Vec3s<S>, F<S>) {
         y: (sin_phi * sin_theta).copysign(v),
         z: (one - r2).copysign(signed_distance),
     };
-    (w, F::splat(simd, pdf_equal_area_square_to_sphere()))
+    Mapped { w, density: F::splat(simd, pdf_equal_area_square_to_sphere()) }
 }
 
 /// As [`equal_area`], for the latitude–longitude mapping.
 #[inline(always)]
-fn lat_long<S: Simd>(x: F<S>, y: F<S>) -> (Vec3s<S>, F<S>) {
-    let (sin_theta, cos_theta) = sin_cos_turns(y * 0.5);
-    let (sin_phi, cos_phi) = sin_cos_turns(x);
+fn lat_long<S: Simd>(x: F<S>, y: F<S>) -> Mapped<S> {
+    let SinCos { sin: sin_theta, cos: cos_theta } = sin_cos_turns(y * 0.5);
+    let SinCos { sin: sin_phi, cos: cos_phi } = sin_cos_turns(x);
     let w = Vec3s { x: sin_theta * cos_phi, y: sin_theta * sin_phi, z: cos_theta };
-    (w, F::splat(x.token(), 1.0) / (sin_theta * (TAU * PI)))
+    Mapped { w, density: F::splat(x.token(), 1.0) / (sin_theta * (TAU * PI)) }
 }
 
 /// Points of the square for unit directions under the equal-area octahedral mapping. Slices have the same length, a
@@ -167,7 +175,7 @@ pub fn equal_area_squares(level: Level, w: Columns3<'_>, out: [&mut [f32]; 2]) {
 #[inline(always)]
 fn squares_lanes<S: Simd>(simd: S, w: Columns3<'_>, [u, v]: [&mut [f32]; 2]) {
     for i in (0..u.len()).step_by(LANES) {
-        let (x, y) = sphere_map::equal_area_squares(Vec3s::load(simd, w, i).into());
+        let [x, y] = sphere_map::equal_area_squares(Vec3s::load(simd, w, i).into());
         store(x.0, u, i);
         store(y.0, v, i);
     }
@@ -257,9 +265,10 @@ impl Environment<'_> {
         (wi, at): (&mut [&mut [f32]; 3], usize),
     ) {
         let [width, height] = self.distribution.resolution();
-        let ((x, column), (y, row)) = (places[0].lanes(simd, i), places[1].lanes(simd, i));
+        let (x, y) = (load(simd, &places[0].place, i), load(simd, &places[1].place, i));
+        let (column, row) = (places[0].texels(simd, i), places[1].texels(simd, i));
         let (px, py) = (x * (1.0 / width as f32), y * (1.0 / height as f32));
-        let (w, density) = if self.is_equal_area { equal_area(px, py) } else { lat_long(px, py) };
+        let Mapped { w, density } = if self.is_equal_area { equal_area(px, py) } else { lat_long(px, py) };
         w.transformed(&self.world_from_light).store(wi, at);
         store(density, &mut lookups.density, i);
 

@@ -93,11 +93,17 @@ const fn stratum_seed(seed: u32, i: u32) -> u32 {
     mix(mix(seed).wrapping_add(i.wrapping_mul(0x9e37_79b9)))
 }
 
-/// ξ of stratum `i` with its jitter.
+/// A random number in a stratum.
+struct Stratum {
+    /// ξ.
+    xi: u32,
+    jitter: u32,
+}
+
 #[inline(always)]
-const fn stratum(reversed: u32, hash_phi: u32, seed: u32, i: u32) -> (u32, u32) {
+const fn stratum(reversed: u32, hash_phi: u32, seed: u32, i: u32) -> Stratum {
     let key = stratum_seed(seed, i);
-    (owen_scramble_reversed(reversed, key), mix(key ^ hash_phi))
+    Stratum { xi: owen_scramble_reversed(reversed, key), jitter: mix(key ^ hash_phi) }
 }
 
 /// Hash of `phi` for jitter.
@@ -114,7 +120,7 @@ fn strata_lanes(phi: u32, seed: u32, m: u32, out: &mut [u32], jitter: &mut [u32]
     if m.is_power_of_two() {
         let bits = m.trailing_zeros();
         for i in 0..n {
-            let (xi, j) = stratum(reversed, hash_phi, seed, i as u32);
+            let Stratum { xi, jitter: j } = stratum(reversed, hash_phi, seed, i as u32);
             out[i] = (i as u32).wrapping_shl(32 - bits) | xi >> bits;
             jitter[i] = j;
         }
@@ -124,7 +130,7 @@ fn strata_lanes(phi: u32, seed: u32, m: u32, out: &mut [u32], jitter: &mut [u32]
     // Subtracting (1 − 1/m)/2 makes it round to its floor, in the low bits of a number with an ulp of 1
     let (count, bias) = (f64::from(m), 0.5 / f64::from(m) - 0.5);
     for i in 0..n {
-        let (xi, j) = stratum(reversed, hash_phi, seed, i as u32);
+        let Stratum { xi, jitter: j } = stratum(reversed, hash_phi, seed, i as u32);
         let quotient = (i as u32 as f64 * 4_294_967_296.0 + f64::from(xi)) / count;
         out[i] = ((quotient + bias) + 4_503_599_627_370_496.0).to_bits() as u32;
         jitter[i] = j;
@@ -141,7 +147,7 @@ pub fn strata(phi: u32, seed: u32, m: u32, out: &mut [u32], jitter: &mut [u32]) 
 /// The scalar twin of [`strata`], in integer arithmetic.
 pub fn strata_scalar(phi: u32, seed: u32, m: u32, out: &mut [u32], jitter: &mut [u32]) {
     for i in 0..out.len() {
-        let (xi, j) = stratum(phi.reverse_bits(), phi_hash(phi), seed, i as u32);
+        let Stratum { xi, jitter: j } = stratum(phi.reverse_bits(), phi_hash(phi), seed, i as u32);
         out[i] = (((i as u64) << 32 | u64::from(xi)) / u64::from(m)) as u32;
         jitter[i] = j;
     }

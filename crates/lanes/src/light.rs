@@ -3,6 +3,7 @@
 use super::lane::{F, LANES, Vec3s, begin, load, padded, safe_sqrt};
 use super::wide::sin_cos_turns;
 use fearless_simd::{Level, Simd, dispatch, prelude::*};
+use lumiris_numbers::math::elementary::SinCos;
 use lumiris_numbers::math::warp;
 
 /// Samples of directions to one light. All slices have the same length.
@@ -55,7 +56,7 @@ fn sample_uniform_sphere_lanes<S: Simd>(simd: S, u: [&[f32]; 2], out: &mut Light
         let i = begin(i, out.pdf.len());
         let z = F::splat(simd, 1.0) - load(simd, u[0], i) * 2.0;
         let sin_theta = safe_sqrt(F::splat(simd, 1.0) - z * z);
-        let (sin_phi, cos_phi) = sin_cos_turns(load(simd, u[1], i));
+        let SinCos { sin: sin_phi, cos: cos_phi } = sin_cos_turns(load(simd, u[1], i));
         Vec3s { x: sin_theta * cos_phi, y: sin_theta * sin_phi, z }.store(&mut out.wi, i);
     }
 }

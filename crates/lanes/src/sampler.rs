@@ -137,15 +137,15 @@ fn descend(kind: StreamKind, below: Below, words: &mut Words) {
         }
         (StreamKind::Sobol | StreamKind::SobolBlueNoise, Below::Domain(key)) => {
             for i in 0..CHUNK {
-                (a[i], b[i]) = net_key(a[i], b[i], key);
+                [a[i], b[i]] = net_key([a[i], b[i]], key);
             }
         }
         (StreamKind::Sobol | StreamKind::SobolBlueNoise, Below::Split { key, count, index }) => {
             // The index of a point has 16 bits; the rest selects another net
             for i in 0..CHUNK {
                 let all = (c[i] & 0xffff).wrapping_mul(count).wrapping_add(index);
-                (a[i], b[i]) = net_key(a[i], b[i], key);
-                (a[i], b[i]) = net_key(a[i], b[i], all >> 16);
+                [a[i], b[i]] = net_key([a[i], b[i]], key);
+                [a[i], b[i]] = net_key([a[i], b[i]], all >> 16);
                 c[i] = c[i] & 0xffff_0000 | all & 0xffff;
             }
         }
@@ -154,9 +154,9 @@ fn descend(kind: StreamKind, below: Below, words: &mut Words) {
 
 /// The key of a domain of a net.
 #[inline(always)]
-fn net_key(a: u32, b: u32, key: u32) -> (u32, u32) {
+fn net_key([a, b]: [u32; 2], key: u32) -> [u32; 2] {
     let [a, b, ..] = pcg4d([a, b, key, 0]);
-    (a, b)
+    [a, b]
 }
 
 /// The keys of a domain of independent numbers.

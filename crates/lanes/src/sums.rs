@@ -58,13 +58,14 @@ fn sums_lanes<S: Simd, T: Term>(simd: S, terms: &[T], out: &mut Sums) -> bool {
         let row = term.numbers();
         let (x, a) = f32x8::from_slice(simd, &row[..8]).widen();
         greatest = greatest.max(x.abs());
-        let (top, rest) = split(x, 1.5 * power(52 + HIGH[0]));
+        let top = multiple(x, 1.5 * power(52 + HIGH[0]));
         high += top;
-        low += rounded(rest * power(-QUANTA[0]));
+        low += rounded((x - top) * power(-QUANTA[0]));
 
-        let (top, rest) = split(x * x, 1.5 * power(52 + HIGH[1]));
+        let square = x * x;
+        let top = multiple(square, 1.5 * power(52 + HIGH[1]));
         squares_high += top;
-        squares_low += (rest * power(-QUANTA[1]) + 0.5).floor();
+        squares_low += ((square - top) * power(-QUANTA[1]) + 0.5).floor();
 
         let (_, b) = f32x8::from_slice(simd, &row[4..]).widen();
         greatest_first = greatest_first.max(a.abs());
@@ -87,11 +88,10 @@ fn sums_lanes<S: Simd, T: Term>(simd: S, terms: &[T], out: &mut Sums) -> bool {
     (is_finite & is_below).all_true()
 }
 
-/// A multiple of a quantum, and the remainder; `shift` is 1.5·2⁵² quanta.
+/// The nearest multiple of a quantum; `shift` is 1.5·2⁵² quanta.
 #[inline(always)]
-fn split<S: Simd>(x: f64x4<S>, shift: f64) -> (f64x4<S>, f64x4<S>) {
-    let top = (x + shift) - shift;
-    (top, x - top)
+fn multiple<S: Simd>(x: f64x4<S>, shift: f64) -> f64x4<S> {
+    (x + shift) - shift
 }
 
 /// The nearest whole number; halves are rounded away from zero.

@@ -52,7 +52,7 @@ fn first_hits_lanes<S: Simd>(
         let axes = Axes::new(d);
         let d = axes.ordered(d);
         let z = F::splat(simd, 1.0) / d.z;
-        let shear = (d.x * z, d.y * z, z);
+        let shear = Vec3s { x: d.x * z, y: d.y * z, z };
         let mut t = F::splat(simd, f32::INFINITY);
         let (mut b1, mut b2, mut index) = (F::splat(simd, 0.0), F::splat(simd, 0.0), F::splat(simd, 0.0));
         // Keep the nearest hit
@@ -108,6 +108,6 @@ impl<S: Simd> Axes<S> {
 }
 
 #[inline(always)]
-fn sheared<S: Simd>(p: Vec3s<S>, (x, y, z): (F<S>, F<S>, F<S>)) -> Vec3s<S> {
-    Vec3s { x: p.x - x * p.z, y: p.y - y * p.z, z: p.z * z }
+fn sheared<S: Simd>(p: Vec3s<S>, shear: Vec3s<S>) -> Vec3s<S> {
+    Vec3s { x: p.x - shear.x * p.z, y: p.y - shear.y * p.z, z: p.z * shear.z }
 }

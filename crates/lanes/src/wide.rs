@@ -2,7 +2,7 @@
 
 use super::lane::{F, I, LANES, M, Vec3s, load};
 use fearless_simd::{Simd, prelude::*};
-use lumiris_numbers::math::elementary;
+use lumiris_numbers::math::elementary::{self, SinCos};
 use lumiris_numbers::math::number::{Mask, Number, ROUNDS};
 use lumiris_numbers::math::v3::V3;
 use std::f32::consts::{FRAC_PI_2, TAU};
@@ -163,11 +163,15 @@ impl<S: Simd> Number for Wide<S> {
     }
 
     #[inline(always)]
-    fn parts(self) -> (Self, Self) {
-        let simd = self.0.token();
+    fn exponent(self) -> Self {
         let bits: I<S> = self.0.bitcast();
-        let significand = bits & I::splat(simd, 0x007f_ffff) | I::splat(simd, 0x3f80_0000);
-        (Wide(((bits >> 23) - 127).to_float()), Wide(significand.bitcast()))
+        Wide(((bits >> 23) - 127).to_float())
+    }
+
+    #[inline(always)]
+    fn significand(self) -> Self {
+        let (simd, bits): (S, I<S>) = (self.0.token(), self.0.bitcast());
+        Wide((bits & I::splat(simd, 0x007f_ffff) | I::splat(simd, 0x3f80_0000)).bitcast())
     }
 
     #[inline(always)]
@@ -200,30 +204,30 @@ impl<S: Simd> From<V3<Wide<S>>> for Vec3s<S> {
 
 /// SIMD version of [`elementary::sin_cos_eighth`].
 #[inline(always)]
-pub fn sin_cos_eighth<S: Simd>(x: F<S>) -> (F<S>, F<S>) {
-    let (sin, cos) = elementary::sin_cos_eighth(Wide(x));
-    (sin.0, cos.0)
+pub fn sin_cos_eighth<S: Simd>(x: F<S>) -> SinCos<F<S>> {
+    let SinCos { sin, cos } = elementary::sin_cos_eighth(Wide(x));
+    SinCos { sin: sin.0, cos: cos.0 }
 }
 
 /// sin 2πt and cos 2πt for |t| < 2²⁰; errors below 2⁻²³.
 #[inline(always)]
-pub fn sin_cos_turns<S: Simd>(t: F<S>) -> (F<S>, F<S>) {
+pub fn sin_cos_turns<S: Simd>(t: F<S>) -> SinCos<F<S>> {
     // The nearest quarter turn, and the remainder, which is exact
     let quarters = (t * 4.0).round_ties_even();
-    let (sin, cos) = sin_cos_eighth((t - quarters * 0.25) * TAU);
+    let SinCos { sin, cos } = sin_cos_eighth((t - quarters * 0.25) * TAU);
     let k: I<S> = quarters.to_int();
     let (one, two) = (I::splat(t.token(), 1), I::splat(t.token(), 2));
     let is_odd = (k & one).simd_eq(one);
     let (s, c) = (is_odd.select(cos, sin), is_odd.select(sin, cos));
-    ((k & two).simd_eq(two).select(-s, s), ((k + one) & two).simd_eq(two).select(-c, c))
+    SinCos { sin: (k & two).simd_eq(two).select(-s, s), cos: ((k + one) & two).simd_eq(two).select(-c, c) }
 }
 
 /// sin θ and cos θ for θ = (a + 1)π/4, |a| ≤ 1.
 #[inline(always)]
-pub fn sin_cos_quadrant<S: Simd>(a: F<S>) -> (F<S>, F<S>) {
-    let (s, c) = sin_cos_eighth(a * (FRAC_PI_2 * 0.5));
+pub fn sin_cos_quadrant<S: Simd>(a: F<S>) -> SinCos<F<S>> {
+    let SinCos { sin: s, cos: c } = sin_cos_eighth(a * (FRAC_PI_2 * 0.5));
     let scale = std::f32::consts::FRAC_1_SQRT_2;
-    ((c + s) * scale, (c - s) * scale)
+    SinCos { sin: (c + s) * scale, cos: (c - s) * scale }
 }
 
 /// SIMD version of [`elementary::exp`].

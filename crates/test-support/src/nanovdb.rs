@@ -83,8 +83,8 @@ impl NanoSpec {
         })
     }
 
-    /// Nodes of 32³ entries, in which those of 16³ have no value, and these.
-    fn nodes(&self) -> (Nodes<Tile>, Nodes<Child<'_>>) {
+    /// Nodes of 16³ entries.
+    fn lowers(&self) -> Nodes<Child<'_>> {
         let mut lowers: Nodes<Child<'_>> = BTreeMap::new();
         for (origin, values) in &self.leaves {
             lowers.entry(key(origin, 7)).or_default().push((*origin, Err(values)));
@@ -92,6 +92,11 @@ impl NanoSpec {
         for (origin, _, value) in self.tiles.iter().filter(|t| t.1 == 8) {
             lowers.entry(key(origin, 7)).or_default().push((*origin, Ok(*value)));
         }
+        lowers
+    }
+
+    /// Nodes of 32³ entries, in which those of 16³ have no value.
+    fn uppers(&self, lowers: &Nodes<Child<'_>>) -> Nodes<Tile> {
         let mut uppers: Nodes<Tile> = BTreeMap::new();
         for lower in lowers.keys() {
             uppers.entry(lower.map(|i| i >> 5)).or_default().push((lower.map(|i| i << 7), None));
@@ -99,13 +104,14 @@ impl NanoSpec {
         for (origin, _, value) in self.tiles.iter().filter(|t| t.1 == 128) {
             uppers.entry(key(origin, 12)).or_default().push((*origin, Some(*value)));
         }
-        (uppers, lowers)
+        uppers
     }
 
     /// The grid as it is in memory.
     pub fn bytes(&self) -> Vec<u8> {
         let wide = self.ty == 2;
-        let (uppers, lowers) = self.nodes();
+        let lowers = self.lowers();
+        let uppers = self.uppers(&lowers);
         let roots: Vec<_> = self.tiles.iter().filter(|t| t.1 == 4096).collect();
 
         // Where everything goes

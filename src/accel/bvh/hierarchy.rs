@@ -34,28 +34,28 @@ impl Bvh {
         let flags = geometry.geometries.iter().map(|g| flags_of(g, alpha.is_some())).collect();
         let is_triangle: Vec<bool> = geometry.geometries.iter().map(|g| matches!(g.shape, Shape::Mesh(_))).collect();
         let build = |prims| build_tree(&geometry, &is_triangle, prims);
-        let built: Vec<(Tree, u64)> =
+        let built: Vec<BuiltTree> =
             geometry.groups.par_iter().map(|group| build(group_prims(&geometry, group))).collect();
-        let group_bounds: Vec<Bounds3> = built.iter().map(|(tree, _)| tree.bounds).collect();
+        let group_bounds: Vec<Bounds3> = built.iter().map(|b| b.tree.bounds).collect();
 
         // Tree of the root
         let mut prims = group_prims(&geometry, &geometry.root);
         prims.extend(instance_prims(&geometry, &group_bounds));
-        let (root, root_peak) = build(prims);
+        let root = build(prims);
 
         // Transforms and memory
         let group_from_world: Vec<Option<Affine3A>> =
             geometry.instances.iter().map(Instance::group_from_world).collect();
-        let group_bytes: u64 = built.iter().map(|(tree, _)| tree.bytes()).sum();
-        let group_peak: u64 = built.iter().map(|(_, peak)| peak).sum();
-        let bytes = group_bytes + root.bytes() + size_of_val(&group_from_world[..]) as u64;
-        let peak_bytes = bytes.max(group_peak).max(group_bytes + root_peak);
+        let group_bytes: u64 = built.iter().map(|b| b.tree.bytes()).sum();
+        let group_peak: u64 = built.iter().map(|b| b.peak_bytes).sum();
+        let bytes = group_bytes + root.tree.bytes() + size_of_val(&group_from_world[..]) as u64;
+        let peak_bytes = bytes.max(group_peak).max(group_bytes + root.peak_bytes);
         Bvh {
             alpha: alpha.map(|source| AlphaTest::new(Arc::clone(&geometry), source)),
             geometry,
             flags,
-            root,
-            groups: built.into_iter().map(|(tree, _)| tree).collect(),
+            root: root.tree,
+            groups: built.into_iter().map(|b| b.tree).collect(),
             group_from_world,
             stats: AccelStats { bytes, peak_bytes, build_seconds: start.elapsed().as_secs_f64() },
         }
@@ -67,13 +67,19 @@ fn flags_of(geometry: &Geometry, has_alpha_source: bool) -> u32 {
     geometry.visibility.0 & Visibility::ALL.0 | tested
 }
 
-/// A tree, and the peak memory of its build (bytes). `is_triangle` tells of each geometry whether it is a mesh.
-fn build_tree(geometry: &GeometrySet, is_triangle: &[bool], mut prims: Vec<PrimRef>) -> (Tree, u64) {
+struct BuiltTree {
+    tree: Tree,
+    /// Peak memory of the build.
+    peak_bytes: u64,
+}
+
+/// Builds a tree. `is_triangle` tells of each geometry whether it is a mesh.
+fn build_tree(geometry: &GeometrySet, is_triangle: &[bool], mut prims: Vec<PrimRef>) -> BuiltTree {
     let binary = build_binary(&mut prims, is_triangle);
     let tree = Tree::new(geometry, &prims, binary.as_ref(), is_triangle);
     let binary_bytes = binary.map_or(0, |root| root.bytes());
-    let peak = tree.bytes() + size_of_val(&prims[..]) as u64 + binary_bytes;
-    (tree, peak)
+    let peak_bytes = tree.bytes() + size_of_val(&prims[..]) as u64 + binary_bytes;
+    BuiltTree { tree, peak_bytes }
 }
 
 /// The finite primitives of a group that are visible to some ray.

@@ -57,8 +57,8 @@ pub(super) struct Node {
 pub(super) struct Block {
     /// Indexed by corner, then axis.
     corners: [[Vec4; 3]; 3],
-    geometry: [u32; LEAF_TRIANGLES],
-    primitive: [u32; LEAF_TRIANGLES],
+    pub(super) geometry: [u32; LEAF_TRIANGLES],
+    pub(super) primitive: [u32; LEAF_TRIANGLES],
 }
 
 impl Block {
@@ -76,12 +76,6 @@ impl Block {
         }
         block.corners = lanes.map(|corner| corner.map(Vec4::from));
         block
-    }
-
-    /// Geometry and primitive of a lane.
-    #[inline]
-    pub(super) fn id(&self, lane: usize) -> (u32, u32) {
-        (self.geometry[lane], self.primitive[lane])
     }
 
     /// Corners of a lane.

@@ -128,10 +128,9 @@ impl Slabs {
         slabs
     }
 
-    /// Bit mask of the boxes that the ray intersects in 0..=limit, and the entry parameters. The exit is increased by
-    /// its rounding error [Ize 2013].
+    /// The boxes that the ray intersects in 0..=limit. The exit is increased by its rounding error [Ize 2013].
     #[inline(always)]
-    fn test(&self, node: &Node, limit: Vec4) -> (u32, [Vec4; 2]) {
+    fn test(&self, node: &Node, limit: Vec4) -> EnteredBoxes {
         const WIDEN: f32 = 1.0 + 2.0 * gamma(3);
         let half = |h: usize| {
             let near = |axis: usize| (node.bounds[self.near_row[axis]][h] - self.near_origin[axis]) * self.inv_d[axis];
@@ -141,8 +140,17 @@ impl Slabs {
             (entry.cmple(exit).bitmask(), entry)
         };
         let ((low, entry_low), (high, entry_high)) = (half(0), half(1));
-        (low | high << 4, [entry_low, entry_high])
+        EnteredBoxes { mask: low | high << 4, entries: [entry_low, entry_high] }
     }
+}
+
+/// Boxes of a node that a ray intersects.
+#[derive(Clone, Copy)]
+struct EnteredBoxes {
+    /// Bit mask.
+    mask: u32,
+    /// Parameters at which the ray enters.
+    entries: [Vec4; 2],
 }
 
 /// A subtree to be traversed.
@@ -193,8 +201,7 @@ impl<'a, Q: Query> Walk<'a, Q> {
                 match child.decode() {
                     Child::Node(index) => {
                         let node = &tree.nodes[index];
-                        let (mask, entries) = slabs.test(node, Vec4::splat(self.query.limit()));
-                        match self.nearest(node, mask, entries) {
+                        match self.nearest(node, slabs.test(node, Vec4::splat(self.query.limit()))) {
                             Some(next) => child = next,
                             None => break false,
                         }
@@ -213,7 +220,7 @@ impl<'a, Q: Query> Walk<'a, Q> {
 
     /// The next box to enter. The others go onto the stack, the nearest on top.
     #[inline(always)]
-    fn nearest(&mut self, node: &Node, mask: u32, entries: [Vec4; 2]) -> Option<ChildRef> {
+    fn nearest(&mut self, node: &Node, EnteredBoxes { mask, entries }: EnteredBoxes) -> Option<ChildRef> {
         if mask == 0 {
             return None;
         }
@@ -257,7 +264,7 @@ impl<'a, Q: Query> Walk<'a, Q> {
             let lane = lanes.trailing_zeros() as usize & 3;
             lanes &= lanes - 1;
             let Some(hit) = intersect_triangle(ray, block.triangle(lane), self.query.limit()) else { continue };
-            let (geometry, primitive) = block.id(lane);
+            let (geometry, primitive) = (block.geometry[lane], block.primitive[lane]);
             let hit = Hit { t: hit.t, uv: [hit.b1, hit.b2], geometry, primitive, instance };
             if self.accepts(&hit, 0) && self.query.take(hit) {
                 return true;

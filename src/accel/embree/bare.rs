@@ -34,15 +34,21 @@ pub struct Packed<'a> {
     packets: Packets,
 }
 
+/// A packet and its valid lanes.
+struct Loaded<const N: usize, P> {
+    valid: Valid<N>,
+    packet: P,
+}
+
 enum Packets {
     First1(Vec<sys::RTCRayHit>),
-    First4(Vec<(Valid<4>, RayHitPacket<4>)>),
-    First8(Vec<(Valid<8>, RayHitPacket<8>)>),
-    First16(Vec<(Valid<16>, RayHitPacket<16>)>),
+    First4(Vec<Loaded<4, RayHitPacket<4>>>),
+    First8(Vec<Loaded<8, RayHitPacket<8>>>),
+    First16(Vec<Loaded<16, RayHitPacket<16>>>),
     Any1(Vec<sys::RTCRay>),
-    Any4(Vec<(Valid<4>, RayPacket<4>)>),
-    Any8(Vec<(Valid<8>, RayPacket<8>)>),
-    Any16(Vec<(Valid<16>, RayPacket<16>)>),
+    Any4(Vec<Loaded<4, RayPacket<4>>>),
+    Any8(Vec<Loaded<8, RayPacket<8>>>),
+    Any16(Vec<Loaded<16, RayPacket<16>>>),
 }
 
 impl Bare {
@@ -90,10 +96,10 @@ impl Bare {
         context.finish();
     }
 
-    fn nearest<const N: usize>(&self, rays: &RayBatch, packets: &mut [(Valid<N>, RayHitPacket<N>)], coherent: bool) {
+    fn nearest<const N: usize>(&self, rays: &RayBatch, packets: &mut [Loaded<N, RayHitPacket<N>>], coherent: bool) {
         let mode = Mode { query: QueryKind::Nearest, coherent };
         let mut context = calls::query_context(&self.world, rays, mode);
-        for (valid, packet) in packets {
+        for Loaded { valid, packet } in packets {
             if self.calls_back {
                 context.begin(packet.rays.id[0] as usize);
             }
@@ -112,10 +118,10 @@ impl Bare {
         context.finish();
     }
 
-    fn any<const N: usize>(&self, rays: &RayBatch, packets: &mut [(Valid<N>, RayPacket<N>)], coherent: bool) {
+    fn any<const N: usize>(&self, rays: &RayBatch, packets: &mut [Loaded<N, RayPacket<N>>], coherent: bool) {
         let mode = Mode { query: QueryKind::Any, coherent };
         let mut context = calls::query_context(&self.world, rays, mode);
-        for (valid, packet) in packets {
+        for Loaded { valid, packet } in packets {
             // SAFETY: the scene is committed, the lanes in `valid` are finite, ids are indices of the batch.
             unsafe { calls::occluded_packet(self.root.raw(), &mut context, mode, valid, packet) };
         }
@@ -157,13 +163,13 @@ impl<'a> Packed<'a> {
     /// Number of rays that hit something.
     pub fn hits(&self) -> usize {
         // A geometry marks a hit
-        fn first<const N: usize>(packets: &[(Valid<N>, RayHitPacket<N>)]) -> usize {
-            let geometries = packets.iter().flat_map(|(_, packet)| packet.geometry);
+        fn first<const N: usize>(packets: &[Loaded<N, RayHitPacket<N>>]) -> usize {
+            let geometries = packets.iter().flat_map(|loaded| loaded.packet.geometry);
             geometries.filter(|&g| g != sys::RTC_INVALID_GEOMETRY_ID).count()
         }
         // A negative end marks occlusion
-        fn any<const N: usize>(packets: &[(Valid<N>, RayPacket<N>)]) -> usize {
-            let stopped = |(valid, packet): &(Valid<N>, RayPacket<N>)| {
+        fn any<const N: usize>(packets: &[Loaded<N, RayPacket<N>>]) -> usize {
+            let stopped = |Loaded { valid, packet }: &Loaded<N, RayPacket<N>>| {
                 (0..N).filter(|&lane| valid.0[lane] != 0 && packet.tfar[lane] < 0.0).count()
             };
             packets.iter().map(stopped).sum()
@@ -187,18 +193,18 @@ fn traceable(rays: &RayBatch, visibility: Visibility) -> impl Iterator<Item = sy
     all.filter(|r| can_trace([r.org_x, r.org_y, r.org_z], [r.dir_x, r.dir_y, r.dir_z], r.tfar))
 }
 
-fn pack_first<const N: usize>(rays: &RayBatch) -> Vec<(Valid<N>, RayHitPacket<N>)> {
+fn pack_first<const N: usize>(rays: &RayBatch) -> Vec<Loaded<N, RayHitPacket<N>>> {
     let pack = |base| {
         let mut packet = RayHitPacket::new(Visibility::PATH.0);
-        (load(&mut packet.rays, rays, base), packet)
+        Loaded { valid: load(&mut packet.rays, rays, base), packet }
     };
     (0..rays.len()).step_by(N).map(pack).collect()
 }
 
-fn pack_any<const N: usize>(rays: &RayBatch) -> Vec<(Valid<N>, RayPacket<N>)> {
+fn pack_any<const N: usize>(rays: &RayBatch) -> Vec<Loaded<N, RayPacket<N>>> {
     let pack = |base| {
         let mut packet = RayPacket::new(Visibility::SHADOW.0);
-        (load(&mut packet, rays, base), packet)
+        Loaded { valid: load(&mut packet, rays, base), packet }
     };
     (0..rays.len()).step_by(N).map(pack).collect()
 }

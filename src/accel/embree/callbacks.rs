@@ -137,7 +137,8 @@ pub(super) unsafe extern "C" fn alpha_filter(arguments: *const sys::RTCFilterFun
         let geometry = &*arguments.geometryUserPtr.cast::<GeometryContext>();
         let query = &mut *arguments.context.cast::<QueryContext<'_>>();
         let n = arguments.N as usize;
-        let (rays, hits) = (Lanes { words: arguments.ray.cast(), n }, Lanes { words: arguments.hit.cast(), n });
+        let rays = Lanes { words: arguments.ray.cast(), n };
+        let hits = Lanes { words: arguments.hit.cast(), n };
         for lane in active(arguments.valid, n) {
             let (id, reported) = (rays.get_u32(ID, lane), reported(rays, hits, lane));
             let mut stops = false;
@@ -163,7 +164,8 @@ pub(super) unsafe extern "C" fn first_filter(arguments: *const sys::RTCFilterFun
         let arguments = &*arguments;
         let query = &mut *arguments.context.cast::<QueryContext<'_>>();
         let n = arguments.N as usize;
-        let (rays, hits) = (Lanes { words: arguments.ray.cast(), n }, Lanes { words: arguments.hit.cast(), n });
+        let rays = Lanes { words: arguments.ray.cast(), n };
+        let hits = Lanes { words: arguments.hit.cast(), n };
         for lane in active(arguments.valid, n) {
             let id = rays.get_u32(ID, lane);
             let end = match query.ties {

@@ -80,10 +80,14 @@ impl Device {
         unsafe { sys::rtcGetDeviceProperty(self.raw, property) != 0 }
     }
 
-    /// Current and peak memory (bytes).
-    pub(super) fn memory(&self) -> (u64, u64) {
-        let load = |value: &AtomicI64| u64::try_from(value.load(Ordering::Relaxed)).unwrap_or(0);
-        (load(&self.log.bytes), load(&self.log.peak_bytes))
+    /// Current memory.
+    pub(super) fn bytes(&self) -> u64 {
+        u64::try_from(self.log.bytes.load(Ordering::Relaxed)).unwrap_or(0)
+    }
+
+    /// Peak memory.
+    pub(super) fn peak_bytes(&self) -> u64 {
+        u64::try_from(self.log.peak_bytes.load(Ordering::Relaxed)).unwrap_or(0)
     }
 }
 

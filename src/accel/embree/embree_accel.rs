@@ -121,8 +121,8 @@ impl EmbreeAccel {
         let root = Arc::new(builder.root()?);
 
         let (has_motion, has_only_triangles) = (set.has_motion(), has_only_triangles(&set));
-        let (bytes, peak_bytes) = device.memory();
-        let stats = AccelStats { bytes, peak_bytes, build_seconds: start.elapsed().as_secs_f64() };
+        let build_seconds = start.elapsed().as_secs_f64();
+        let stats = AccelStats { bytes: device.bytes(), peak_bytes: device.peak_bytes(), build_seconds };
         Ok(EmbreeAccel { root, world, widths, has_only_triangles, has_motion, stats })
     }
 

@@ -43,7 +43,7 @@ impl ExactHits {
         t_max[..count].copy_from_slice(&rays.t_max[range.clone()]);
 
         // All indices first, then all corners: both are cache misses, and the misses of different rays overlap
-        let mut triangles: [Option<(&TriangleMesh, [u32; 3])>; BLOCK] = [None; BLOCK];
+        let mut triangles: [Option<IndexedTriangle<'_>>; BLOCK] = [None; BLOCK];
         for begin in (0..count).step_by(GROUP) {
             if is_same(&reported.geometry, begin)
                 & is_same(&reported.primitive, begin)
@@ -54,7 +54,7 @@ impl ExactHits {
                 self.geometries[begin..begin + GROUP].fill(geometry);
                 self.instances[begin..begin + GROUP].fill(instance);
                 match triangle {
-                    Some((mesh, vertices)) => self.set_corners::<GROUP>(begin, mesh.corners(vertices)),
+                    Some(triangle) => self.set_corners::<GROUP>(begin, triangle.corners()),
                     None => self.pairs.t_max[begin..begin + GROUP].fill(f32::NEG_INFINITY),
                 }
             } else {
@@ -68,8 +68,8 @@ impl ExactHits {
             }
         }
         for (lane, triangle) in triangles[..count].iter().enumerate() {
-            if let Some((mesh, vertices)) = triangle {
-                self.set_corners::<1>(lane, mesh.corners(*vertices));
+            if let Some(triangle) = triangle {
+                self.set_corners::<1>(lane, triangle.corners());
             }
         }
         if !world.instances.is_empty() {
@@ -78,14 +78,14 @@ impl ExactHits {
         hits::exact(level(), &self.pairs, count, &mut self.hits);
     }
 
-    /// The mesh and the vertices of the triangle reported for a ray. Also stores its geometry and instance.
+    /// The triangle reported for a ray. Also stores its geometry and instance.
     #[inline(always)]
     fn triangle<'a>(
         &mut self,
         world: &'a SceneIds,
         reported: &ReportedBlock,
         lane: usize,
-    ) -> Option<(&'a TriangleMesh, [u32; 3])> {
+    ) -> Option<IndexedTriangle<'a>> {
         if reported.geometry[lane] == u32::MAX {
             self.instances[lane] = Hit::NO_INSTANCE;
             return None;
@@ -94,7 +94,9 @@ impl ExactHits {
         let geometry = world.geometry(reported.geometry[lane], instance);
         (self.geometries[lane], self.instances[lane]) = (geometry, instance);
         match &world.set.geometries[geometry as usize].shape {
-            Shape::Mesh(mesh) => Some((mesh, mesh.indices[reported.primitive[lane] as usize])),
+            Shape::Mesh(mesh) => {
+                Some(IndexedTriangle { mesh, vertices: mesh.indices[reported.primitive[lane] as usize] })
+            }
             _ => None,
         }
     }
@@ -126,6 +128,19 @@ impl ExactHits {
         let Hits { t, b1, b2 } = &self.hits;
         let (geometry, instance) = (self.geometries[lane], self.instances[lane]);
         (!t[lane].is_nan()).then(|| Hit { t: t[lane], uv: [b1[lane], b2[lane]], geometry, primitive, instance })
+    }
+}
+
+/// The vertex indices of a triangle.
+#[derive(Clone, Copy)]
+struct IndexedTriangle<'a> {
+    mesh: &'a TriangleMesh,
+    vertices: [u32; 3],
+}
+
+impl IndexedTriangle<'_> {
+    fn corners(&self) -> [Vec3; 3] {
+        self.mesh.corners(self.vertices)
     }
 }
 

@@ -116,7 +116,8 @@ impl EmbreeAccel {
     #[inline]
     fn trace_one(&self, context: &mut QueryContext<'_>, i: usize, tnear: f32) {
         let rays = context.rays;
-        let (o, d) = ([rays.ox[i], rays.oy[i], rays.oz[i]], [rays.dx[i], rays.dy[i], rays.dz[i]]);
+        let o = [rays.ox[i], rays.oy[i], rays.oz[i]];
+        let d = [rays.dx[i], rays.dy[i], rays.dz[i]];
         if !can_trace(o, d, rays.t_max[i]) {
             return;
         }

@@ -150,7 +150,8 @@ fn beside(ray: &Ray, triangle: [Vec3; 3]) -> Option<(f32, [f32; 2])> {
     let n = e1.cross(e2);
     let t = n.dot(p0 - o) / n.dot(d);
     let q = o + d * t - p0;
-    let (b1, b2) = (n.dot(q.cross(e2)) / n.length_squared(), n.dot(e1.cross(q)) / n.length_squared());
+    let b1 = n.dot(q.cross(e2)) / n.length_squared();
+    let b2 = n.dot(e1.cross(q)) / n.length_squared();
     let (b1, b2) = (b1.max(0.0), b2.max(0.0));
     let sum = (b1 + b2).max(1.0);
     let found = (t as f32, [(b1 / sum) as f32, (b2 / sum) as f32]);

@@ -193,11 +193,13 @@ fn packets_of_any_width_answer_as_single_rays_do() {
 /// `side` × `side` quads in a plane, each of two triangles along one of its diagonals.
 fn grid(side: u32, other_diagonal: bool) -> TriangleMesh {
     let point = |i: u32| {
-        let (x, y) = ((i % (side + 1)) as f32 / side as f32 - 0.5, (i / (side + 1)) as f32 / side as f32 - 0.5);
+        let x = (i % (side + 1)) as f32 / side as f32 - 0.5;
+        let y = (i / (side + 1)) as f32 / side as f32 - 0.5;
         Vec3::new(x, y, 0.31 * x - 0.17 * y)
     };
     let quad = |i: u32| {
-        let (a, b) = (i / side * (side + 1) + i % side, (i / side + 1) * (side + 1) + i % side);
+        let a = i / side * (side + 1) + i % side;
+        let b = (i / side + 1) * (side + 1) + i % side;
         if other_diagonal { [[a, a + 1, b], [b, a + 1, b + 1]] } else { [[a, a + 1, b + 1], [a, b + 1, b]] }
     };
     TriangleMesh::new((0..(side + 1).pow(2)).map(point).collect(), (0..side * side).flat_map(quad).collect()).unwrap()
@@ -259,7 +261,8 @@ fn answers_agree_with_brute_force_in_f64() {
     let set = only_root(vec![Shape::Mesh(mesh.clone())]);
     let accel = embree(&set, 8);
     let rays = random_rays(20_000, 8);
-    let (hits, shadows) = (intersect(&accel, &rays, Coherence::Packets), occluded(&accel, &rays, Coherence::Packets));
+    let hits = intersect(&accel, &rays, Coherence::Packets);
+    let shadows = occluded(&accel, &rays, Coherence::Packets);
 
     // Compare with the nearest of all triangles
     let (mut hit_count, mut unclear) = (0, 0);
@@ -289,7 +292,8 @@ fn rays_that_leave_a_surface_do_not_meet_it_again() {
     let mut tested = 0;
     // A triangle of any size and position
     for k in 0..60 {
-        let (center, scale) = (random_point(&mut s) * 300.0, [0.01, 1.0, 50.0, 2000.0][k % 4]);
+        let center = random_point(&mut s) * 300.0;
+        let scale = [0.01, 1.0, 50.0, 2000.0][k % 4];
         let corners = (0..3).map(|_| center + random_point(&mut s) * scale).collect();
         let set = only_root(vec![Shape::Mesh(separate_triangles(corners))]);
         let accel = embree(&set, 8);

@@ -65,16 +65,23 @@ fn the_closed_form_is_the_mean_of_the_walk() {
     }
 }
 
-/// Analog simulation: light enters, has up to `max_depth` events in the layer, and leaves. Returns the exit direction,
-/// the weight of the path, and a flag for the mirror reflection.
-fn analog_walk(l: &Layered, wo: Vec3, s: &mut Pcg32) -> Option<(Vec3, Rgb, bool)> {
+/// Light that left a layer.
+struct WalkExit {
+    wi: Vec3,
+    beta: Rgb,
+    /// True for the mirror reflection.
+    specular: bool,
+}
+
+/// Analog simulation: light enters, has up to `max_depth` events in the layer, and leaves.
+fn analog_walk(l: &Layered, wo: Vec3, s: &mut Pcg32) -> Option<WalkExit> {
     let weight = |x: &BsdfSample| x.f * (x.wi.z.abs() / x.pdf);
     let all = dielectric::Select::All;
     let mut x = l.top.sample_select(wo, s.random::<f32>(), s.random::<[f32; 2]>(), Transport::Radiance, all)?;
     let mut beta = weight(&x);
     let mut specular = x.lobe.is_specular();
     if !x.lobe.contains(Lobe::TRANSMISSION) {
-        return Some((x.wi, beta, specular));
+        return Some(WalkExit { wi: x.wi, beta, specular });
     }
     let (mut w, mut z) = (x.wi, l.thickness);
     for _ in 0..=l.max_depth {
@@ -107,7 +114,7 @@ fn analog_walk(l: &Layered, wo: Vec3, s: &mut Pcg32) -> Option<(Vec3, Rgb, bool)
         specular &= x.lobe.is_specular();
         w = x.wi;
         if x.lobe.contains(Lobe::TRANSMISSION) {
-            return Some((w, beta, specular));
+            return Some(WalkExit { wi: w, beta, specular });
         }
     }
     None
@@ -124,7 +131,7 @@ fn albedos_of_the_closed_form_and_of_analog_walks_agree_to_half_a_percent() {
         for cos in [0.1, 0.5, 1.0] {
             let (wo, mut s) = (warp::direction(cos, 0.5), pcg32([8, 8, 8]));
             let w: Welford = (0..400_000)
-                .map(|_| analog_walk(&walk, wo, &mut s).map_or(0.0, |(_, beta, _)| f64::from(beta.r)))
+                .map(|_| analog_walk(&walk, wo, &mut s).map_or(0.0, |exit| f64::from(exit.beta.r)))
                 .collect();
             let albedo = f64::from(closed.albedo(wo).r);
             let bound = 0.005 * albedo + 3.0 * w.standard_error();
@@ -150,7 +157,7 @@ fn layered_sampling_reproduces_the_analog_walk_in_three_bands() {
             let (mut s, mut t) = (pcg32([6, 1, 8]), pcg32([6, 2, 8]));
             for _ in 0..300_000 {
                 let mut values = [0.0; 4];
-                if let Some((wi, beta, specular)) = analog_walk(l, wo.abs(), &mut s) {
+                if let Some(WalkExit { wi, beta, specular }) = analog_walk(l, wo.abs(), &mut s) {
                     values[band(wi, specular)] = f64::from(beta.g);
                 }
                 a.iter_mut().zip(values).for_each(|(w, v)| w.add(v));

@@ -51,7 +51,8 @@ fn expected(pdf: &dyn Fn(Vec3) -> f32) -> Vec<f64> {
         let (sp, cp) = phi.sin_cos();
         st * f64::from(pdf(Vec3::new((st * cp) as f32, (st * sp) as f32, ct as f32)))
     };
-    let (dt, dp) = (std::f64::consts::PI / thetas as f64, std::f64::consts::TAU / phis as f64);
+    let dt = std::f64::consts::PI / thetas as f64;
+    let dp = std::f64::consts::TAU / phis as f64;
     let mut bins: Vec<f64> = (0..thetas * phis)
         .map(|i| {
             let (t, p) = ((i / phis) as f64 * dt, (i % phis) as f64 * dp);

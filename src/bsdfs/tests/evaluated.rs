@@ -32,7 +32,8 @@ fn evaluated(model: Model) -> Bsdf<'static> {
 /// ∫ f(wo, wi) cos θi L(wi) over the side of `wo`, by the midpoint rule in (θ, φ).
 fn quadrature(bsdf: &Bsdf<'_>, wo: Vec3, l: impl Fn(Vec3) -> Rgb) -> [f64; 3] {
     let (thetas, phis) = (1000, 1000);
-    let (dt, dp) = (0.5 * std::f64::consts::PI / f64::from(thetas), std::f64::consts::TAU / f64::from(phis));
+    let dt = 0.5 * std::f64::consts::PI / f64::from(thetas);
+    let dp = std::f64::consts::TAU / f64::from(phis);
     let mut sum = [0.0; 3];
     for i in 0..thetas {
         let (sin, cos) = (dt * (f64::from(i) + 0.5)).sin_cos();

@@ -32,7 +32,9 @@ use crate::direct::point::ShadingPoint;
 use crate::direct::t1::T1;
 use crate::lights::learned_visibility::{ExpectedContribution, NoncontributingLight};
 use crate::lights::visibility_cache::ContributingLights;
-use crate::lights::{JobLights, LeAndPdf, LearnedVisibility, LightCtx, LightId, PhotonCount, SampledLight};
+use crate::lights::{
+    JobLights, LeAndPdf, LearnedVisibility, LightCtx, LightId, PhotonCount, SampleOfLight, SampledLight,
+};
 use crate::scene::RenderJob;
 use lumiris_numbers::estimators::heuristics::Heuristic;
 use lumiris_numbers::math::cumulative;
@@ -225,7 +227,7 @@ impl At<'_, '_> {
                 self.lights.infinite_in_direction_by(&self.ctx, sample.wi, rate);
         }
         let allocation = SampleAllocation { n_bsdf: self.n_bsdf, ..SampleAllocation::fixed(1, 0) };
-        unshadowed_candidate(self.index, self.point, &allocation, light, sample)
+        unshadowed_candidate(self.index, self.point, &allocation, SampleOfLight { light, sample })
     }
 
     /// True if other infinite lights overlap with the light.

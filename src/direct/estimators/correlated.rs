@@ -28,7 +28,7 @@ use crate::direct::light_samples::{light_candidate, with_infinite};
 use crate::direct::point::ShadingPoint;
 use crate::direct::shadow_segments::Segments;
 use crate::direct::t1::{T1, choice_by_sampler};
-use crate::lights::{LightId, LightSample, SurfacePoint};
+use crate::lights::{LightId, LightSample, SampleOfLight, SurfacePoint};
 use crate::scene::{EmitterHit, EmitterScratch, RenderJob};
 use crate::settings::SamplingTechnique;
 use lumiris_numbers::estimators::correlated::{self, SUMS};
@@ -239,7 +239,7 @@ impl CorrelatedBuffers {
             let candidate = sampler
                 .sample(&ctx, u_choice)
                 .and_then(|choice| job.lights.sample_choice(&ctx, choice, [u0, u1]))
-                .and_then(|(light, s)| light_candidate(job, index as u32, point, &allocation, light, s));
+                .and_then(|drawn| light_candidate(job, index as u32, point, &allocation, drawn));
             self.add(index, candidate, control, candidates);
         }
     }
@@ -257,15 +257,14 @@ impl CorrelatedBuffers {
 
             // Sample, c, and candidate
             let drawn = job.lights.sample(&ctx, u_choice, [u0, u1]);
-            let drawn = drawn.map(|(light, s)| (light, with_infinite(job, &ctx, light, s)));
+            let drawn = drawn.map(|drawn| with_infinite(job, &ctx, drawn));
             let control = match &drawn {
-                Some((light, s)) if !s.is_delta => {
+                Some(SampleOfLight { light, sample: s }) if !s.is_delta => {
                     estimate.control(sampled_l(job, &estimate, point.p, *light, s), s.wi, s.pdf)
                 }
                 Some(_) | None => estimate.without_g(),
             };
-            let candidate =
-                drawn.and_then(|(light, s)| light_candidate(job, index as u32, point, &allocation, light, s));
+            let candidate = drawn.and_then(|drawn| light_candidate(job, index as u32, point, &allocation, drawn));
             self.add(index, candidate, Some(control), candidates);
         }
     }
@@ -362,7 +361,8 @@ impl CorrelatedBuffers {
     fn add_bsdf(&mut self, candidates: &mut Candidates) {
         for i in 0..self.pending.len() {
             let pending = &self.pending[i];
-            let (index, estimate) = (pending.point as usize, &self.estimates[pending.point as usize]);
+            let index = pending.point as usize;
+            let estimate = &self.estimates[pending.point as usize];
             let control = if pending.specular {
                 estimate.without_g()
             } else {

@@ -32,7 +32,8 @@ pub struct Mis {
 impl Mis {
     /// The estimator at a path vertex, counted from 0.
     pub(super) fn at_vertex(settings: &IntegratorSettings, vertex: u32) -> Self {
-        let (samples, bsdf_fraction) = (settings.sample_counts_at(vertex).samples, settings.bsdf_fraction());
+        let samples = settings.sample_counts_at(vertex).samples;
+        let bsdf_fraction = settings.bsdf_fraction();
         Mis { samples, heuristic: settings.heuristic(), bsdf_fraction }
     }
 

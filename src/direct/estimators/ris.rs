@@ -142,10 +142,10 @@ impl Ris {
             for draw in &b.draws {
                 let place = range.start + draw.index as usize;
                 let evaluated = if place < range.bsdf_start {
-                    let sample = b.proposals.light_sample(place);
-                    sample.and_then(|(light, sample)| {
+                    let drawn = b.proposals.light_sample(place);
+                    drawn.and_then(|drawn| {
                         let index = (chunk.first + i) as u32;
-                        unshadowed_candidate(index, point, &SampleAllocation::fixed(0, 0), light, sample)
+                        unshadowed_candidate(index, point, &SampleAllocation::fixed(0, 0), drawn)
                     })
                 } else {
                     Some(own[place - range.bsdf_start])
@@ -268,7 +268,7 @@ impl RisBuffers {
                 }
                 let segment = match by_bsdf {
                     Some(candidate) => Some((candidate.light, candidate.segment)),
-                    None => self.proposals.light_sample(place).map(|(light, s)| (light, point.light_segment(&s))),
+                    None => self.proposals.light_sample(place).map(|s| (s.light, point.light_segment(&s.sample))),
                 };
                 match segment {
                     Some((light, segment)) => {

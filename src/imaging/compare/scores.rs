@@ -101,6 +101,16 @@ pub enum Noise {
     Unknown,
 }
 
+impl Noise {
+    fn of(image: &Shown, reference: &Shown) -> Self {
+        match (&image.variance, &reference.variance) {
+            (Some(_), Some(_)) => Noise::Both,
+            (Some(_), None) => Noise::ImageOnly,
+            (None, _) => Noise::Unknown,
+        }
+    }
+}
+
 /// Compares each image with the reference.
 pub fn compare(set: &ImageSet, settings: &Settings) -> Vec<Compared> {
     set.images.iter().map(|image| compare_one(image, &set.reference, set.region, settings)).collect()
@@ -110,7 +120,8 @@ fn compare_one(image: &Shown, reference: &Shown, region: Region, settings: &Sett
     // Differences and variances
     let wants = |metric: Metric| settings.metrics.contains(&metric);
     let (x, r, size) = (&image.pixels, &reference.pixels, region.size());
-    let (noise, variance) = variance_of_difference(image, reference);
+    let noise = Noise::of(image, reference);
+    let variance = variance_of_difference(image, reference);
     let differences = differences(x, r, settings.epsilon);
     let both = variance.as_deref().filter(|_| noise == Noise::Both);
 
@@ -141,15 +152,11 @@ fn compare_one(image: &Shown, reference: &Shown, region: Region, settings: &Sett
 }
 
 /// Variance of x − r per pixel; `None` if the image has no variance.
-fn variance_of_difference(image: &Shown, reference: &Shown) -> (Noise, Option<Vec<Pixel>>) {
-    match (&image.variance, &reference.variance) {
-        (Some(a), Some(b)) => {
-            let sum = |(a, b): (&Pixel, &Pixel)| std::array::from_fn(|c| a[c] + b[c]);
-            (Noise::Both, Some(a.iter().zip(b).map(sum).collect()))
-        }
-        (Some(a), None) => (Noise::ImageOnly, Some(a.clone())),
-        (None, _) => (Noise::Unknown, None),
-    }
+fn variance_of_difference(image: &Shown, reference: &Shown) -> Option<Vec<Pixel>> {
+    let variance = image.variance.as_ref()?;
+    let Some(of_reference) = &reference.variance else { return Some(variance.clone()) };
+    let sum = |(a, b): (&Pixel, &Pixel)| std::array::from_fn(|c| a[c] + b[c]);
+    Some(variance.iter().zip(of_reference).map(sum).collect())
 }
 
 #[cfg(test)]

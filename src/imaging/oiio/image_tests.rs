@@ -60,7 +60,8 @@ fn an_exr_holds_parts_with_names_half_floats_and_values() {
     for (channel, name) in ["R", "G", "B", "Z"].iter().enumerate() {
         let c = read.image.channel(name).unwrap();
         for pixel in 0..6 {
-            let (wrote, found) = (beauty[pixel * 4 + channel], read.image.data[pixel * 4 + c]);
+            let wrote = beauty[pixel * 4 + channel];
+            let found = read.image.data[pixel * 4 + c];
             let tolerance = if *name == "Z" { 0.0 } else { wrote / 2048.0 };
             assert!((wrote - found).abs() <= tolerance, "{name} {wrote} {found}");
         }

@@ -25,7 +25,7 @@ pub use part::{MetaValue, Part, Storage};
 pub use pyramid::FilePyramid;
 pub(super) use read::{Input, read_failure};
 pub use read::{
-    ReadImage, image_texels, read_colors, read_headers, read_image, read_metadata, read_part, texture_bytes,
+    ReadColors, ReadImage, image_texels, read_colors, read_headers, read_image, read_metadata, read_part, texture_bytes,
 };
 pub use shim::load;
 pub use write::{ROWS_AT_ONCE, RowSource, write_image, write_rows};

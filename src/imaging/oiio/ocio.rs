@@ -32,7 +32,7 @@ pub fn ocio_display(pixels: &mut [f32], view: &OcioView<'_>) -> Result<[String; 
         let [input, display, name, looks] = [&input, &display, &name, &looks].map(|text| text.as_ptr());
         (api.ocio_display)(input, display, name, looks, data, count, chosen.as_mut_ptr(), chosen_size, e, n)
     })
-    .map_err(|(_, message)| ImageError::Color(message))?;
+    .map_err(|failure| ImageError::Color(failure.message))?;
     let chosen = text(chosen.as_ptr());
     let (display, view) = chosen.split_once('\n').unwrap_or((&chosen, ""));
     Ok([display.to_owned(), view.to_owned()])

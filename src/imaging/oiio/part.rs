@@ -1,5 +1,6 @@
 //! Images to write: pixels, metadata and storage.
 
+use crate::imaging::file::TextEntries;
 use openimageio_sys as sys;
 
 /// Storage type of values.
@@ -90,7 +91,7 @@ impl Part {
 
     /// Adds text metadata.
     #[must_use]
-    pub fn with_metadata(mut self, metadata: Vec<(String, String)>) -> Self {
+    pub fn with_metadata(mut self, metadata: TextEntries) -> Self {
         self.metadata.extend(metadata.into_iter().map(|(name, value)| (name, MetaValue::Text(value))));
         self
     }

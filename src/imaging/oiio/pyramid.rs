@@ -34,7 +34,8 @@ impl std::fmt::Debug for FilePyramid {
 impl FilePyramid {
     /// Opens a file without reading pixels. Returns `None` if the image does not have all levels.
     pub fn open(path: &Path) -> Result<Option<Self>, ImageError> {
-        let (input, layer) = Input::open_colors(path)?;
+        let mut input = Input::open(path, 0)?;
+        let layer = input.choose_colors(path)?;
         let failed = |failure| read_failure(path, failure);
         let spec = input.spec().map_err(failed)?;
         let Some(sizes) = all_levels(&input) else { return Ok(None) };

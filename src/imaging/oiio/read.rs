@@ -3,7 +3,7 @@
 
 use super::part::{MetaValue, Storage};
 use super::radiance;
-use super::shim::{api, c_path, call, text};
+use super::shim::{Failure, api, c_path, call, text};
 use crate::imaging::color_layers::{ColorLayer, choose};
 use crate::imaging::file::{ImageError, PartHeader, ReadLimits, Window};
 use crate::imaging::{ColorEncoding, Image};
@@ -27,6 +27,20 @@ pub struct ReadImage {
     pub window: Window,
     /// True if the values are stored as 16-bit floats.
     pub is_half: bool,
+}
+
+/// An image with the choice of its colour channels.
+#[derive(Clone, Debug)]
+pub struct ReadColors {
+    /// The image.
+    pub read: ReadImage,
+    /// The colour channels.
+    pub layer: ColorLayer,
+}
+
+struct Channel {
+    name: String,
+    storage: Storage,
 }
 
 /// A file open for reading.
@@ -58,18 +72,17 @@ impl Input {
         // SAFETY: the name ends in a zero byte, and `handle` is only written. Alpha stays unassociated: colours of
         // textures must not be multiplied by it in 8 bits.
         call(|e, n| unsafe { (api.input_open)(name.as_ptr(), 1, &mut handle, e, n) })
-            .map_err(|(_, m)| unreadable(m))?;
+            .map_err(|failure| unreadable(failure.message))?;
         Ok(Input { api, handle, part, stored: radiance::Storage::of(path) })
     }
 
-    /// Opens a file at the part with the image, and returns the image's colour channels.
-    pub(super) fn open_colors(path: &Path) -> Result<(Self, ColorLayer), ImageError> {
-        let mut input = Input::open(path, 0)?;
-        let headers = input.headers().map_err(|failure| read_failure(path, failure))?;
+    /// Goes to the part with the image, and returns the image's colour channels. `path` is for messages.
+    pub(super) fn choose_colors(&mut self, path: &Path) -> Result<ColorLayer, ImageError> {
+        let headers = self.headers().map_err(|failure| read_failure(path, failure))?;
         let unreadable = |reason| ImageError::Unreadable { path: path.to_owned(), reason };
         let layer = choose(&headers, None).map_err(unreadable)?;
-        input.part = i32::try_from(layer.part).unwrap_or(i32::MAX);
-        Ok((input, layer))
+        self.part = i32::try_from(layer.part).unwrap_or(i32::MAX);
+        Ok(layer)
     }
 
     /// A level of the part; `None` if it does not exist.
@@ -87,7 +100,7 @@ impl Input {
         origin: [i32; 2],
         size: [i32; 2],
         channels: [i32; 2],
-    ) -> Result<Vec<f32>, (i32, String)> {
+    ) -> Result<Vec<f32>, Failure> {
         let counts = [size[0], size[1], channels[1] - channels[0]].map(|n| usize::try_from(n).unwrap_or(0));
         let mut pixels = vec![0.0; counts.iter().product()];
         let ([x, y], [width, height], [begin, end]) = (origin, size, channels);
@@ -113,14 +126,14 @@ impl Input {
         Ok(pixels)
     }
 
-    fn parts(&self) -> Result<usize, (i32, String)> {
+    fn parts(&self) -> Result<usize, Failure> {
         let mut count = 0;
         // SAFETY: the handle is live until drop, here and below.
         call(|e, n| unsafe { (self.api.input_subimages)(self.handle, &mut count, e, n) })?;
         Ok(usize::try_from(count).unwrap_or(0))
     }
 
-    pub(super) fn spec(&self) -> Result<sys::OiioSpec, (i32, String)> {
+    pub(super) fn spec(&self) -> Result<sys::OiioSpec, Failure> {
         let mut spec = sys::OiioSpec::default();
         // SAFETY: as above.
         call(|e, n| unsafe { (self.api.input_spec)(self.handle, self.part, &mut spec, e, n) })?;
@@ -131,24 +144,24 @@ impl Input {
         Ok(spec)
     }
 
-    fn channel(&self, index: i32) -> Result<(String, Storage), (i32, String)> {
+    fn channel(&self, index: i32) -> Result<Channel, Failure> {
         let (mut name, mut format) = (ptr::null(), 0);
         // SAFETY: as above; the name is copied while the handle is live.
         call(|e, n| unsafe { (self.api.input_channel)(self.handle, self.part, index, &mut name, &mut format, e, n) })?;
-        Ok((text(name), Storage::of_format(format)))
+        Ok(Channel { name: text(name), storage: Storage::of_format(format) })
     }
 
-    pub(super) fn channels(&self, count: i32) -> Result<Vec<String>, (i32, String)> {
-        (0..count).map(|i| self.channel(i).map(|(name, _)| name)).collect()
+    pub(super) fn channels(&self, count: i32) -> Result<Vec<String>, Failure> {
+        (0..count).map(|i| self.channel(i).map(|channel| channel.name)).collect()
     }
 
     /// Storage types of the channels of the part.
-    pub(in crate::imaging) fn storage(&self) -> Result<Vec<Storage>, (i32, String)> {
-        (0..self.spec()?.nchannels).map(|i| self.channel(i).map(|(_, storage)| storage)).collect()
+    pub(in crate::imaging) fn storage(&self) -> Result<Vec<Storage>, Failure> {
+        (0..self.spec()?.nchannels).map(|i| self.channel(i).map(|channel| channel.storage)).collect()
     }
 
     /// The headers of all parts.
-    fn headers(&mut self) -> Result<Vec<PartHeader>, (i32, String)> {
+    fn headers(&mut self) -> Result<Vec<PartHeader>, Failure> {
         let first = self.part;
         let mut headers = Vec::new();
         for part in 0..self.parts()? {
@@ -164,7 +177,7 @@ impl Input {
     }
 
     /// Metadata of the part with types that [`MetaValue`] supports.
-    pub(in crate::imaging) fn values(&self) -> Result<Vec<(String, MetaValue)>, (i32, String)> {
+    pub(in crate::imaging) fn values(&self) -> Result<Vec<(String, MetaValue)>, Failure> {
         let value = |a: &sys::OiioAttribute| {
             let bytes: &[u8] = if a.data.is_null() {
                 &[]
@@ -208,7 +221,7 @@ impl Input {
         read(&a)
     }
 
-    fn pixels(&self, max_bytes: u64) -> Result<Vec<f32>, (i32, String)> {
+    fn pixels(&self, max_bytes: u64) -> Result<Vec<f32>, Failure> {
         let mut count = 0;
         // SAFETY: as above.
         call(|e, n| unsafe { (self.api.input_float_count)(self.handle, self.part, max_bytes, &mut count, e, n) })?;
@@ -234,11 +247,11 @@ pub fn read_image(path: &Path, limits: &ReadLimits) -> Result<ReadImage, ImageEr
     read_part(path, 0, limits)
 }
 
-/// Reads the part of a file with the image, and returns its colour channels. Used wherever no layer is selected. `Err`
-/// if the choice is ambiguous.
-pub fn read_colors(path: &Path, limits: &ReadLimits) -> Result<(ReadImage, ColorLayer), ImageError> {
-    let (input, layer) = Input::open_colors(path)?;
-    Ok((read(&input, path, layer.part, limits)?, layer))
+/// Reads the part of a file with the image. Used wherever no layer is selected. `Err` if the choice is ambiguous.
+pub fn read_colors(path: &Path, limits: &ReadLimits) -> Result<ReadColors, ImageError> {
+    let mut input = Input::open(path, 0)?;
+    let layer = input.choose_colors(path)?;
+    Ok(ReadColors { read: read(&input, path, layer.part, limits)?, layer })
 }
 
 /// Reads a part of an image; the first is 0.
@@ -251,7 +264,8 @@ fn read(input: &Input, path: &Path, part: usize, limits: &ReadLimits) -> Result<
     let failed = |failure| read_failure(path, failure);
     let parts = input.parts().map_err(failed)?;
     if part >= parts {
-        return Err(failed((sys::OIIO_INVALID_ARGUMENT, format!("has {parts} parts, none of number {part}"))));
+        let message = format!("has {parts} parts, none of number {part}");
+        return Err(failed(Failure { code: sys::OIIO_INVALID_ARGUMENT, message }));
     }
     let spec = input.spec().map_err(failed)?;
     let data = input.pixels(limits.bytes_for(path.metadata().map_or(0, |m| m.len()))).map_err(failed)?;
@@ -301,7 +315,8 @@ pub fn image_texels(path: &Path) -> Result<u64, ImageError> {
 
 /// Number of texels of an image, and bytes of each as a texture.
 fn texels_and_bytes(path: &Path) -> Result<(u64, u64), ImageError> {
-    let (input, layer) = Input::open_colors(path)?;
+    let mut input = Input::open(path, 0)?;
+    let layer = input.choose_colors(path)?;
     let spec = input.spec().map_err(|failure| read_failure(path, failure))?;
     let [width, height] = [spec.width, spec.height].map(|n| u64::try_from(n).unwrap_or(0));
     let bytes = if spec.format == sys::OIIO_FORMAT_U8 { 1 } else { 4 };
@@ -309,9 +324,9 @@ fn texels_and_bytes(path: &Path) -> Result<(u64, u64), ImageError> {
 }
 
 /// The error of a failed read.
-pub(in crate::imaging) fn read_failure(path: &Path, (code, reason): (i32, String)) -> ImageError {
-    let path = path.to_owned();
-    match code {
+pub(in crate::imaging) fn read_failure(path: &Path, failure: Failure) -> ImageError {
+    let (path, reason) = (path.to_owned(), failure.message);
+    match failure.code {
         sys::OIIO_TOO_LARGE => ImageError::TooLarge { path, reason },
         _ => ImageError::Unreadable { path, reason },
     }

@@ -29,12 +29,20 @@ pub fn load() -> Result<(), ImageError> {
     api().map(|_| ())
 }
 
-/// Calls a function of the shim. `Err` holds its code and message.
-pub(super) fn call(f: impl FnOnce(*mut c_char, usize) -> i32) -> Result<(), (i32, String)> {
+/// Failure of a call of the shim.
+#[derive(Debug)]
+pub(in crate::imaging) struct Failure {
+    /// One of the codes of the shim, such as [`sys::OIIO_TOO_LARGE`].
+    pub(super) code: i32,
+    pub(super) message: String,
+}
+
+/// Calls a function of the shim.
+pub(super) fn call(f: impl FnOnce(*mut c_char, usize) -> i32) -> Result<(), Failure> {
     let mut message = [0 as c_char; 1024];
     match f(message.as_mut_ptr(), message.len()) {
         sys::OIIO_OK => Ok(()),
-        code => Err((code, text(message.as_ptr()))),
+        code => Err(Failure { code, message: text(message.as_ptr()) }),
     }
 }
 

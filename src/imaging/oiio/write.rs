@@ -28,7 +28,7 @@ impl Output {
         let name = c_path(path)?;
         let mut handle = ptr::null_mut();
         // SAFETY: the name ends in a zero byte, and `handle` is only written.
-        call(|e, n| unsafe { (api.output_create)(name.as_ptr(), &mut handle, e, n) }).map_err(|(_, m)| m)?;
+        call(|e, n| unsafe { (api.output_create)(name.as_ptr(), &mut handle, e, n) }).map_err(|f| f.message)?;
         Ok(Output { api, handle })
     }
 
@@ -59,7 +59,7 @@ impl Output {
             channel_formats: formats.as_ptr(),
         };
         // SAFETY: the handle is live until drop, here and below; names and formats outlive the call.
-        call(|e, n| unsafe { (self.api.output_add_part)(self.handle, &description, e, n) }).map_err(|(_, m)| m)?;
+        call(|e, n| unsafe { (self.api.output_add_part)(self.handle, &description, e, n) }).map_err(|f| f.message)?;
 
         if !part.metadata.iter().any(|(name, _)| name == "DateTime") {
             self.set(index, "DateTime", &MetaValue::Text(NO_DATE.to_owned()))?;
@@ -89,12 +89,12 @@ impl Output {
                 call(|e, n| unsafe { (api.output_set_matrix)(handle, part, name.as_ptr(), rows.as_ptr(), e, n) })
             }
         };
-        result.map_err(|(_, message)| message)
+        result.map_err(|failure| failure.message)
     }
 
     fn write(&mut self, parts: &[Part], values: &RowSource<'_>) -> Result<(), String> {
         // SAFETY: as above.
-        call(|e, n| unsafe { (self.api.output_open)(self.handle, e, n) }).map_err(|(_, m)| m)?;
+        call(|e, n| unsafe { (self.api.output_open)(self.handle, e, n) }).map_err(|f| f.message)?;
         for (index, part) in parts.iter().enumerate() {
             let mut begin = 0;
             while begin < part.height {
@@ -110,12 +110,12 @@ impl Output {
                     let write = self.api.output_write;
                     write(self.handle, index as i32, first, rows.len() as i32, data.as_ptr(), count, e, n)
                 })
-                .map_err(|(_, m)| m)?;
+                .map_err(|f| f.message)?;
                 begin = rows.end;
             }
         }
         // SAFETY: as above. Data are flushed here, so a full disk is reported.
-        call(|e, n| unsafe { (self.api.output_close)(self.handle, e, n) }).map_err(|(_, m)| m)
+        call(|e, n| unsafe { (self.api.output_close)(self.handle, e, n) }).map_err(|f| f.message)
     }
 }
 

@@ -2,6 +2,7 @@
 
 use super::layout::{DIRECTORIES, Layout};
 use crate::imaging::tiles::TILE;
+use std::collections::BTreeMap;
 
 /// The value by which OpenImageIO and RenderMan know that further images are levels of the first.
 const TEXTURE: &[u8; 14] = b"Plain Texture\0";
@@ -15,15 +16,22 @@ enum Values {
 }
 
 impl Values {
-    /// Number of the type, count and bytes.
-    fn encoded(&self) -> (u16, usize, Vec<u8>) {
-        match self {
+    fn encoded(&self) -> Encoded {
+        let (kind, count, bytes) = match self {
             Values::Text(text) => (2, text.len(), text.to_vec()),
             Values::Short(values) => (3, values.len(), values.iter().flat_map(|v| v.to_le_bytes()).collect()),
             Values::Long(value) => (4, 1, value.to_le_bytes().to_vec()),
             Values::Long8(values) => (16, values.len(), values.iter().flat_map(|v| v.to_le_bytes()).collect()),
-        }
+        };
+        Encoded { kind, count, bytes }
     }
+}
+
+/// Number of a type, number of values, and their bytes.
+struct Encoded {
+    kind: u16,
+    count: usize,
+    bytes: Vec<u8>,
 }
 
 /// Directories of all levels, for the position [`DIRECTORIES`].
@@ -36,8 +44,8 @@ pub(super) fn directories(layout: &Layout) -> Vec<u8> {
     bytes
 }
 
-/// Tags of a level, in ascending order.
-fn tags(layout: &Layout, level: usize) -> Vec<(u16, Values)> {
+/// Tags of a level.
+fn tags(layout: &Layout, level: usize) -> BTreeMap<u16, Values> {
     let Layout { channels, channel_bytes, .. } = *layout;
     let [width, height] = layout.sizes[level].map(|n| n as u32);
     let tiles: usize = layout.grid(level).iter().product();
@@ -67,13 +75,13 @@ fn tags(layout: &Layout, level: usize) -> Vec<(u16, Values)> {
 }
 
 /// Appends a directory and the values that do not fit into its entries.
-fn append(bytes: &mut Vec<u8>, tags: &[(u16, Values)], is_last: bool) {
+fn append(bytes: &mut Vec<u8>, tags: &BTreeMap<u16, Values>, is_last: bool) {
     let begin = DIRECTORIES as usize + bytes.len();
     let mut outside_at = begin + 8 + 20 * tags.len() + 8;
     let mut outside = Vec::new();
     bytes.extend((tags.len() as u64).to_le_bytes());
     for (tag, values) in tags {
-        let (kind, count, mut data) = values.encoded();
+        let Encoded { kind, count, bytes: mut data } = values.encoded();
         bytes.extend(tag.to_le_bytes());
         bytes.extend(kind.to_le_bytes());
         bytes.extend((count as u64).to_le_bytes());

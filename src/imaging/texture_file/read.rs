@@ -149,8 +149,8 @@ impl std::fmt::Debug for TextureFile {
 impl MipMap {
     /// Moves levels of more than a tile into the temporary file of `store`. `Err` if it cannot be written.
     pub fn tiled(self, store: &Arc<TileStore>) -> io::Result<Self> {
-        let (file, begin) = store.append(|out| write_texture(out, &[&self]))?;
-        let place = Place::Temporary(file, begin);
+        let begin = store.append(|out| write_texture(out, &[&self]))?;
+        let place = Place::Temporary(store.temporary(), begin);
         TextureFile::at(place).and_then(|file| file.map(self.wrap, self.filter, store)).map_err(io::Error::other)
     }
 }

@@ -3,7 +3,7 @@
 use super::directories::directories;
 use super::layout::{DIRECTORIES, Layout};
 use crate::imaging::mipmap::MipMap;
-use crate::imaging::texels::{Level, Texels};
+use crate::imaging::texels::Texels;
 use crate::imaging::tiles::TILE;
 use std::io::{self, Write};
 
@@ -40,7 +40,7 @@ fn tile(layout: &Layout, maps: &[&MipMap], level: usize, [x0, y0]: [usize; 2]) -
             for map in maps {
                 let begin = y * width + x;
                 let values = map.channels() * begin..map.channels() * (begin + step);
-                append(&mut tile, &map.levels[level], values, (layout.channel_bytes, &map.table));
+                append(&mut tile, map, level, values, layout.channel_bytes);
             }
         }
         tile.resize((row + 1) * layout.tile_bytes() / TILE, 0);
@@ -50,11 +50,10 @@ fn tile(layout: &Layout, maps: &[&MipMap], level: usize, [x0, y0]: [usize; 2]) -
 }
 
 /// Appends values of a level as bytes or floats.
-fn append(out: &mut Vec<u8>, level: &Level, values: std::ops::Range<usize>, how: (usize, &[f32; 256])) {
-    let (channel_bytes, table) = how;
-    match &level.texels {
+fn append(out: &mut Vec<u8>, map: &MipMap, level: usize, values: std::ops::Range<usize>, channel_bytes: usize) {
+    match &map.levels[level].texels {
         Texels::Bytes(v) if channel_bytes == 1 => out.extend_from_slice(&v[values]),
-        Texels::Bytes(v) => out.extend(v[values].iter().flat_map(|&byte| table[usize::from(byte)].to_le_bytes())),
+        Texels::Bytes(v) => out.extend(v[values].iter().flat_map(|&byte| map.table[usize::from(byte)].to_le_bytes())),
         Texels::Floats(v) => out.extend(v[values].iter().flat_map(|v| v.to_le_bytes())),
         // Only pyramids in memory are written
         Texels::Tiled(_) => {}

@@ -167,7 +167,8 @@ impl<'a> Assembly<'a> {
         if messages.diagnostics.has_errors() {
             return None;
         }
-        let (geometry, textures) = (Arc::new(self.set), Arc::new(self.materials.textures.set));
+        let geometry = Arc::new(self.set);
+        let textures = Arc::new(self.materials.textures.set);
         let lights = light_set(self.lights, self.emitters, &geometry, &textures, bounds);
         let materials = MaterialSet::new(self.materials.entries, &textures).find_caustics(&textures);
         Some(Scene {
@@ -380,7 +381,8 @@ impl<'a> Assembly<'a> {
         }
 
         // Light
-        let (p, axis) = (m.transform_point3(Vec3::ZERO), m.transform_vector3(-Vec3::Z).normalize_or(-Vec3::Z));
+        let p = m.transform_point3(Vec3::ZERO);
+        let axis = m.transform_vector3(-Vec3::Z).normalize_or(-Vec3::Z);
         match light.key("type").text() {
             Some("directional") => self.lights.push(Light::Distant(DistantLight { wi: -axis, irradiance: intensity })),
             Some("spot") => {

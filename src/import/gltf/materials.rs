@@ -155,35 +155,25 @@ impl<'a> Materials<'a> {
         let pbr = if old.is_some() { Place::default() } else { place.key("pbrMetallicRoughness") };
         let packed = pbr.key("metallicRoughnessTexture");
         let specular = place.extension("KHR_materials_specular");
-        let coat = place.extension("KHR_materials_clearcoat");
         let sheen = place.extension("KHR_materials_sheen");
-        let transmission = place.extension("KHR_materials_transmission");
         let volume = place.extension("KHR_materials_volume");
         let anisotropy = place.extension("KHR_materials_anisotropy");
         let color = Rgb::from_array(specular.key("specularColorFactor").numbers().unwrap_or([1.0; 3]));
         let sheen_color = Rgb::from_array(sheen.key("sheenColorFactor").numbers().unwrap_or([0.0; 3]));
+        let [coat, coat_roughness] = self.coat(place, messages)?;
+        let transmission = self.transmission(place, messages)?;
         let t = &mut self.textures;
-        let mut number = |place: &Place<'a>, key: &str, default: f32, texture: &Place<'a>, channel: usize| {
-            t.scaled(factor(&place.key(key), default), texture, channel, messages)
-        };
-        let of_coat = |key: &'static str| coat.key(key);
         let mut material = PrincipledMaterial {
             base_color,
-            metalness: number(&pbr, "metallicFactor", 1.0, &packed, 2)?,
-            roughness: number(&pbr, "roughnessFactor", 1.0, &packed, 1)?,
+            metalness: t.scaled(factor(&pbr.key("metallicFactor"), 1.0), &packed, 2, messages)?,
+            roughness: t.scaled(factor(&pbr.key("roughnessFactor"), 1.0), &packed, 1, messages)?,
             anisotropy: Anisotropy::Gltf(factor(&anisotropy.key("anisotropyStrength"), 0.0)),
             direction: None,
             ior: ior(place),
-            transmission: number(
-                &transmission,
-                "transmissionFactor",
-                0.0,
-                &transmission.key("transmissionTexture"),
-                0,
-            )?,
+            transmission,
             is_thin: factor(&volume.key("thicknessFactor"), 0.0) <= 0.0,
-            coat: number(&coat, "clearcoatFactor", 0.0, &of_coat("clearcoatTexture"), 0)?,
-            coat_roughness: number(&coat, "clearcoatRoughnessFactor", 0.0, &of_coat("clearcoatRoughnessTexture"), 1)?,
+            coat,
+            coat_roughness,
             specular: t.opacity_scaled(
                 factor(&specular.key("specularFactor"), 1.0),
                 &specular.key("specularTexture"),
@@ -203,6 +193,23 @@ impl<'a> Materials<'a> {
             self.specular_glossiness(&old, &mut material, messages)?;
         }
         Ok(material)
+    }
+
+    /// Weight and roughness of the coat.
+    fn coat(&mut self, place: &Place<'a>, messages: &mut Messages<'_>) -> Result<[FloatTextureId; 2], GltfError> {
+        let coat = place.extension("KHR_materials_clearcoat");
+        let weight = factor(&coat.key("clearcoatFactor"), 0.0);
+        let weight = self.textures.scaled(weight, &coat.key("clearcoatTexture"), 0, messages)?;
+        let roughness = factor(&coat.key("clearcoatRoughnessFactor"), 0.0);
+        let roughness = self.textures.scaled(roughness, &coat.key("clearcoatRoughnessTexture"), 1, messages)?;
+        Ok([weight, roughness])
+    }
+
+    /// Weight of the transmission.
+    fn transmission(&mut self, place: &Place<'a>, messages: &mut Messages<'_>) -> Result<FloatTextureId, GltfError> {
+        let extension = place.extension("KHR_materials_transmission");
+        let weight = factor(&extension.key("transmissionFactor"), 0.0);
+        self.textures.scaled(weight, &extension.key("transmissionTexture"), 0, messages)
     }
 
     /// Rotation and texture of `KHR_materials_anisotropy`.

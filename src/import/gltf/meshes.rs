@@ -37,11 +37,7 @@ pub(super) fn primitive(
         return Ok(None);
     };
     let count = document.open(positions)?.count();
-    let indices = match place.key("indices").index() {
-        Some(index) => document.accessor(index)?.values.iter().map(|&v| v as u32).collect(),
-        None => (0..count as u32).collect::<Vec<u32>>(),
-    };
-    let mut triangles = triangles(&indices, mode);
+    let mut triangles = triangles(&indices(document, place, count)?, mode);
     let in_use = InUse::of(count, &mut triangles, &place.key("indices"))?;
 
     // Attributes, deformed by the pose
@@ -59,24 +55,39 @@ pub(super) fn primitive(
         return Err(attributes.key("POSITION").error(format!("vertex {} is not finite", in_use.vertex(i))));
     }
 
-    // Positions relative to the common origin
+    move_to_origin(&mut positions, origin);
+    let mut mesh = TriangleMesh::new(positions, triangles).map_err(|message| place.key("indices").error(message))?;
+
+    // Other attributes
+    mesh.uvs = uvs(document, &in_use, &attributes.key("TEXCOORD_0"))?;
+    mesh.uvs1 = uvs(document, &in_use, &attributes.key("TEXCOORD_1"))?;
+    (mesh.normals, mesh.tangents) = (normals, moved);
+    mesh.tangent_signs = tangents.iter().map(|&[.., w]| if w < 0.0 { -1 } else { 1 }).collect();
+    mesh.colors = in_use.read(document, &attributes.key("COLOR_0"), 1.0)?;
+    Ok(Some(Primitive { mesh, material: place.key("material").index() }))
+}
+
+/// Vertices of the corners of a primitive whose attributes have `count` elements.
+fn indices(document: &Document, place: &Place<'_>, count: usize) -> Result<Vec<u32>, GltfError> {
+    match place.key("indices").index() {
+        Some(index) => Ok(document.accessor(index)?.values.iter().map(|&v| v as u32).collect()),
+        None => Ok((0..count as u32).collect()),
+    }
+}
+
+/// Subtracts the common origin, which is near the positions if there is none yet.
+fn move_to_origin(positions: &mut [Vec3], origin: &mut Option<DVec3>) {
     let middle = positions.get(positions.len() / 2).map_or(DVec3::ZERO, |p| p.as_dvec3());
     let origin = *origin.get_or_insert_with(|| near_origin(middle));
     if origin != DVec3::ZERO {
         positions.iter_mut().for_each(|p| *p = (p.as_dvec3() - origin).as_vec3());
     }
-    let mut mesh = TriangleMesh::new(positions, triangles).map_err(|message| place.key("indices").error(message))?;
+}
 
-    // Other attributes; glTF has v downwards
-    let uvs = |name| -> Result<Vec<Vec2>, GltfError> {
-        let uvs = in_use.read::<2>(document, &attributes.key(name), 0.0)?;
-        Ok(uvs.into_iter().map(|[u, v]| Vec2::new(u, 1.0 - v)).collect())
-    };
-    (mesh.uvs, mesh.uvs1) = (uvs("TEXCOORD_0")?, uvs("TEXCOORD_1")?);
-    (mesh.normals, mesh.tangents) = (normals, moved);
-    mesh.tangent_signs = tangents.iter().map(|&[.., w]| if w < 0.0 { -1 } else { 1 }).collect();
-    mesh.colors = in_use.read(document, &attributes.key("COLOR_0"), 1.0)?;
-    Ok(Some(Primitive { mesh, material: place.key("material").index() }))
+/// Texture coordinates; glTF has v downwards.
+fn uvs(document: &Document, in_use: &InUse, place: &Place<'_>) -> Result<Vec<Vec2>, GltfError> {
+    let uvs = in_use.read::<2>(document, place, 0.0)?;
+    Ok(uvs.into_iter().map(|[u, v]| Vec2::new(u, 1.0 - v)).collect())
 }
 
 /// Corners of a list, a strip or a fan.

@@ -10,7 +10,7 @@ use crate::import::LoadOptions;
 use crate::scene::FilmSettings;
 use lumiris_formats::gltf::{Document, Place};
 use lumiris_numbers::math::origin::rebased;
-use lumiris_numbers::math::{Affine3A, Bounds3, DAffine3, DVec3, Vec3};
+use lumiris_numbers::math::{Affine3A, Bounds3, DAffine3, DVec3, Sphere, Vec3};
 
 /// Default height of the image.
 const HEIGHT: u32 = 720;
@@ -166,7 +166,7 @@ fn of_file(world_from_node: &DAffine3, camera: &Place<'_>, aspect: f32, resoluti
 
 /// The automatic camera, with the whole scene in view.
 fn frame(bounds: &Bounds3, aspect: f32, resolution: [u32; 2]) -> Camera {
-    let (center, radius) = bounds.bounding_sphere();
+    let Sphere { center, radius } = bounds.bounding_sphere();
     let radius = if radius > 0.0 && radius.is_finite() { radius } else { 1.0 };
     let center = if center.is_finite() { center } else { Vec3::ZERO };
     let half = (AUTO_FOV.to_radians() * 0.5).tan() * aspect.min(1.0);

@@ -5,7 +5,7 @@ use super::descriptions::{CurveData, ShapeDesc, ShapeSource};
 use crate::geometry::{Curve, CurveKind, CurveSet};
 use lumiris_formats::diagnostic::Diagnostics;
 use lumiris_formats::pbrt::params::{ParamSet, ParamType};
-use lumiris_numbers::math::origin::relative;
+use lumiris_numbers::math::origin::{LocalPoints, relative};
 use lumiris_numbers::math::transform::transform_normal;
 use lumiris_numbers::math::{Affine3A, DVec3, Vec3};
 
@@ -64,7 +64,7 @@ pub(super) fn curve_data(p: &ParamSet, d: &mut Diagnostics) -> Option<CurveData>
 }
 
 fn segments(p: &ParamSet, basis: Basis, degree: usize, d: &mut Diagnostics) -> Option<Segments> {
-    let (points, origin) = match p.points("P", d).map(relative) {
+    let LocalPoints { points, origin } = match p.points("P", d).map(relative) {
         Some(points) => points,
         None => {
             d.error(p.span, "a curve needs `point3 P`");

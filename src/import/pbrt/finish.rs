@@ -81,7 +81,8 @@ impl Builder<'_> {
         // Add lights
         let ParsedOptions { camera, film, settings, given, .. } = options?;
         let Assembly { set, surfaces, emitters, media, .. } = assembly;
-        let (geometry, textures) = (Arc::new(set), Arc::new(std::mem::take(&mut self.textures)));
+        let geometry = Arc::new(set);
+        let textures = Arc::new(std::mem::take(&mut self.textures));
         let lights = self.light_set(emitters, &geometry, &textures, &media.set, d);
         let scene = Scene {
             camera,

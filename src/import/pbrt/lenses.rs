@@ -2,7 +2,7 @@
 
 use super::checks::positive;
 use crate::cameras::{Aperture, LensElement, LensSystem};
-use crate::imaging::oiio::{ReadLimits, read_colors};
+use crate::imaging::oiio::{ReadColors, ReadLimits, read_colors};
 use lumiris_formats::diagnostic::Diagnostics;
 use lumiris_formats::names::file_in;
 use lumiris_formats::number::numbers_of_text;
@@ -105,7 +105,7 @@ fn aperture(p: &ParamSet, folder: &Path, d: &mut Diagnostics) -> Option<Aperture
     // Image: mean of the colour channels
     let path = file_in(folder, name);
     match read_colors(&path, &ReadLimits::default()) {
-        Ok((read, layer)) => {
+        Ok(ReadColors { read, layer }) => {
             let image = read.image;
             let channels = image.channels.len();
             let colors = layer.channels.as_slice();

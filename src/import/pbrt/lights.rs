@@ -88,7 +88,8 @@ impl Builder<'_> {
         let power = p.float("power", d).unwrap_or(0.0);
 
         // Axis
-        let (p0, p1) = (world_from_light.transform_point3(from), world_from_light.transform_point3(to));
+        let p0 = world_from_light.transform_point3(from);
+        let p1 = world_from_light.transform_point3(to);
         let Some(axis) = (p1 - p0).as_vec3().try_normalize() else {
             d.error(p.span_of("to"), "the light and what it points at are the same point");
             return None;

@@ -250,7 +250,8 @@ fn displaced(
     let length = |a: Vec3, b: Vec3| group_from_object.transform_vector3(a - b).length();
     mesh.refine(length, displacement.edge_length, MAX_TRIANGLES)?;
     mesh.displace(|p, n, uv| {
-        let (p, n) = (textured_from_object.transform_point3(p.as_dvec3()), transform_normal(group_from_object, n));
+        let p = textured_from_object.transform_point3(p.as_dvec3());
+        let n = transform_normal(group_from_object, n);
         let point = TextureContext { uv, uv_width: Vec2::ZERO, uv1: Vec2::ZERO, color: [1.0; 4], face: 0, p, n };
         textures.float(displacement.texture, &point)
     });

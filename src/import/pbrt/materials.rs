@@ -382,9 +382,8 @@ impl Builder<'_> {
         if let (Some(eta), Some(k)) = (eta, k) {
             // A spectral renderer shows the colour of both curves together. The Fresnel equations per colour channel do
             // not give this colour.
-            let (eta, k) = spectra::conductor_rgb(&eta.unbounded_curve(), &k.unbounded_curve());
-            let (eta, k) =
-                (self.textures.add_rgb(RgbTexture::Constant(eta)), self.textures.add_rgb(RgbTexture::Constant(k)));
+            let fitted = spectra::conductor_rgb(&eta.unbounded_curve(), &k.unbounded_curve());
+            let [eta, k] = [fitted.eta, fitted.k].map(|rgb| self.textures.add_rgb(RgbTexture::Constant(rgb)));
             return ConductorSpectrum::EtaK { eta, k };
         }
         ConductorSpectrum::EtaK {

@@ -13,7 +13,7 @@ use lumiris_formats::names::file_in;
 use lumiris_formats::pbrt::directive::Name;
 use lumiris_formats::pbrt::params::{Input, ParamSet, ParamType};
 use lumiris_formats::source::Span;
-use lumiris_numbers::math::origin::relative;
+use lumiris_numbers::math::origin::{LocalPoints, relative};
 use lumiris_numbers::math::{Vec2, Vec3};
 use std::sync::Arc;
 
@@ -184,7 +184,8 @@ fn quadric(kind: &str, p: &ParamSet, d: &mut Diagnostics) -> Option<QuadricKind>
             })
         }
         _ => {
-            let (z_min, z_max) = (p.float("zmin", d).unwrap_or(-1.0), p.float("zmax", d).unwrap_or(1.0));
+            let z_min = p.float("zmin", d).unwrap_or(-1.0);
+            let z_max = p.float("zmax", d).unwrap_or(1.0);
             let (z_min, z_max) = (z_min.min(z_max), z_min.max(z_max));
             if !(z_min < z_max && z_min.is_finite() && z_max.is_finite()) {
                 d.error(p.span_of("zmin"), "a cylinder needs two different finite ends");
@@ -260,7 +261,7 @@ fn face_numbers(p: &mut ParamSet, count: usize, d: &mut Diagnostics) -> Vec<u32>
 }
 
 fn face_data<const N: usize>(p: &mut ParamSet, d: &mut Diagnostics) -> Option<FaceData<N>> {
-    let Some((positions, origin)) = p.points("P", d).map(relative) else {
+    let Some(LocalPoints { points: positions, origin }) = p.points("P", d).map(relative) else {
         d.error(p.span, format!("{} needs `point3 P`", p.owner));
         // Other errors are irrelevant without vertices
         p.ignore_all();

@@ -261,7 +261,8 @@ impl Builder<'_> {
             d.warning_once(p.span_of("gamma"), "`gamma` is pbrt-v3; pbrt-v4 writes `encoding`");
             encoding = if gamma { ImageEncoding::Srgb } else { ImageEncoding::Linear };
         }
-        let (scale, invert) = (p.float("scale", d).unwrap_or(1.0), p.boolean("invert", d).unwrap_or(false));
+        let scale = p.float("scale", d).unwrap_or(1.0);
+        let invert = p.boolean("invert", d).unwrap_or(false);
         let Some(name) = file_name(p, "filename", d) else {
             d.error(p.span, "an image texture needs a `string filename`");
             return None;

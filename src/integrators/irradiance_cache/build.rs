@@ -12,6 +12,7 @@
 //! So a round depends only on earlier rounds.
 
 use super::cache::IrradianceCache;
+use super::cache_integrator::CacheIntegrator;
 use super::gather::{BATCH, Gatherer, RecordRequest};
 use super::octree::Octree;
 use super::record::{Range, Record};
@@ -41,19 +42,14 @@ const CHUNK: usize = 1024;
 /// Records computed before they are added. The number of records per round is not limited.
 const MAX_AT_ONCE: usize = 1 << 14;
 
-/// Builds the cache for the pixels in `bounds`. `stop` ends the build early.
-pub fn build(
-    job: &RenderJob,
-    bounds: PixelBounds,
-    cameras: Cameras<'_>,
-    stop: &AtomicBool,
-) -> (IrradianceCache, BuildStats) {
+/// Builds the cache for the pixels of the image. `stop` ends the build early.
+pub(super) fn build(job: &RenderJob, cameras: Cameras<'_>, stop: &AtomicBool) -> CacheIntegrator {
     let start = Instant::now();
     let world_bounds = job.world.scene.geometry.world_bounds();
     let mut cache = IrradianceCache::new(job.settings().integrator.cache, &world_bounds);
     let mut stats = BuildStats::default();
     if holds_nothing(job) {
-        return (cache, stats);
+        return CacheIntegrator { cache, build: stats };
     }
     for round in rounds() {
         if cache.is_full() || stop.load(Ordering::Relaxed) {
@@ -62,7 +58,7 @@ pub fn build(
         stats.rounds += 1;
 
         // Request records, and drop redundant requests
-        let pixels = round.pixels(bounds);
+        let pixels = round.pixels(job.world.scene.film.bounds);
         stats.camera_samples += pixels.len() as u64;
         let wanted = ask(job, &cache, &pixels, &|pixel| cameras(pixel, round.sample), &mut stats.paths);
         let wanted: Vec<RecordRequest> =
@@ -79,7 +75,7 @@ pub fn build(
         }
     }
     stats.elapsed = start.elapsed();
-    (cache, stats)
+    CacheIntegrator { cache, build: stats }
 }
 
 /// True if all records would be black.
@@ -157,8 +153,8 @@ fn ask_chunk(
         let sample = path.sample as usize;
         let min = WORTHWHILE * samples.weight[sample].abs();
         let is_worthwhile = !(path.beta.map(f32::abs).max_component() < min);
-        let sides = unserved_sides(cache, point).into_iter().flatten().filter(|_| is_worthwhile);
-        wanted.extend(sides.map(|(side, ns)| RecordRequest {
+        let sides = (0..).zip(unserved_sides(cache, point)).filter(|_| is_worthwhile);
+        wanted.extend(sides.filter_map(|(side, ns)| Some((side, ns?))).map(|(side, ns)| RecordRequest {
             p: point.p,
             p_error: point.p_error,
             n: point.bsdf.n,
@@ -182,14 +178,14 @@ fn ask_chunk(
     wanted
 }
 
-/// The sides of a diffuse surface without a usable record, with their normals. Side 0 is the side of the viewer, if it
+/// Normals of the sides of a diffuse surface without a usable record. Side 0 is the side of the viewer, if it
 /// reflects; side 1 the other one, if it transmits.
-fn unserved_sides(cache: &IrradianceCache, v: &ShadingPoint<'_>) -> [Option<(u32, Vec3)>; 2] {
+fn unserved_sides(cache: &IrradianceCache, v: &ShadingPoint<'_>) -> [Option<Vec3>; 2] {
     let Some(part) = v.bsdf.lambertian(v.wo) else { return [None; 2] };
     let ns = v.viewer_normal();
-    [(0, part.reflectance, ns), (1, part.transmittance, -ns)].map(|(side, albedo, ns)| {
+    [(part.reflectance, ns), (part.transmittance, -ns)].map(|(albedo, ns)| {
         let asks = !albedo.is_black() && !cache.serves(v.p, ns, COVERED);
-        asks.then_some((side, ns))
+        asks.then_some(ns)
     })
 }
 

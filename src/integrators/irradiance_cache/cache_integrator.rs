@@ -19,15 +19,14 @@ use std::sync::atomic::AtomicBool;
 /// Renders with a cache.
 #[derive(Debug)]
 pub struct CacheIntegrator {
-    cache: IrradianceCache,
-    build: BuildStats,
+    pub(super) cache: IrradianceCache,
+    pub(super) build: BuildStats,
 }
 
 impl CacheIntegrator {
     /// Builds the cache.
     pub fn new(job: &RenderJob, cameras: Cameras<'_>, stop: &AtomicBool) -> Self {
-        let (cache, build) = build(job, job.world.scene.film.bounds, cameras, stop);
-        CacheIntegrator { cache, build }
+        build(job, cameras, stop)
     }
 }
 

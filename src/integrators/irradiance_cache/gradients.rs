@@ -102,7 +102,8 @@ impl Cells {
         let at = |ring: u32, sector: u32| (ring * self.sectors + sector) as usize;
         let weight = PI / self.count() as f32;
         for sector in 0..self.sectors {
-            let (middle, lower) = (self.azimuth(sector as f32 + 0.5), self.azimuth(sector as f32));
+            let middle = self.azimuth(sector as f32 + 0.5);
+            let lower = self.azimuth(sector as f32);
             let u = frame.to_world(Vec3::new(middle.cos(), middle.sin(), 0.0));
             let v = frame.to_world(Vec3::new(-middle.sin(), middle.cos(), 0.0));
             let v_lower = frame.to_world(Vec3::new(-lower.sin(), lower.cos(), 0.0));
@@ -207,7 +208,8 @@ mod tests {
     #[test]
     fn gradients_of_few_cells_are_near_those_of_many() {
         let (p, n) = (Vec3::new(0.2, -0.1, 0.0), Vec3::Z);
-        let (few, many) = (under_plane(Cells::new(256), p, n, pattern), under_plane(FINE, p, n, pattern));
+        let few = under_plane(Cells::new(256), p, n, pattern);
+        let many = under_plane(FINE, p, n, pattern);
         for c in 0..2 {
             let limit = 0.15 * many.translation[c].length();
             assert!((few.translation[c] - many.translation[c]).length() < limit, "{few:?} {many:?}");

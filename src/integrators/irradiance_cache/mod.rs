@@ -12,9 +12,9 @@
 //! light are counted from the record, not counting mirrors before. Records of different shutter times are not
 //! distinguished. Without interpolation, the result equals the integrator `path`.
 //!
-//! Reading order: [`gradients`], [`record`], [`octree`], [`cache`], [`gather`], [`mod@build`], `cache_integrator`.
+//! Reading order: [`gradients`], [`record`], [`octree`], [`cache`], [`gather`], `build`, `cache_integrator`.
 
-pub mod build;
+mod build;
 pub mod cache;
 mod cache_integrator;
 pub mod gather;
@@ -22,7 +22,6 @@ pub mod gradients;
 pub mod octree;
 pub mod record;
 
-pub use build::build;
 pub use cache::IrradianceCache;
 pub use cache_integrator::CacheIntegrator;
 pub use record::Record;

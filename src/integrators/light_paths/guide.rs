@@ -157,7 +157,7 @@ fn table(cells: &[f64]) -> PiecewiseConstant2D {
         let mut sum = 0.0;
         for (dy, wy) in (-1..).zip([1.0, 2.0, 1.0]) {
             for (dx, wx) in (-1..).zip([1.0, 2.0, 1.0]) {
-                let (x, y) = wrap_equal_area_texel(x + dx, y + dy, edge);
+                let [x, y] = wrap_equal_area_texel([x + dx, y + dy], edge);
                 sum += wx * wy * cells[(y * edge + x) as usize];
             }
         }

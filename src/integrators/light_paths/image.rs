@@ -53,7 +53,8 @@ impl LightImage {
             return None;
         }
         let pilot = LightPilot::new(job, 1)?;
-        let (guide, stats) = (pilot.guide.with_paths(paths.min(f64::from(u32::MAX)) as u32), pilot.stats);
+        let guide = pilot.guide.with_paths(paths.min(f64::from(u32::MAX)) as u32);
+        let stats = pilot.stats;
         let rows = vec![0; bounds.height() as usize + 1];
         let has_entries = vec![0; bounds.area().div_ceil(64)];
         Some(LightImage { guide: Arc::new(guide), bounds, served: 0, entries: Vec::new(), rows, has_entries, stats })

@@ -46,6 +46,12 @@ pub(super) struct CameraConnection {
     pub(super) d: Vec3,
 }
 
+/// A connection and its shadow segment.
+struct Connected {
+    connection: CameraConnection,
+    segment: Ray,
+}
+
 /// Traces light paths; holds the buffers of one worker.
 #[derive(Debug, Default)]
 pub(super) struct LightPathWalker {
@@ -98,7 +104,7 @@ impl LightPathWalker {
                 let may_connect = !bsdf.makes_caustics || interaction.is_mixture(job);
                 if scattered > 0
                     && may_connect
-                    && let Some((connection, segment)) = path.connect(input, &interaction)
+                    && let Some(Connected { connection, segment }) = path.connect(input, &interaction)
                 {
                     self.connections.push(connection);
                     self.shadows.push(&segment);
@@ -161,8 +167,8 @@ impl LightPath {
         (!power.is_black() && power.is_finite()).then_some(LightPath { ray, power, ..*self })
     }
 
-    /// Connects the path at any other surface to the camera. Returns the contribution and the shadow segment.
-    fn connect(&self, input: &TraceInput<'_>, at: &SurfaceInteraction) -> Option<(CameraConnection, Ray)> {
+    /// Connects the path at any other surface to the camera.
+    fn connect(&self, input: &TraceInput<'_>, at: &SurfaceInteraction) -> Option<Connected> {
         let (job, film) = (input.job, &input.job.world.scene.film);
         let camera = &job.world.scene.camera;
 
@@ -203,7 +209,8 @@ impl LightPath {
         }
         let o = offset_origin(p, at.surface.p_error, bsdf.n, wo);
         let segment = Ray { o, d: projected.o - o, t_max: SEGMENT_END, time: self.ray.time };
-        Some((CameraConnection { pixel, value, weight, light: self.light, d: self.d }, segment))
+        let connection = CameraConnection { pixel, value, weight, light: self.light, d: self.d };
+        Some(Connected { connection, segment })
     }
 }
 

@@ -101,7 +101,8 @@ impl<'a> MapMaker<'a> {
     /// determines the first radii: the distance of the nearest photons at `visible`, points visible to the camera.
     pub fn new(job: &RenderJob, visible: &[GatherPoint], stop: &'a AtomicBool) -> Result<Self, PhotonError> {
         let settings = job.settings().integrator.photons;
-        let (max_depth, seed) = (job.settings().integrator.max_depth, job.settings().sampling.seed);
+        let max_depth = job.settings().integrator.max_depth;
+        let seed = job.settings().sampling.seed;
 
         // Importance
         let low_importance = match settings.storage {
@@ -190,7 +191,8 @@ impl<'a> MapMaker<'a> {
 
     fn maps(&self, job: &RenderJob, pass: u32, traced: Traced) -> PhotonMaps {
         let nearest = self.settings.nearest;
-        let (global, caustic) = (PhotonMap::new(traced.global), PhotonMap::new(traced.caustic));
+        let global = PhotonMap::new(traced.global);
+        let caustic = PhotonMap::new(traced.caustic);
         if let (Some(progressive), Some(radii)) = (self.settings.progressive, self.radii) {
             let [search, caustic_search] = radii.map(|r| Search::Radius(r * progressive.factor(pass)));
             return PhotonMaps { global, caustic, records: None, search, caustic_search, nearest };

@@ -6,7 +6,7 @@ use super::mixture_groups::MixtureGroups;
 use super::set::LightSet;
 use crate::lights::visibility::visibility_cache::ContributingLights;
 use crate::lights::{
-    LeAndPdf, LearnedVisibility, LightCtx, LightHit, LightId, LightSample, TreeChoice, VisibilityCache,
+    LeAndPdf, LearnedVisibility, Light, LightCtx, LightHit, LightId, SampleOfLight, TreeChoice, VisibilityCache,
 };
 use crate::media::{EmissionLookup, MediumId};
 use lumiris_numbers::math::{Rgb, Vec3};
@@ -123,7 +123,7 @@ impl JobLights {
     /// Chooses a light by `u_choice` and samples a direction to it by `u`. `pdf` of the sample includes the probability
     /// of the choice: it is per steradian, or a probability for delta lights.
     #[inline]
-    pub fn sample(&self, ctx: &LightCtx, u_choice: f32, u: [f32; 2]) -> Option<(LightId, LightSample)> {
+    pub fn sample(&self, ctx: &LightCtx, u_choice: f32, u: [f32; 2]) -> Option<SampleOfLight> {
         self.set.sample_choice(ctx, self.sampler.sample(ctx, u_choice)?, u)
     }
 
@@ -135,7 +135,8 @@ impl JobLights {
     /// Density per steradian, at `ctx`, of sampling a point of emission in a medium by light sampling; `p` is the point
     /// in world space.
     pub fn pdf_volume(&self, ctx: &LightCtx, medium: MediumId, lookup: &EmissionLookup, p: Vec3) -> f32 {
-        let Some((light, volume)) = self.set.volume_light_at(medium, lookup.unit) else { return 0.0 };
+        let Some(light) = self.set.volume_light_at(medium, lookup.unit) else { return 0.0 };
+        let Light::Volume(volume) = &self.set.lights[light as usize] else { return 0.0 };
         let pmf = self.sampler.pmf(ctx, light);
         if pmf > 0.0 { pmf * volume.pdf(ctx, lookup.unit, p, lookup.rate) } else { 0.0 }
     }
@@ -150,7 +151,7 @@ impl JobLights {
         group_pmf: f32,
         u_choice: f32,
         u: [f32; 2],
-    ) -> Option<(LightId, LightSample)> {
+    ) -> Option<SampleOfLight> {
         self.set.sample_choice(ctx, self.groups.sample(&self.sampler, ctx, group, group_pmf, u_choice)?, u)
     }
 
@@ -404,7 +405,7 @@ mod tests {
             let mut moments = Moments::default();
             for _ in 0..200_000 {
                 let sample = set.sample(&ctx, s.random::<f32>(), s.random::<[f32; 2]>());
-                moments.add(sample.map_or(0.0, |(light, s)| {
+                moments.add(sample.map_or(0.0, |SampleOfLight { light, sample: s }| {
                     if !s.is_delta {
                         let hit = LightHit { t: s.t, p: s.p, n: s.n, uv: lumiris_numbers::math::Vec2::ZERO };
                         let pdf = set.pdf(&ctx, light, s.wi, &hit);

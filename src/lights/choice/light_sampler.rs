@@ -94,7 +94,8 @@ impl FixedChoice {
             let Some(&end) = self.cumulative.get(light) else { return };
             let start = cumulative::sum_before(&self.cumulative, light);
             let count = positions[first..].partition_point(|&p| f64::from(p) * UNIT < end);
-            let (pmf, range) = (self.table.pmf(light), [first as u32, (first + count) as u32]);
+            let pmf = self.table.pmf(light);
+            let range = [first as u32, (first + count) as u32];
             out.push(LightRun { light: light as LightId, pmf, range, interval: [start, end] });
             first += count;
         }

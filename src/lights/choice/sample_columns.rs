@@ -420,7 +420,7 @@ mod tests {
     use crate::geometry::{Quadric, QuadricKind, Shape, TriangleMesh};
     use crate::lights::{
         DistantLight, Emission, EnvironmentFilter, EnvironmentMap, EnvironmentMapping, LightSamplerKind,
-        LightSetBuilder, PointLight,
+        LightSetBuilder, PointLight, SampleOfLight,
     };
     use lumiris_numbers::math::warp::sample_uniform_sphere;
     use lumiris_numbers::math::{Affine3A, Bounds3};
@@ -495,7 +495,8 @@ mod tests {
         let mut drawn = 0;
         for i in 0..N {
             let ctx = at.get(i);
-            let Some((light, s)) = lights.sample(&ctx, u[0][i], [u[1][i], u[2][i]]) else {
+            let sampled = lights.sample(&ctx, u[0][i], [u[1][i], u[2][i]]);
+            let Some(SampleOfLight { light, sample: s }) = sampled else {
                 assert_eq!(out.pdf[i], 0.0);
                 continue;
             };

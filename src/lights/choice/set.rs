@@ -3,8 +3,8 @@
 use crate::geometry::{GeometryId, Shape};
 use crate::lights::kinds::volume_light::Parts;
 use crate::lights::{
-    AreaShape, Emission, Light, LightCtx, LightId, LightLayers, LightSample, LightTree, SampledLight, Sphere,
-    TreeChoice, VolumeLight, area_lights_of,
+    AreaShape, Emission, Light, LightCtx, LightId, LightLayers, LightSample, LightTree, SampleOfLight, SampledLight,
+    Sphere, TreeChoice, VolumeLight, area_lights_of,
 };
 use crate::media::{Medium, MediumId, MediumSet};
 use lumiris_numbers::math::{Bounds3, Rgb, Vec3};
@@ -89,7 +89,7 @@ impl LightSetBuilder {
 
     /// The set, for a scene of the given bounds.
     pub fn build(mut self, scene_bounds: &Bounds3) -> LightSet {
-        let (center, radius) = scene_bounds.bounding_sphere();
+        let Sphere { center, radius } = scene_bounds.bounding_sphere();
         let has_extent = radius > 0.0 && radius.is_finite();
         let scene_radius = if has_extent { radius } else { 1.0 };
 
@@ -224,11 +224,9 @@ impl LightSet {
 
     /// The light of the part of a medium that contains a point of its unit cube; `None` if the part is dark.
     #[inline]
-    pub fn volume_light_at(&self, medium: MediumId, unit: Vec3) -> Option<(LightId, &VolumeLight)> {
+    pub fn volume_light_at(&self, medium: MediumId, unit: Vec3) -> Option<LightId> {
         let medium = self.emitting_media.get(medium as usize)?.as_ref()?;
-        let light = medium.lights[medium.parts.at(unit)]?;
-        let Light::Volume(volume_light) = &self.lights[light as usize] else { return None };
-        Some((light, volume_light))
+        medium.lights[medium.parts.at(unit)]
     }
 
     /// Rate of emission lookups along camera rays (1/m), by the size of the emitting region; 0 if the medium does not
@@ -247,10 +245,11 @@ impl LightSet {
     /// Samples a direction to the light of `choice`. `pdf` of the sample includes the probability of the choice: it is
     /// per steradian, or a probability for delta lights.
     #[inline]
-    pub fn sample_choice(&self, ctx: &LightCtx, choice: SampledLight, u: [f32; 2]) -> Option<(LightId, LightSample)> {
+    pub fn sample_choice(&self, ctx: &LightCtx, choice: SampledLight, u: [f32; 2]) -> Option<SampleOfLight> {
         let sample = self.lights[choice.light as usize].sample_li(ctx, u)?;
         let pdf = sample.pdf * choice.pmf;
-        (pdf > 0.0 && pdf.is_finite()).then_some((choice.light, LightSample { pdf, ..sample }))
+        let sample = LightSample { pdf, ..sample };
+        (pdf > 0.0 && pdf.is_finite()).then_some(SampleOfLight { light: choice.light, sample })
     }
 
     /// Radiance that all infinite lights send along a ray that leaves the scene from `p` in direction `w`.

@@ -101,13 +101,13 @@ fn with_border(texels: &[Rgb], [width, height]: [usize; 2], mapping: Environment
     let mut bordered = Vec::with_capacity((width + 2) * (height + 2));
     for y in -1..=h {
         for x in -1..=w {
-            let (x, y) = match mapping {
-                EnvironmentMapping::EqualArea => wrap_equal_area_texel(x, y, w),
+            let [x, y] = match mapping {
+                EnvironmentMapping::EqualArea => wrap_equal_area_texel([x, y], w),
                 // Beyond a pole, the opposite meridian follows.
                 EnvironmentMapping::LatLong => {
                     let over_pole = y < 0 || y >= h;
                     let x = if over_pole { x + w / 2 } else { x };
-                    (x.rem_euclid(w), y.clamp(0, h - 1))
+                    [x.rem_euclid(w), y.clamp(0, h - 1)]
                 }
             };
             let [r, g, b] = cleaned(texels[y as usize * width + x as usize]).to_array();

@@ -335,7 +335,8 @@ fn cells(map: &EnvironmentMap, light_from_portal: Mat3, n: usize) -> Vec<Cell> {
             let texels = (a.w - b.w).length() / map.texel_angle();
             (LOOKUPS_PER_TEXEL * texels).ceil().clamp(LOOKUPS[0], LOOKUPS[1]) as usize
         };
-        let (across, down) = (lookups(at(0.01, 0.5), at(0.99, 0.5)), lookups(at(0.5, 0.01), at(0.5, 0.99)));
+        let across = lookups(at(0.01, 0.5), at(0.99, 0.5));
+        let down = lookups(at(0.5, 0.01), at(0.5, 0.99));
         let [mut square, mut sum, mut projected] = [0.0; 3];
         for k in 0..across * down {
             let midpoint = |i: usize, n: usize| (i as f64 + 0.5) / n as f64;

@@ -475,7 +475,8 @@ mod tests {
                     0 => Light::Point(PointLight { p, intensity: l * scale * scale }),
                     1 => {
                         let (a, b) = (s.random::<f32>(), s.random::<f32>());
-                        let (cos_total, cos_falloff_start) = (a.min(b) * 2.0 - 1.0, a.max(b) * 2.0 - 1.0);
+                        let cos_total = a.min(b) * 2.0 - 1.0;
+                        let cos_falloff_start = a.max(b) * 2.0 - 1.0;
                         Light::Spot(SpotLight { p, axis, cos_total, cos_falloff_start, intensity: l * scale * scale })
                     }
                     k => {

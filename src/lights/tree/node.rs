@@ -1,6 +1,7 @@
 //! A node of a [`LightTree`](super::light_tree::LightTree).
 
 use crate::lights::{LightBounds, LightCtx};
+use lumiris_numbers::math::Sphere;
 use lumiris_numbers::math::light_bound::LightBound;
 
 /// Lights with a common bound.
@@ -17,7 +18,7 @@ impl Node {
         let center = b.bounds.center();
         let radius = (b.bounds.max - center).length() + 4.0 * f32::EPSILON * center.abs().max_element();
         let cosines = [b.cos_theta_o, b.cos_theta_e];
-        let bound = LightBound::new((center, radius), b.axis, cosines, b.two_sided, b.intensity);
+        let bound = LightBound::new(Sphere { center, radius }, b.axis, cosines, b.two_sided, b.intensity);
         Node { bound, is_leaf, light_or_right_child }
     }
 

@@ -3,7 +3,7 @@
 use crate::direct::Estimator;
 use crate::film::PixelBounds;
 use crate::film::replicas::ReplicaChoice;
-use crate::integrators::light_layers;
+use crate::imaging::TextEntries;
 use crate::render::render_settings::RenderSettings;
 use crate::render::tile_share::TileShare;
 use crate::render::tiles::replica_choice;
@@ -13,9 +13,6 @@ use std::str::FromStr;
 
 /// Name of the note with the plan: the settings chosen by measurements.
 pub const PLAN_NOTE: &str = "plan";
-
-/// Texts with names.
-type Entries = Vec<(String, String)>;
 
 /// The header of a file of sums.
 #[derive(Clone, Debug, PartialEq)]
@@ -41,9 +38,9 @@ pub struct FilmHeader {
     /// Hash of the scene files.
     pub fingerprint: u64,
     /// Settings that the image depends on. They are equal in all parts of an image.
-    pub settings: Entries,
+    pub settings: TextEntries,
     /// Notes, which may differ between parts.
-    pub notes: Entries,
+    pub notes: TextEntries,
 }
 
 impl FilmHeader {
@@ -53,7 +50,7 @@ impl FilmHeader {
         render: &RenderSettings,
         spp: u32,
         fingerprint: u64,
-        [settings, notes]: [Entries; 2],
+        [settings, notes]: [TextEntries; 2],
     ) -> Self {
         // Samples and pixels come from the job; settings and notes are given
         let film = &job.world.scene.film;
@@ -68,7 +65,7 @@ impl FilmHeader {
             is_finished: false,
             replicas: replica_choice(job, render),
             controls: if estimator.is_over_pixels() { job.controls() as u32 } else { 0 },
-            light_layers: light_layers::names(job).to_vec(),
+            light_layers: render.light_layers(job).to_vec(),
             fingerprint,
             settings,
             notes,

@@ -14,6 +14,7 @@ use crate::film::fixed_sums::FixedSum;
 use crate::film::light_layers::{LayerScratch, PackedLayers, PixelLight};
 use crate::film::packed::PackedSums;
 use crate::film::{Film, PixelBounds};
+use crate::imaging::TextEntries;
 use crate::render::control_variates;
 use crate::render::output::{Aov, default_aovs};
 use crate::render::tile_share::SHARE_TILE;
@@ -56,9 +57,9 @@ impl Merged {
     }
 
     /// Metadata, as for an image rendered at once.
-    pub fn metadata(&self) -> Vec<(String, String)> {
+    pub fn metadata(&self) -> TextEntries {
         let settings = self.header.settings.iter().filter(|(key, _)| key.starts_with("lumiris:")).cloned();
-        let mut metadata: Vec<(String, String)> = settings.collect();
+        let mut metadata: TextEntries = settings.collect();
         let mut add = |key: &str, value: String| metadata.push((format!("lumiris:{key}"), value));
         add("scene", self.header.note(SCENE_NOTE).unwrap_or_default().to_owned());
         if let Some(plan) = self.header.note(PLAN_NOTE) {

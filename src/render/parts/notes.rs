@@ -5,6 +5,7 @@ use super::error::PartError;
 use super::header::{FilmHeader, PLAN_NOTE, list};
 use super::stored::Stored;
 use crate::cameras::Camera;
+use crate::imaging::TextEntries;
 use crate::import::LoadOptions;
 use crate::import::gltf::LightUnits;
 use crate::render::output::{self, Aov};
@@ -87,7 +88,7 @@ impl Asked {
 
     /// Notes, which may differ between parts; some are needed to resume. `plan` is the text of the settings chosen by
     /// measurements.
-    pub(in crate::render) fn notes(&self, plan: Option<String>, camera: &Camera) -> Vec<(String, String)> {
+    pub(in crate::render) fn notes(&self, plan: Option<String>, camera: &Camera) -> TextEntries {
         // One note per option that is given
         let LoadOptions { resolution, crop, environment, scene, camera: camera_name, camera_auto, light_units, time } =
             &self.load;
@@ -116,7 +117,7 @@ impl Asked {
     }
 
     /// Settings that all parts of an image have in common.
-    pub(in crate::render) fn described(&self, job: &RenderJob, settings: &RenderSettings) -> Vec<(String, String)> {
+    pub(in crate::render) fn described(&self, job: &RenderJob, settings: &RenderSettings) -> TextEntries {
         let mut entries = output::metadata(&job.world.scene.film, job.settings());
         entries.push(("lumiris:accel".to_owned(), <&str>::from(self.accel).to_owned()));
         let layers = [(settings.with_features, FEATURES), (settings.with_replicas, "variance")];
@@ -139,7 +140,7 @@ impl Asked {
         ];
         entries.extend(shown.into_iter().filter_map(|(key, value)| Some((key.to_owned(), value?))));
         // Join values with the same name
-        let mut joined: Vec<(String, String)> = Vec::new();
+        let mut joined = TextEntries::new();
         for (key, value) in entries {
             match joined.iter_mut().find(|(other, _)| *other == key) {
                 Some((_, values)) => *values = format!("{values}; {value}"),

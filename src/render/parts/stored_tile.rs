@@ -67,7 +67,8 @@ impl StoredTile {
     pub(super) fn read(decoder: &mut Decoder<'_>, header: &FilmHeader) -> Option<Self> {
         let (image, samples) = (&header.bounds, &header.samples);
         let mut word = || decoder.word();
-        let (bounds, done) = (PixelBounds { x0: word()?, x1: word()?, y0: word()?, y1: word()? }, word()?);
+        let bounds = PixelBounds { x0: word()?, x1: word()?, y0: word()?, y1: word()? };
+        let done = word()?;
         let (layers, replicas, controls) = (word()? as usize, word()? as usize, word()? as usize);
         let is_inside =
             image.x0 <= bounds.x0 && bounds.x1 <= image.x1 && image.y0 <= bounds.y0 && bounds.y1 <= image.y1;

@@ -148,8 +148,9 @@ pub(super) const SAMPLING: Group = Group {
             value_name: "K",
             directive: Directive::Sampler,
             parameters: &["pixelsamples"],
-            help: "Camera samples per pixel; the average over the image where sampling is adaptive (--allocation), and the \
-                   maximum with --noise",
+            help: "Camera samples per pixel. With adaptive sampling (--allocation), the image takes the time of about as many \
+                   in each pixel; if pixels share paths (--path-reuse), this is the minimum, and noisy pixels have 2, 4 or \
+                   8 times as many. With --noise, the maximum",
             ..row!(count("spp", 1, MAX_U32, sampling.spp))
         },
         Setting {
@@ -157,7 +158,7 @@ pub(super) const SAMPLING: Group = Group {
             directive: Directive::Sampler,
             parameters: &["allocation"],
             help: "Distribution of the camera samples over the pixels: the same number for each, or more where a pilot \
-                   measures more noise, in about the same time. Adaptive counts are for the integrators direct and path, \
+                   measures more noise (see --spp). Adaptive counts are for the integrators direct and path, \
                    from 8 samples per pixel on",
             default: "auto: adaptive with --estimator auto, otherwise uniform",
             resolved: Some(|s| Some(Value::Name(s.allocation().into()))),

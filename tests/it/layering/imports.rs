@@ -52,10 +52,9 @@ impl Crate {
         self.sources.iter().filter(names).map(|s| s.file.as_str())
     }
 
-    /// The `mod.rs` files of a module and of the folders in it, with their code.
-    pub(super) fn mod_files<'a>(&'a self, module: &str) -> impl Iterator<Item = (&'a str, &'a str)> {
-        let is_one = move |s: &&Source| s.module.first().is_some_and(|m| m == module) && s.file.ends_with("/mod.rs");
-        self.sources.iter().filter(is_one).map(|s| (s.file.as_str(), s.code.as_str()))
+    /// The `mod.rs` files with their code.
+    pub(super) fn mod_files(&self) -> impl Iterator<Item = (&str, &str)> {
+        self.sources.iter().filter(|s| s.file.ends_with("/mod.rs")).map(|s| (s.file.as_str(), s.code.as_str()))
     }
 
     /// All imports between different modules of the crate.

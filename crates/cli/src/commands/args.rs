@@ -10,7 +10,7 @@ use super::output_options::OutputOptions;
 use super::part_args::{LONGEST, PartArgs};
 use super::settings_args::SettingsArgs;
 use super::watch_args::WatchArgs;
-use clap::builder::{BoolishValueParser, PossibleValuesParser, TypedValueParser};
+use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{ArgAction, Args};
 use lumiris::import::LoadOptions;
 use lumiris::import::gltf::LightUnits;
@@ -24,6 +24,11 @@ use strum::VariantNames;
 pub(super) fn aov() -> impl TypedValueParser<Value = Option<Aov>> {
     let names = Aov::VARIANTS.iter().copied().chain(["none"]);
     PossibleValuesParser::new(names).try_map(|name| if name == "none" { Ok(None) } else { name.parse().map(Some) })
+}
+
+/// Parses `on` and `off`.
+pub(super) fn on_or_off() -> impl TypedValueParser<Value = bool> {
+    PossibleValuesParser::new(["on", "off"]).map(|word| word == "on")
 }
 
 /// The scene, and options that override its settings.
@@ -134,7 +139,7 @@ pub(super) struct RenderArgs {
     /// the metadata
     #[arg(
         long, value_name = "on|off", default_value = "on", action = ArgAction::Set,
-        value_parser = BoolishValueParser::new(), requires = "frames"
+        value_parser = on_or_off(), requires = "frames"
     )]
     pub seed_per_frame: bool,
     /// With --frames: skip frames whose images exist and were not interrupted by Ctrl-C

@@ -68,8 +68,8 @@ pub(super) fn run(args: &BenchArgs) -> anyhow::Result<ExitCode> {
         bail!("bench measures Embree; leave out --accel");
     }
     args.json.as_deref().map_or(Ok(()), check_writable)?;
-    let (mut job, Setup { times, given, .. }) = load_job(&args.scene)?;
-    plan(&args.scene, (&mut job, &given), &Preparation::default(), false)?;
+    let Setup { mut job, times, given, .. } = load_job(&args.scene)?;
+    plan(&args.scene, &mut job, &given, &Preparation::default(), false)?;
 
     // Measure
     let asked = |subject| args.subject == subject || args.subject == Subject::All;

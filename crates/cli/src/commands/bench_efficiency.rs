@@ -148,7 +148,7 @@ pub(super) fn efficiency(scene_args: &SceneArgs, own: &EfficiencyArgs, json: Opt
     for path in std::iter::once(&scene_args.scene).chain(&own.more_scenes) {
         let mut scene = scene_args.clone();
         scene.scene.clone_from(path);
-        let (mut job, Setup { files, .. }) = load_job_of(&scene, &FileCache::default(), None, None)?;
+        let Setup { mut job, files, .. } = load_job_of(&scene, &FileCache::default(), None, None)?;
         let mut base = *job.settings();
         // Texture filtering is the same for cases with other sample counts
         base.sampling.footprint_spp = Some(base.sampling.footprint_spp());
@@ -159,7 +159,7 @@ pub(super) fn efficiency(scene_args: &SceneArgs, own: &EfficiencyArgs, json: Opt
         for &kind in kinds {
             let base = Settings { integrator: base.integrator.of_kind(kind), ..base };
             let mut cases = cases(own, &base);
-            cases.retain(|case| is_possible(case, (&job, path)));
+            cases.retain(|case| is_possible(case, &job, path));
             if cases.is_empty() {
                 continue;
             }
@@ -213,7 +213,7 @@ pub(super) fn efficiency(scene_args: &SceneArgs, own: &EfficiencyArgs, json: Opt
 }
 
 /// True if a case can render the scene; otherwise prints the reason.
-fn is_possible(case: &Case, (job, scene): (&RenderJob, &Path)) -> bool {
+fn is_possible(case: &Case, job: &RenderJob, scene: &Path) -> bool {
     let refusal = exclusions::refusal(job, &case.settings.integrator);
     if let Some(conflict) = refusal {
         progress::say(&format!("{}: {} is left out: {conflict}", scene.display(), case.name));

@@ -5,7 +5,7 @@ use super::progress;
 use anyhow::{Context, bail};
 use lumiris::film::PixelBounds;
 use lumiris::imaging::ColorChannels;
-use lumiris::imaging::oiio::{Part, ReadLimits, read_colors, write_image};
+use lumiris::imaging::oiio::{Part, ReadColors, ReadLimits, read_colors, write_image};
 use lumiris::import::fingerprint::SceneFiles;
 use lumiris::render::RenderSettings;
 use lumiris::render::output::metadata;
@@ -81,7 +81,7 @@ impl<'a> References<'a> {
 
 /// Reads a reference; fails if its size differs from `bounds`.
 fn read(path: &Path, bounds: &PixelBounds) -> anyhow::Result<Colors> {
-    let (read, layer) = read_colors(path, &ReadLimits::default())?;
+    let ReadColors { read, layer } = read_colors(path, &ReadLimits::default())?;
     let image = read.image;
     let asked = [bounds.width() as usize, bounds.height() as usize];
     if [image.width, image.height] != asked {

@@ -4,6 +4,7 @@ use super::progress;
 use crate::compare::{check_page, write_page};
 use anyhow::{Context, bail};
 use clap::{Args, ValueEnum};
+use lumiris::imaging::TextEntries;
 use lumiris::imaging::compare::columns::{column, shown_columns};
 use lumiris::imaging::compare::{COLUMNS, Column, Compared, ImageSet, Metric, Scores, Settings, Shown, compare, load};
 use lumiris::imaging::metrics::bias::Z_95;
@@ -183,7 +184,7 @@ fn settings(args: &CompareArgs) -> Settings {
 }
 
 /// Remarks on the images, each with the name of its image.
-fn remarks(set: &ImageSet, compared: &[Compared]) -> Vec<(String, String)> {
+fn remarks(set: &ImageSet, compared: &[Compared]) -> TextEntries {
     // Remarks on loading
     let mut remarks = Vec::new();
     for shown in set.images.iter().chain([&set.reference]) {

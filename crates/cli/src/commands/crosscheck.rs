@@ -68,8 +68,8 @@ pub(super) fn run(args: &CrosscheckArgs) -> anyhow::Result<ExitCode> {
     check_files(args)?;
 
     // Rays
-    let (mut job, Setup { given, .. }) = load_job(&args.scene)?;
-    plan(&args.scene, (&mut job, &given), &Preparation::default(), true)?;
+    let Setup { mut job, given, .. } = load_job(&args.scene)?;
+    plan(&args.scene, &mut job, &given, &Preparation::default(), true)?;
     let bvh: Box<dyn Accel> =
         Box::new(Bvh::new(Arc::clone(&job.world.scene.geometry), Some(Arc::clone(&job.world.scene.textures) as _)));
     let report = crosscheck(&job, &*bvh, args.rays);

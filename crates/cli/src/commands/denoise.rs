@@ -4,16 +4,16 @@ use super::UsageError;
 use super::denoise_args::{DENOISED, DENOISED_KEY, Denoised, LAYER, open};
 use super::look::LookArgs;
 use super::part_args::is_part;
-use super::pictures::{check_outputs, is_exr, write_display};
+use super::pictures::{Placement, check_outputs, is_exr, write_display};
 use super::progress;
 use super::rescue::write_or_rescue;
 use anyhow::{anyhow, bail};
 use clap::Args;
-use lumiris::imaging::ColorChannels;
 use lumiris::imaging::color_layers::{ColorLayer, choose};
 use lumiris::imaging::file_parts::{FilePart, read_file_parts};
 use lumiris::imaging::oidn::NoisyImage;
 use lumiris::imaging::oiio::{MetaValue, PartHeader, ReadLimits, Storage, write_image};
+use lumiris::imaging::{ColorChannels, TextEntries};
 use std::ops::Range;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -85,7 +85,8 @@ pub(super) fn run(args: &DenoiseFileArgs) -> anyhow::Result<ExitCode> {
             let size = [part.image.width, part.image.height];
             let metadata = [texts(&parts), denoised.metadata_shown()].concat();
             let rows = |rows: Range<usize>| denoised.pixels[3 * size[0] * rows.start..3 * size[0] * rows.end].to_vec();
-            write_display(path, (size, part.origin, part.full), &args.look, &rows, metadata)
+            let placement = Placement { size, origin: part.origin, full: part.full };
+            write_display(path, placement, &args.look, &rows, metadata)
         };
         match write_or_rescue(path, write) {
             Ok(()) => written.push(path.display().to_string()),
@@ -201,7 +202,7 @@ fn shares_paths(parts: &[FilePart]) -> bool {
 }
 
 /// The metadata of the settings.
-fn texts(parts: &[FilePart]) -> Vec<(String, String)> {
+fn texts(parts: &[FilePart]) -> TextEntries {
     let entries = parts.iter().take(1).flat_map(|part| &part.metadata);
     let entries = entries.filter_map(|(name, value)| match value {
         MetaValue::Text(text) if name.starts_with("lumiris:") => Some((name.clone(), text.clone())),

@@ -4,6 +4,7 @@ use super::UsageError;
 use super::part_args::extension;
 use clap::Args;
 use lumiris::film::{Film, PixelBounds};
+use lumiris::imaging::TextEntries;
 use lumiris::imaging::oidn::{DenoiseError, Denoiser, NoisyImage};
 use lumiris::render::output::{Aov, Layers};
 use std::path::{Path, PathBuf};
@@ -50,11 +51,8 @@ impl DenoiseArgs {
 
 /// The denoised image, or an error message: a failure does not lose the rendered image. `has_features`: the film has
 /// the features of the first surfaces.
-pub(super) fn denoise(denoiser: &Denoiser, film: &Film, has_features: bool) -> (Option<Denoised>, Option<String>) {
-    match Denoised::of_film(denoiser, film, has_features) {
-        Ok(denoised) => (Some(denoised), None),
-        Err(error) => (None, Some(format!("{error}; the image is written as it is"))),
-    }
+pub(super) fn denoise(denoiser: &Denoiser, film: &Film, has_features: bool) -> Result<Denoised, String> {
+    Denoised::of_film(denoiser, film, has_features).map_err(|error| format!("{error}; the image is written as it is"))
 }
 
 /// Opens the library named by the option, else by the environment, else the system's.
@@ -112,12 +110,12 @@ impl Denoised {
     }
 
     /// Metadata of files with the layer.
-    pub(super) fn metadata(&self) -> Vec<(String, String)> {
+    pub(super) fn metadata(&self) -> TextEntries {
         vec![(DENOISED_KEY.to_owned(), self.about.clone())]
     }
 
     /// Metadata of files that show the layer instead of the rendered image.
-    pub(super) fn metadata_shown(&self) -> Vec<(String, String)> {
+    pub(super) fn metadata_shown(&self) -> TextEntries {
         let mut metadata = self.metadata();
         metadata.push((SHOWN_KEY.to_owned(), "denoised".to_owned()));
         metadata

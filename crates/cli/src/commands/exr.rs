@@ -5,6 +5,7 @@ use super::named::named;
 use clap::Args;
 use clap::builder::PossibleValuesParser;
 use lumiris::film::Film;
+use lumiris::imaging::TextEntries;
 use lumiris::imaging::oiio::{MetaValue, Part, Storage, write_rows};
 use lumiris::render::cryptomatte::Cryptomatte;
 use lumiris::render::parts::CameraMatrices;
@@ -93,7 +94,7 @@ pub(super) struct ExrLayer<'a> {
     /// Returns the values of a range of rows, interleaved. Row 0 is the first.
     pub rows: Box<dyn Fn(Range<usize>) -> Vec<f32> + 'a>,
     /// Metadata of the layer.
-    pub metadata: Vec<(String, String)>,
+    pub metadata: TextEntries,
     /// True if the values are ids, which need lossless compression.
     pub is_exact: bool,
 }
@@ -105,7 +106,7 @@ pub(super) struct ExrImage<'a> {
     /// Wall-clock time of the rendering (s).
     pub seconds: f64,
     pub layers: Vec<ExrLayer<'a>>,
-    pub metadata: Vec<(String, String)>,
+    pub metadata: TextEntries,
 }
 
 impl ExrArgs {

@@ -1,7 +1,7 @@
 //! `lumiris farm`: an image rendered in parts by the nodes of a cluster.
 
 use super::UsageError;
-use super::args::{RenderArgs, SceneArgs, aov, is_standard_input, parse_fps};
+use super::args::{RenderArgs, SceneArgs, aov, is_standard_input, on_or_off, parse_fps};
 use super::denoise_args::DenoiseArgs;
 use super::exr::ExrArgs;
 use super::farm_scripts::{Job, quoted};
@@ -17,7 +17,6 @@ use super::progress;
 use super::settings::load_scene;
 use super::typed_options::AsTyped;
 use anyhow::{Context, bail};
-use clap::builder::BoolishValueParser;
 use clap::{Args, FromArgMatches, Subcommand};
 use lumiris::import::Loaded;
 use lumiris::import::cache::FileCache;
@@ -54,7 +53,7 @@ struct SlurmArgs {
     #[arg(long, value_name = "F", value_parser = parse_fps, requires = "frames")]
     fps: Option<f32>,
     /// With --frames: whether each frame has its own seed [default: on]
-    #[arg(long, value_name = "on|off", value_parser = BoolishValueParser::new(), requires = "frames")]
+    #[arg(long, value_name = "on|off", value_parser = on_or_off(), requires = "frames")]
     seed_per_frame: Option<bool>,
     /// Number of parts per image; each is a task of an array job [default with --frames: 1]
     #[arg(
@@ -112,7 +111,7 @@ pub(super) fn run(args: &FarmArgs) -> anyhow::Result<ExitCode> {
     }
     check_look(&args.look.args, &args.exr.args)?;
     args.denoise.args.check(&args.output)?;
-    let (first, needs_plan) = check(args)?;
+    let first = check(args)?;
 
     // Choose the folder
     let folder = args.dir.clone().unwrap_or_else(|| default_folder(&args.output[0]));
@@ -123,7 +122,7 @@ pub(super) fn run(args: &FarmArgs) -> anyhow::Result<ExitCode> {
     }
 
     // Write the scripts, and submit or print them
-    let job = job(args, &folder, (&first, needs_plan))?;
+    let job = job(args, &folder, &first)?;
     write_folder(args, &folder, &job)?;
     if args.submit {
         submit(&folder)?;
@@ -159,9 +158,15 @@ fn default_folder(output: &Path) -> PathBuf {
     output.with_file_name(name).with_extension("farm")
 }
 
-/// Rejects options that cannot be rendered in parts, before anything is written. Returns the options of the first
-/// image, and true if a plan must be made.
-fn check(args: &SlurmArgs) -> anyhow::Result<(RenderArgs, bool)> {
+/// The first image.
+struct First {
+    args: RenderArgs,
+    /// True if a plan must be made.
+    needs_plan: bool,
+}
+
+/// Rejects options that cannot be rendered in parts, before anything is written.
+fn check(args: &SlurmArgs) -> anyhow::Result<First> {
     // Parse the options as `lumiris render` will
     let mut words = part_options(args, None);
     words.extend(["--part".to_owned(), format!("1/{}", args.count())]);
@@ -200,7 +205,7 @@ fn check(args: &SlurmArgs) -> anyhow::Result<(RenderArgs, bool)> {
         );
         return Err(UsageError(message).into());
     }
-    Ok((render, needs_plan))
+    Ok(First { args: render, needs_plan })
 }
 
 /// Fails if the scene of a frame is missing. Only the first frame's scene is loaded.
@@ -229,7 +234,8 @@ fn part_options(args: &SlurmArgs, plan: Option<String>) -> Vec<String> {
     words
 }
 
-fn job(args: &SlurmArgs, folder: &Path, (first, needs_plan): (&RenderArgs, bool)) -> anyhow::Result<Job> {
+fn job(args: &SlurmArgs, folder: &Path, first: &First) -> anyhow::Result<Job> {
+    let &First { args: ref first, needs_plan } = first;
     // Paths
     let from = std::env::current_dir().context("there is no current folder")?;
     let program = match &args.program {

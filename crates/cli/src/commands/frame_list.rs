@@ -2,10 +2,12 @@
 
 use super::plan_file::PlanFile;
 use lumiris_numbers::math::hash::pcg4d;
+use std::iter::StepBy;
+use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 
 /// Maximum number of frames per run.
-const MAX_FRAMES: u32 = 1_000_000;
+const MAX_FRAMES: usize = 1_000_000;
 
 /// Constant that is hashed with the seed and the frame number to give the frame's seed.
 const FRAME_SEED: u32 = 0x66_72_61_6d;
@@ -42,18 +44,17 @@ pub(super) fn parse_frames(text: &str) -> Result<FrameList, String> {
     let mut frames = Vec::new();
     let mut seen = std::collections::HashSet::new();
     for range in text.split(',') {
-        let (first, last, step) = parse_range(range.trim())?;
-        if (last - first) / step >= MAX_FRAMES {
+        let numbers = parse_range(range.trim())?;
+        if numbers.size_hint().0 > MAX_FRAMES {
             return Err(format!("`{range}` is more than {MAX_FRAMES} frames"));
         }
-        let numbers = (first..=last).step_by(step as usize);
         frames.extend(numbers.filter(|n| seen.insert(*n)));
     }
     Ok(FrameList(frames))
 }
 
-/// First, last and step of a range.
-fn parse_range(text: &str) -> Result<(u32, u32, u32), String> {
+/// The numbers of a range.
+fn parse_range(text: &str) -> Result<StepBy<RangeInclusive<u32>>, String> {
     // A number with its error message
     let number = |digits: &str| {
         let digits = digits.trim();
@@ -74,7 +75,7 @@ fn parse_range(text: &str) -> Result<(u32, u32, u32), String> {
     if first > last || step == 0 {
         return Err(format!("`{text}` holds no frame"));
     }
-    Ok((first, last, step))
+    Ok((first..=last).step_by(step as usize))
 }
 
 /// True if the name contains `#`, the placeholder for the frame number.

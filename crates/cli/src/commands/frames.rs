@@ -83,7 +83,7 @@ pub(super) fn run(args: &RenderArgs, list: &FrameList) -> anyhow::Result<ExitCod
 /// each other.
 fn check_names(args: &RenderArgs) -> Result<(), UsageError> {
     let scene = Some(&args.scene.scene).filter(|scene| !is_animated(args, scene));
-    let checkpoint = args.parts.checkpoint.as_ref().map(|(path, _)| path);
+    let checkpoint = args.parts.checkpoint.as_ref().map(|checkpoint| &checkpoint.path);
     check_numbers(args.output.iter().chain(scene).chain(checkpoint).chain(&args.parts.resume))
 }
 
@@ -112,7 +112,7 @@ fn of_frame(args: &RenderArgs, frame: u32) -> RenderArgs {
     if is_animated(&args, &args.scene.scene) {
         args.scene.time_in_scene = Some(frame as f32 / args.fps);
     }
-    let checkpoint = args.parts.checkpoint.as_mut().map(|(path, _)| path);
+    let checkpoint = args.parts.checkpoint.as_mut().map(|checkpoint| &mut checkpoint.path);
     let names = [&mut args.scene.scene].into_iter().chain(&mut args.output);
     names.chain(checkpoint).chain(&mut args.parts.resume).for_each(|path| *path = numbered(path, frame));
     args.scene.frame = Some(FrameOf { seed_by: Some(frame).filter(|_| args.seed_per_frame), plan: None });

@@ -31,7 +31,7 @@ pub(super) fn run(args: &InfoArgs) -> anyhow::Result<ExitCode> {
     let facts = match facts_of_file(&args.scene.scene)? {
         Some(facts) => facts,
         None => {
-            let (job, Setup { times, .. }) = load_job(&args.scene)?;
+            let Setup { job, times, .. } = load_job(&args.scene)?;
             let mut facts = facts(&job);
             facts["seconds"] = json!({ "load": times.load, "build": times.build });
             facts["scene"] = json!(args.scene.scene.display().to_string());
@@ -47,7 +47,7 @@ pub(super) fn run(args: &InfoArgs) -> anyhow::Result<ExitCode> {
         progress::print(&serde_json::to_string_pretty(&facts)?)?;
     } else {
         let mut text = String::new();
-        list(&facts, (0, false), &mut text);
+        list(&facts, 0, false, &mut text);
         progress::print(text.trim_end())?;
     }
     Ok(ExitCode::SUCCESS)
@@ -153,7 +153,7 @@ fn geometry_bytes(scene: &Scene) -> u64 {
 const VERBATIM: [&str; 2] = ["layers", "metadata"];
 
 /// Writes a JSON object as an indented list. Underscores in keys become spaces, except for verbatim keys.
-fn list(value: &Value, (indent, is_verbatim): (usize, bool), out: &mut String) {
+fn list(value: &Value, indent: usize, is_verbatim: bool, out: &mut String) {
     let Value::Object(map) = value else { return };
     for (key, value) in map {
         let words = if is_verbatim { key.clone() } else { key.replace('_', " ") };
@@ -161,7 +161,7 @@ fn list(value: &Value, (indent, is_verbatim): (usize, bool), out: &mut String) {
         match value {
             Value::Object(_) => {
                 *out += &format!("{name}\n");
-                list(value, (indent + 2, VERBATIM.contains(&key.as_str())), out);
+                list(value, indent + 2, VERBATIM.contains(&key.as_str()), out);
             }
             Value::String(text) => *out += &format!("{name:<34}{text}\n"),
             other => *out += &format!("{name:<34}{other}\n"),

@@ -1,8 +1,9 @@
 //! `lumiris info` for rendered files: images, parts and checkpoints.
 
 use super::pictures::is_picture;
+use lumiris::film::Summary;
 use lumiris::imaging::oiio::{read_headers, read_metadata};
-use lumiris::render::parts::{FilmHeader, FilmReader, PartError};
+use lumiris::render::parts::{FilmHeader, FilmReader, PartError, merge};
 use serde_json::{Map, Value, json};
 use std::path::Path;
 
@@ -37,7 +38,7 @@ fn facts_of_image(path: &Path) -> anyhow::Result<Value> {
     let [width, height] = headers.first().map_or([0, 0], |part| part.size);
 
     // Separate the settings from other metadata
-    let (settings, others) = divided(read_metadata(path)?);
+    let Divided { settings, others } = divided(read_metadata(path)?);
     Ok(json!({
         "image": path.display().to_string(),
         "size": format!("{width}x{height}"),
@@ -49,12 +50,13 @@ fn facts_of_image(path: &Path) -> anyhow::Result<Value> {
 }
 
 fn facts_of_part(path: &Path, header: &FilmHeader) -> Value {
-    let (settings, others) = divided(header.settings.iter().chain(&header.notes).cloned());
+    let Divided { settings, others } = divided(header.settings.iter().chain(&header.notes).cloned());
     let share = header.share.map(|share| format!("{} of {}", share.index + 1, share.count));
     json!({
         "part": path.display().to_string(),
         "size": format!("{}x{}", header.bounds.width(), header.bounds.height()),
         "samples": format!("{} to {} of {}", header.samples.start, header.samples.end, header.spp),
+        "samples done": samples_done(path, header),
         "share of tiles": share.unwrap_or_else(|| "all".to_owned()),
         "is complete": header.is_finished,
         "light groups": header.light_layers.join(" "),
@@ -63,8 +65,21 @@ fn facts_of_part(path: &Path, header: &FilmHeader) -> Value {
     })
 }
 
+/// The samples of the pixels so far, or the reason why they cannot be read.
+fn samples_done(path: &Path, header: &FilmHeader) -> String {
+    let of = if header.share.is_some() { Summary::samples_text_of_sampled } else { Summary::samples_text };
+    merge(&[path.to_owned()], true)
+        .map_or_else(|error| error.to_string(), |merged| of(merged.film.summary(), "per pixel"))
+}
+
+/// Metadata, by whether it is a setting of the renderer.
+struct Divided {
+    settings: Map<String, Value>,
+    others: Map<String, Value>,
+}
+
 /// Splits metadata into the renderer's settings and everything else. A plan is parsed as JSON.
-fn divided(entries: impl IntoIterator<Item = (String, String)>) -> (Map<String, Value>, Map<String, Value>) {
+fn divided(entries: impl IntoIterator<Item = (String, String)>) -> Divided {
     let (mut settings, mut others) = (Map::new(), Map::new());
     for (key, text) in entries {
         let is_plan = key.trim_start_matches(PREFIX) == "plan";
@@ -75,5 +90,5 @@ fn divided(entries: impl IntoIterator<Item = (String, String)>) -> (Map<String, 
             None => others.insert(key, value),
         };
     }
-    (settings, others)
+    Divided { settings, others }
 }

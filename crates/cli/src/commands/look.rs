@@ -4,9 +4,9 @@ use super::UsageError;
 use anyhow::Context;
 use clap::Args;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
-use lumiris::imaging::ViewTransform;
 use lumiris::imaging::oiio::{OcioView, ocio_display};
 use lumiris::imaging::view_transform::auto_exposure;
+use lumiris::imaging::{TextEntries, ViewTransform};
 use strum::VariantNames;
 
 /// Common OpenColorIO names of the linear Rec.709 colour space, in which images are stored.
@@ -70,7 +70,7 @@ pub(super) struct Displayed {
     /// RGB, interleaved, 0..1.
     pub pixels: Vec<f32>,
     /// Exposure and view transform, as metadata.
-    pub metadata: Vec<(String, String)>,
+    pub metadata: TextEntries,
 }
 
 /// Exposure and a built-in curve.
@@ -90,12 +90,12 @@ impl Grade {
     }
 
     /// Exposure and view transform, as metadata.
-    pub(super) fn metadata(&self) -> Vec<(String, String)> {
+    pub(super) fn metadata(&self) -> TextEntries {
         metadata(self.stops, <&str>::from(self.curve).to_owned())
     }
 }
 
-fn metadata(stops: f32, view: String) -> Vec<(String, String)> {
+fn metadata(stops: f32, view: String) -> TextEntries {
     let entry = |key: &str, value: String| (format!("lumiris:{key}"), value);
     vec![entry("exposure", stops.to_string()), entry("view_transform", view)]
 }

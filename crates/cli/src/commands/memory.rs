@@ -35,8 +35,10 @@ pub(super) fn limit(given: Option<MemoryLimit>) -> Option<Limit> {
     match given {
         Some(MemoryLimit::Off) => None,
         Some(MemoryLimit::Bytes(bytes)) => Some(Limit { bytes, origin: "--memory-limit allows".to_owned() }),
-        None => available()
-            .map(|(bytes, origin)| Limit { bytes: resident() + bytes, origin: format!("there is ({origin})") }),
+        None => available().map(|Available { bytes, source }| Limit {
+            bytes: resident() + bytes,
+            origin: format!("there is ({source})"),
+        }),
     }
 }
 
@@ -73,15 +75,21 @@ pub(super) fn check(limit: Option<MemoryLimit>, prediction: &Prediction) -> anyh
     Ok(())
 }
 
-/// Available memory (bytes) with its source: the machine's, or less if a control group limits it.
-fn available() -> Option<(u64, String)> {
+/// Available memory.
+struct Available {
+    bytes: u64,
+    source: String,
+}
+
+/// The available memory of the machine, or less if a control group limits it.
+fn available() -> Option<Available> {
     let text = fs::read_to_string("/proc/meminfo").ok()?;
-    let machine = (kibibytes(&text, "MemAvailable:")?, "MemAvailable of /proc/meminfo".to_owned());
+    let bytes = kibibytes(&text, "MemAvailable:")?;
+    let machine = Available { bytes, source: "MemAvailable of /proc/meminfo".to_owned() };
     let groups = group_folders().into_iter().filter_map(|folder| {
-        let left = left_in(&folder)?;
-        Some((left, format!("the control group {}", folder.display())))
+        Some(Available { bytes: left_in(&folder)?, source: format!("the control group {}", folder.display()) })
     });
-    groups.chain([machine]).min_by_key(|(bytes, _)| *bytes)
+    groups.chain([machine]).min_by_key(|available| available.bytes)
 }
 
 /// Folders of this process's control group (version 2) and of its ancestors.

@@ -87,7 +87,8 @@ fn merge_one(args: &MergeArgs, denoiser: Option<&Denoiser>) -> anyhow::Result<()
 
     // Merge and denoise
     let merged = merge(&args.parts, args.allow_missing)?;
-    let (denoised, not_denoised) = denoise(denoiser, &merged);
+    let denoised = denoiser.map(|denoiser| denoise(denoiser, &merged)).transpose();
+    let (denoised, not_denoised) = (denoised.as_ref().ok().and_then(Option::as_ref), denoised.as_ref().err());
     let picture = Picture {
         film: &merged.film,
         look: &args.look,
@@ -95,7 +96,7 @@ fn merge_one(args: &MergeArgs, denoiser: Option<&Denoiser>) -> anyhow::Result<()
         aovs: merged.aovs(),
         sample_count_map: None,
         cryptomattes: &[],
-        denoised: denoised.as_ref(),
+        denoised,
         camera: CameraMatrices::from_notes(|name| merged.header.note(name)),
         seconds: merged.seconds,
         metadata: merged.metadata(),
@@ -103,7 +104,7 @@ fn merge_one(args: &MergeArgs, denoiser: Option<&Denoiser>) -> anyhow::Result<()
 
     // Write the image
     let Written { paths, mut misplaced } = write_all(&picture, &args.output);
-    misplaced.extend(not_denoised);
+    misplaced.extend(not_denoised.cloned());
     report(args, &merged, &paths);
     if !misplaced.is_empty() {
         bail!(misplaced.join("\nlumiris: "));
@@ -111,9 +112,8 @@ fn merge_one(args: &MergeArgs, denoiser: Option<&Denoiser>) -> anyhow::Result<()
     Ok(())
 }
 
-/// The denoised image, if requested, or an error message: a failure does not lose the merged image.
-fn denoise(denoiser: Option<&Denoiser>, merged: &Merged) -> (Option<Denoised>, Option<String>) {
-    let Some(denoiser) = denoiser else { return (None, None) };
+/// The denoised image, or an error message: a failure does not lose the merged image.
+fn denoise(denoiser: &Denoiser, merged: &Merged) -> Result<Denoised, String> {
     if !merged.has_features() {
         progress::say("warning: the parts have neither albedo nor normal: denoised by colour, which loses detail");
     }

@@ -43,7 +43,7 @@ pub(super) struct PartArgs {
     pub samples_to: Option<u32>,
     /// Store the state needed to resume, at this interval [default: 60 s] and at the end
     #[arg(long, value_name = "FILE[,SECONDS]", value_parser = parse_checkpoint)]
-    pub checkpoint: Option<(PathBuf, f64)>,
+    pub checkpoint: Option<CheckpointArg>,
     /// Resume from a checkpoint or an unfinished part, with its settings; --spp may ask for more samples. If
     /// --checkpoint names the same file and it does not exist yet, start from the beginning
     #[arg(long, value_name = "FILE")]
@@ -61,6 +61,13 @@ impl PartArgs {
     }
 }
 
+/// A file for checkpoints, and the time between them (s).
+#[derive(Clone, Debug)]
+pub(super) struct CheckpointArg {
+    pub path: PathBuf,
+    pub seconds: f64,
+}
+
 fn parse_part(text: &str) -> Result<[u32; 2], String> {
     let parsed = text.split_once('/').and_then(|(i, n)| Some([i.trim().parse().ok()?, n.trim().parse().ok()?]));
     match parsed {
@@ -69,14 +76,14 @@ fn parse_part(text: &str) -> Result<[u32; 2], String> {
     }
 }
 
-fn parse_checkpoint(text: &str) -> Result<(PathBuf, f64), String> {
+fn parse_checkpoint(text: &str) -> Result<CheckpointArg, String> {
     let with_seconds = text.rsplit_once(',').and_then(|(path, seconds)| Some((path, seconds.trim().parse().ok()?)));
     match with_seconds {
         Some((path, seconds)) if seconds > 0.0 && f64::is_finite(seconds) && !path.is_empty() => {
-            Ok((PathBuf::from(path), seconds.min(LONGEST)))
+            Ok(CheckpointArg { path: PathBuf::from(path), seconds: seconds.min(LONGEST) })
         }
         Some(_) => Err("expected FILE or FILE,SECONDS with a positive number of seconds".to_owned()),
-        None => Ok((PathBuf::from(text), CHECKPOINT_SECONDS)),
+        None => Ok(CheckpointArg { path: PathBuf::from(text), seconds: CHECKPOINT_SECONDS }),
     }
 }
 

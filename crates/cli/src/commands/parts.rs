@@ -43,7 +43,7 @@ pub(super) fn check(args: &RenderArgs) -> anyhow::Result<()> {
     }
     // The names of frames are not expanded yet
     let checkpoint = parts.checkpoint.as_ref().filter(|_| args.frames.is_none());
-    checkpoint.map_or(Ok(()), |(path, _)| check_destination(path).map(drop))?;
+    checkpoint.map_or(Ok(()), |checkpoint| check_destination(&checkpoint.path).map(drop))?;
     Ok(())
 }
 
@@ -59,7 +59,7 @@ pub(super) fn check_settings(args: &RenderArgs, settings: &Settings) -> Result<(
 
 /// The stored state to resume from, if any.
 pub(super) fn stored(args: &PartArgs) -> anyhow::Result<Option<Stored>> {
-    let checkpoint = args.checkpoint.as_ref().map(|(path, _)| path.as_path());
+    let checkpoint = args.checkpoint.as_ref().map(|checkpoint| checkpoint.path.as_path());
     let stored = args.resume.as_ref().map(|path| Stored::read(path, checkpoint)).transpose()?;
     Ok(stored.flatten())
 }
@@ -95,7 +95,9 @@ fn asked(args: &RenderArgs) -> Asked {
 /// cannot be resumed from the stored state.
 pub(super) fn film_file(
     args: &RenderArgs,
-    (job, plan, files): (&RenderJob, &PlanFile, &SceneFiles),
+    job: &RenderJob,
+    plan: &PlanFile,
+    files: &SceneFiles,
     settings: &mut RenderSettings,
     stored: Option<Stored>,
 ) -> anyhow::Result<Option<FilmFile>> {
@@ -107,7 +109,7 @@ pub(super) fn film_file(
         return Ok(None);
     }
     let checkpoint = args.parts.checkpoint.as_ref();
-    let checkpoint = checkpoint.map(|(path, seconds)| (path.clone(), Duration::from_secs_f64(*seconds)));
+    let checkpoint = checkpoint.map(|c| (c.path.clone(), Duration::from_secs_f64(c.seconds)));
     let plan = if plan.settings.is_empty() { None } else { Some(plan.text()?) };
     let storage = Storage { checkpoint, keeps_sums, stored, plan };
     Ok(Some(FilmFile::new(&asked(args), job, files, settings, spp, storage, progress::say)?))

@@ -10,6 +10,7 @@ use super::plan_file::{PLAN_KEY, PlanFile};
 use super::progress;
 use super::rescue::write_or_rescue;
 use lumiris::film::Film;
+use lumiris::imaging::TextEntries;
 use lumiris::imaging::oiio::{self, Part, ROWS_AT_ONCE};
 use lumiris::render::Rendering;
 use lumiris::render::cryptomatte::Layer;
@@ -140,7 +141,7 @@ pub(super) struct Picture<'a> {
     /// Wall-clock time of the rendering (s).
     pub seconds: f64,
     /// Settings and provenance of the image.
-    pub metadata: Vec<(String, String)>,
+    pub metadata: TextEntries,
 }
 
 impl Picture<'_> {
@@ -160,7 +161,7 @@ impl Picture<'_> {
             Some(denoised) => denoised.pixels[3 * size[0] * rows.start..3 * size[0] * rows.end].to_vec(),
             None => image.rows_in_parallel(film.bounds.y0 + rows.start as u32..film.bounds.y0 + rows.end as u32),
         };
-        write_display(path, (size, origin, full), self.look, &rows, metadata)
+        write_display(path, Placement { size, origin, full }, self.look, &rows, metadata)
     }
 
     fn write_exr(&self, path: &Path) -> anyhow::Result<()> {
@@ -220,14 +221,24 @@ impl Picture<'_> {
     }
 }
 
-/// Writes a display image: its size, the position of its first pixel in the full image, and the size of the full image.
-/// `rows` returns radiance of a range of rows: RGB, interleaved.
+/// The pixels of an image within the full image.
+#[derive(Clone, Copy)]
+pub(super) struct Placement {
+    /// Columns and rows.
+    pub size: [usize; 2],
+    /// Position of the first pixel.
+    pub origin: [usize; 2],
+    /// Size of the full image.
+    pub full: [usize; 2],
+}
+
+/// Writes a display image. `rows` returns radiance of a range of rows: RGB, interleaved.
 pub(super) fn write_display(
     path: &Path,
-    (size, origin, full): ([usize; 2], [usize; 2], [usize; 2]),
+    Placement { size, origin, full }: Placement,
     look: &LookArgs,
     rows: &dyn Fn(Range<usize>) -> Vec<f32>,
-    metadata: Vec<(String, String)>,
+    metadata: TextEntries,
 ) -> anyhow::Result<()> {
     let names = ["R", "G", "B"].map(str::to_owned).to_vec();
     let part = Part::display(size[0], size[1], names, Vec::new()).with_window(origin, full).with_metadata(metadata);
@@ -275,7 +286,7 @@ impl Made<'_> {
     }
 
     /// Settings and provenance of the image.
-    fn metadata(&self) -> anyhow::Result<Vec<(String, String)>> {
+    fn metadata(&self) -> anyhow::Result<TextEntries> {
         let Made { args, job, rendering, .. } = self;
         let mut metadata = output::metadata(&job.world.scene.film, job.settings());
         let mut add = |key: &str, value: String| metadata.push((key.to_owned(), value));

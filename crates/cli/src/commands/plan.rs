@@ -25,10 +25,10 @@ pub(super) struct PlanArgs {
 
 pub(super) fn run(args: &PlanArgs) -> anyhow::Result<ExitCode> {
     check_writable(&args.output)?;
-    let (mut job, Setup { given, .. }) = load_job(&args.scene)?;
+    let Setup { mut job, given, .. } = load_job(&args.scene)?;
     let expect = |time| expect_trials(time, false);
     let how = Preparation { tunes: true, expect: &expect, stop: interrupt::stop(), ..Preparation::default() };
-    let file = plan(&args.scene, (&mut job, &given), &how, true)?;
+    let file = plan(&args.scene, &mut job, &given, &how, true)?;
     write_text(&args.output, &serde_json::to_string_pretty(&file)?)
         .with_context(|| format!("cannot write {}", args.output.display()))?;
     if let Ok(Some(tuning)) = serde_json::from_value::<Option<Tuning>>(file.tuning.clone()) {

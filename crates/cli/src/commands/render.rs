@@ -2,7 +2,7 @@
 
 use super::UsageError;
 use super::args::{RenderArgs, is_standard_input};
-use super::denoise_args::denoise;
+use super::denoise_args::{Denoised, denoise};
 use super::interrupt::{self, During, INTERRUPTED};
 use super::laps::{self, Laps};
 use super::libraries::Loading;
@@ -30,10 +30,10 @@ use lumiris::render::FilmFile;
 use lumiris::render::cryptomatte::cryptomattes;
 use lumiris::render::memory::{Wanted, predict};
 use lumiris::render::output::{self, Aov};
-use lumiris::render::parts::PLAN_NOTE;
+use lumiris::render::parts::{PLAN_NOTE, Stored};
 use lumiris::render::{CacheReport, Continuation, Progress, RenderError, RenderSettings, Rendering, TileShare, resume};
 use lumiris::scene::RenderJob;
-use lumiris::settings::{IntegratorKind, IntegratorSettings};
+use lumiris::settings::{Given, IntegratorKind, IntegratorSettings};
 use lumiris_formats::output::{check_writable, write_text};
 use serde_json::json;
 use std::path::{Path, PathBuf};
@@ -108,6 +108,13 @@ impl Session {
         }
         Ok(Session { files, denoiser, watch })
     }
+
+    /// The denoised image, if requested, or an error message.
+    fn denoised(&self, film: &Film) -> Result<Option<Denoised>, String> {
+        let Some(denoiser) = &self.denoiser else { return Ok(None) };
+        progress::stage("denoising", None);
+        denoise(denoiser, film, true).map(Some)
+    }
 }
 
 /// Renders an image and writes it. `start` is the start of its time. Files that could not be written are not an error,
@@ -122,68 +129,77 @@ pub(super) fn render_one(args: &RenderArgs, session: &Session, start: Instant) -
     let asked = check(args)?;
     let clock = Clock { start, limit: args.time.map(Duration::from_secs_f64) };
     let bar = Bar::new(args.quiet, clock);
-    let (mut job, Setup { times: setup, files, given }) =
+    let Setup { mut job, times, files, given } =
         load_job_of(&args.scene, &session.files, stored.as_ref(), clock.limit)?;
     parts::check_settings(args, job.settings())?;
-    check_memory(args, &job, asked.as_deref())?;
+    let outputs = outputs(args, &job);
+    let kept = Kept {
+        asked: asked.as_deref(),
+        has_exr: outputs.iter().any(|path| is_exr(path)),
+        has_sums: stored.is_some() || args.parts.checkpoint.is_some() || outputs.iter().any(|path| is_part(path)),
+    };
+    check_memory(args, &job, &kept)?;
     if args.denoise.denoise && job.settings().integrator.path_reuse.is_none() {
         // A denoiser would keep noise that is correlated between pixels
         job.change(|s| s.integrator.path_reuse = Some(1));
     }
-    let settings = settings_of(args, &job, asked.as_deref());
+    let settings = settings_of(args, &job, &kept);
     let canvas = session.watch.begin(&name_of(args), &job.world.scene.film, settings.with_features);
     if let (Some(canvas), true) = (&canvas, has_pilot(job.settings())) {
-        watch::preview(canvas, (&job, &settings), interrupt::stop())?;
+        watch::preview(canvas, &job, &settings, interrupt::stop())?;
     }
     let begin = Instant::now();
-    // A continued rendering uses the stored pilots
-    let limit = clock.limit.filter(|_| stored.is_none());
-    let deadline = limit.and_then(|limit| pilot_deadline(start, limit));
-    let ratio_map = asked.as_ref().is_some_and(|list| list.contains(&Aov::Ratio));
-    let expect = |time| expect_trials(time, args.quiet);
-    let is_planned = args.scene.frame.as_ref().is_some_and(|frame| frame.plan.is_some());
-    let tunes = args.tune && stored.is_none() && !is_planned;
-    let how =
-        Preparation { ratio_map, tunes, deadline, expect: &expect, stop: interrupt::stop(), ..Preparation::default() };
-    let mut plan = plan(&args.scene, (&mut job, &given), &how, args.quiet)?;
-    if plan.settings.is_empty() {
-        // A rendering continued from a checkpoint keeps the choices of its beginning
-        let text = stored.as_ref().and_then(|stored| stored.header.note(PLAN_NOTE));
-        plan = text.and_then(|text| serde_json::from_str(text).ok()).unwrap_or(plan);
-    }
+    let plan = choose(args, &mut job, &given, stored.as_ref(), &kept, &clock)?;
     if let Some(canvas) = &canvas {
         let _ = canvas.summary.set(job.settings().summary());
     }
-    let setup = SetupTimes { prepare: begin.elapsed().as_secs_f64(), ..setup };
-    let outputs = outputs(args, &job);
+    let setup = SetupTimes { prepare: begin.elapsed().as_secs_f64(), ..times };
     if args.output.is_empty() {
         check_outputs(&outputs)?;
     }
     check_denoise(args, &outputs)?;
     args.output_options.check(&outputs);
-    note_layers(args, &job, (&outputs, asked.as_deref()));
-
-    let mut settings = settings_of(args, &job, asked.as_deref());
-    let mut film_file = parts::film_file(args, (&job, &plan, &files), &mut settings, stored)?;
+    let mut settings = settings_of(args, &job, &kept);
+    if !settings.with_light_layers && kept.needs(LIGHT_GROUPS) && light_layers::count(&job) > 0 && !args.quiet {
+        progress::say_once("note: only EXR files have the layers of light groups: -o image.exr");
+    }
+    let mut film_file = parts::film_file(args, &job, &plan, &files, &mut settings, stored)?;
     settings.time_limit = clock.left();
     let continuation = film_file.as_mut().map_or_else(Continuation::default, FilmFile::continuation);
     laps::end("prepare", &[]);
     let loading = Loading::begin(outputs.iter().any(|path| !is_part(path)));
-    let rendering = render_shown((&job, &settings), (canvas.as_ref(), &bar), continuation, preparing)?;
+    let rendering = render_shown(&job, &settings, canvas.as_ref(), &bar, continuation, preparing)?;
     session.files.take_texture_warnings().iter().for_each(|warning| progress::say(&format!("warning: {warning}")));
     laps::end("passes", &[&rendering.phases[..], &[loading.end()]].concat());
     if interrupt::is_stopped() && rendering.film.summary().samples[1] == 0 {
         return Err(RenderError::Stopped.into());
     }
 
-    let (written, denoising) =
-        write_results(args, (&job, &plan, &rendering), (session, &settings), (film_file.as_mut(), outputs))?;
+    // Only EXR files store Cryptomattes
+    let kinds = if kept.has_exr { &args.exr.cryptomatte[..] } else { &[] };
+    let cryptomattes = cryptomattes(&job, &settings, &rendering.film, kinds)?;
+    let begin = Instant::now();
+    let denoised = session.denoised(&rendering.film);
+    let denoising = begin.elapsed();
+    let not_denoised = denoised.as_ref().err().cloned();
+    let made = Made {
+        args,
+        job: &job,
+        plan: &plan,
+        rendering: &rendering,
+        asked: asked.as_deref(),
+        cryptomattes,
+        denoised: denoised.ok().flatten(),
+        is_interrupted: interrupt::is_stopped(),
+    };
+    let mut written = write_results(&made, film_file.as_mut(), outputs)?;
+    written.misplaced.extend(not_denoised);
     drop(bar);
     laps::end("output", &[]);
     let laps = laps::take();
     let times = Times { setup, denoising, all: start.elapsed() };
-    report(args, (&job, &rendering), (&times, &laps, &written.paths));
-    let mut stats = stats(args, &job, &rendering, (setup, &laps));
+    report(args, &job, &rendering, &times, &laps, &written.paths);
+    let mut stats = stats(args, &job, &rendering, setup, &laps);
     stats["checkpoints"] = parts::stats(film_file.as_ref());
     Ok(Rendered {
         stats,
@@ -195,29 +211,66 @@ pub(super) fn render_one(args: &RenderArgs, session: &Session, start: Instant) -
     })
 }
 
-/// Prints a note, once, if no output stores the layers of light groups.
-fn note_layers(args: &RenderArgs, job: &RenderJob, (outputs, asked): (&[PathBuf], Option<&[Aov]>)) {
-    let is_wanted = asked.is_none_or(|list| list.contains(&Aov::LightGroups));
-    let is_kept = outputs.iter().any(|path| is_exr(path) || is_part(path)) || args.parts.checkpoint.is_some();
-    if light_layers::count(job) > 0 && is_wanted && !is_kept && !args.quiet {
-        progress::say_once("note: only EXR files have the layers of light groups: -o image.exr");
+/// Makes the choices that the settings leave open.
+fn choose(
+    args: &RenderArgs,
+    job: &mut RenderJob,
+    given: &Given,
+    stored: Option<&Stored>,
+    kept: &Kept<'_>,
+    clock: &Clock,
+) -> anyhow::Result<PlanFile> {
+    // A continued rendering uses the stored pilots
+    let limit = clock.limit.filter(|_| stored.is_none());
+    let deadline = limit.and_then(|limit| pilot_deadline(clock.start, limit));
+    let ratio_map = kept.asked.is_some_and(|list| list.contains(&Aov::Ratio));
+    let expect = |time| expect_trials(time, args.quiet);
+    let is_planned = args.scene.frame.as_ref().is_some_and(|frame| frame.plan.is_some());
+    let tunes = args.tune && stored.is_none() && !is_planned;
+    let how =
+        Preparation { ratio_map, tunes, deadline, expect: &expect, stop: interrupt::stop(), ..Preparation::default() };
+    let plan = plan(&args.scene, job, given, &how, args.quiet)?;
+    if plan.settings.is_empty() {
+        // A rendering continued from a checkpoint keeps the choices of its beginning
+        let text = stored.and_then(|stored| stored.header.note(PLAN_NOTE));
+        return Ok(text.and_then(|text| serde_json::from_str(text).ok()).unwrap_or(plan));
+    }
+    Ok(plan)
+}
+
+/// True for the layers of light groups.
+const LIGHT_GROUPS: fn(&Aov) -> bool = |aov| *aov == Aov::LightGroups;
+
+/// What the outputs of an image store.
+struct Kept<'a> {
+    /// The requested AOVs; all if `None`.
+    asked: Option<&'a [Aov]>,
+    /// True if one is an EXR file.
+    has_exr: bool,
+    /// True if one has sums, which are a part or a checkpoint.
+    has_sums: bool,
+}
+
+impl Kept<'_> {
+    fn needs(&self, is_shown: fn(&Aov) -> bool) -> bool {
+        self.asked.is_none_or(|list| list.iter().any(is_shown))
     }
 }
 
 /// The render settings for the requested AOVs.
-fn settings_of(args: &RenderArgs, job: &RenderJob, asked: Option<&[Aov]>) -> RenderSettings {
-    let needs = |is_shown: fn(&Aov) -> bool| asked.is_none_or(|list| list.iter().any(is_shown));
+fn settings_of(args: &RenderArgs, job: &RenderJob, kept: &Kept<'_>) -> RenderSettings {
     RenderSettings {
         time_limit: args.time.map(Duration::from_secs_f64),
-        with_replicas: needs(|aov| *aov == Aov::Variance),
-        with_features: args.denoise.denoise || needs(|aov| aov.is_feature()),
+        with_replicas: kept.needs(|aov| *aov == Aov::Variance),
+        with_features: args.denoise.denoise || kept.needs(|aov| aov.is_feature()),
+        with_light_layers: kept.has_sums || kept.has_exr && kept.needs(LIGHT_GROUPS),
         ..render_settings(&args.scene, job)
     }
 }
 
 /// Refuses an image that does not fit in memory.
-fn check_memory(args: &RenderArgs, job: &RenderJob, asked: Option<&[Aov]>) -> anyhow::Result<()> {
-    let mut render = settings_of(args, job, asked);
+fn check_memory(args: &RenderArgs, job: &RenderJob, kept: &Kept<'_>) -> anyhow::Result<()> {
+    let mut render = settings_of(args, job, kept);
     if let Some([i, n]) = args.parts.part.filter(|_| args.parts.is_by_tiles()) {
         render.share = Some(TileShare { index: i - 1, count: n });
     }
@@ -226,38 +279,17 @@ fn check_memory(args: &RenderArgs, job: &RenderJob, asked: Option<&[Aov]>) -> an
     memory::check(args.memory_limit, &predict(job, &wanted))
 }
 
-/// Denoises a rendering and writes its images and parts. Also returns the time spent on denoising.
-fn write_results(
-    args: &RenderArgs,
-    (job, plan, rendering): (&RenderJob, &PlanFile, &Rendering),
-    (session, settings): (&Session, &RenderSettings),
-    (film_file, outputs): (Option<&mut FilmFile>, Vec<PathBuf>),
-) -> anyhow::Result<(Written, Duration)> {
-    // Only EXR files store Cryptomattes
-    let has_exr = outputs.iter().any(|path| is_exr(path));
-    let kinds = if has_exr { &args.exr.cryptomatte[..] } else { &[] };
-    let cryptomattes = cryptomattes(job, settings, &rendering.film, kinds)?;
-    let begin = Instant::now();
-    if session.denoiser.is_some() {
-        progress::stage("denoising", None);
-    }
-    let denoised = session.denoiser.as_ref().map(|denoiser| denoise(denoiser, &rendering.film, true));
-    let (denoised, not_denoised) = denoised.unwrap_or_default();
-    let denoising = begin.elapsed();
+/// Writes the images and parts of a rendering.
+fn write_results(made: &Made<'_>, film_file: Option<&mut FilmFile>, outputs: Vec<PathBuf>) -> anyhow::Result<Written> {
     progress::stage("writing", None);
-    let asked = asked_aovs(args)?;
-    let asked = asked.as_deref();
-    let is_interrupted = interrupt::is_stopped();
-    let made = Made { args, job, plan, rendering, asked, cryptomattes, denoised, is_interrupted };
     let (part_files, images): (Vec<PathBuf>, Vec<PathBuf>) = outputs.into_iter().partition(|path| is_part(path));
-    let mut written = write_pictures(&made, &images)?;
-    written.misplaced.extend(not_denoised);
+    let mut written = write_pictures(made, &images)?;
     if let Some(film_file) = film_file.filter(|_| !part_files.is_empty()) {
-        film_file.end(rendering);
-        let write = |path: &Path| Ok(film_file.write(path, rendering)?);
+        film_file.end(made.rendering);
+        let write = |path: &Path| Ok(film_file.write(path, made.rendering)?);
         part_files.into_iter().for_each(|path| written.write(path, write));
     }
-    Ok((written, denoising))
+    Ok(written)
 }
 
 /// Refuses to denoise parts, and `--denoise` without an EXR output, since the noisy image would be lost.
@@ -272,8 +304,10 @@ fn check_denoise(args: &RenderArgs, outputs: &[PathBuf]) -> Result<(), UsageErro
 /// Renders, and sends the image to viewers if there are any. Ctrl-C is orderly from the first sample on, since there is
 /// then an image to lose.
 fn render_shown(
-    (job, settings): (&RenderJob, &RenderSettings),
-    (canvas, bar): (Option<&Arc<Canvas>>, &Bar),
+    job: &RenderJob,
+    settings: &RenderSettings,
+    canvas: Option<&Arc<Canvas>>,
+    bar: &Bar,
     continuation: Continuation<'_>,
     preparing: During,
 ) -> anyhow::Result<Rendering> {
@@ -369,7 +403,8 @@ fn stats(
     args: &RenderArgs,
     job: &RenderJob,
     rendering: &Rendering,
-    (setup, laps): (SetupTimes, &Laps),
+    setup: SetupTimes,
+    laps: &Laps,
 ) -> serde_json::Value {
     // Times and settings
     let s = &rendering.stats;

@@ -93,8 +93,11 @@ fn reached_text(target: f32, spp: u32, reached: &Reached, ended: Ended) -> Strin
 /// Reports on a rendering, unless `--quiet` is given.
 pub(super) fn report(
     args: &RenderArgs,
-    (job, rendering): (&RenderJob, &Rendering),
-    (times, laps, outputs): (&Times, &Laps, &[PathBuf]),
+    job: &RenderJob,
+    rendering: &Rendering,
+    times: &Times,
+    laps: &Laps,
+    outputs: &[PathBuf],
 ) {
     if args.quiet {
         return;

@@ -157,8 +157,10 @@ fn mesh_kind(path: &Path) -> Option<&'static str> {
     }
 }
 
-/// Data of a loaded scene beside its job.
+/// A loaded scene.
 pub(super) struct Setup {
+    /// The job.
+    pub job: RenderJob,
     /// Setup times.
     pub times: SetupTimes,
     /// The files of the scene.
@@ -168,7 +170,7 @@ pub(super) struct Setup {
 }
 
 /// Loads the scene and builds its ray tracers.
-pub(super) fn load_job(args: &SceneArgs) -> anyhow::Result<(RenderJob, Setup)> {
+pub(super) fn load_job(args: &SceneArgs) -> anyhow::Result<Setup> {
     load_job_of(args, &FileCache::default(), None, None)
 }
 
@@ -179,7 +181,7 @@ pub(super) fn load_job_of(
     files: &FileCache,
     stored: Option<&Stored>,
     time: Option<Duration>,
-) -> anyhow::Result<(RenderJob, Setup)> {
+) -> anyhow::Result<Setup> {
     // Load
     laps::end("start", &[]);
     let start = Instant::now();
@@ -197,14 +199,15 @@ pub(super) fn load_job_of(
         .with_context(|| format!("cannot build the ray tracer of {}", args.scene.display()))?;
     laps::end("build", &[]);
     let times = SetupTimes { load, build: start.elapsed().as_secs_f64(), prepare: 0.0 };
-    Ok((job, Setup { times, files, given }))
+    Ok(Setup { job, times, files, given })
 }
 
 /// Makes the choices that the settings leave open, with `--threads` threads. Prints them unless `quiet`. Warns of given
 /// settings that have no effect.
 pub(super) fn plan(
     args: &SceneArgs,
-    (job, given): (&mut RenderJob, &Given),
+    job: &mut RenderJob,
+    given: &Given,
     how: &Preparation<'_>,
     quiet: bool,
 ) -> anyhow::Result<PlanFile> {

@@ -12,7 +12,7 @@ const OPTIONS: [(&str, &str); 24] = [
     ("crop", "--crop 0.25,0.75,0,0.5"),
     ("camera", "--camera 1"),
     ("environment", "--environment sky.exr"),
-    ("frames", "--frames 1-48 -o frame-####.exr"),
+    ("frames", "shot.####.pbrt --frames 1-48 -o frame.####.exr"),
     ("time", "--time 600"),
     ("aov", "--aov albedo,normal,depth"),
     ("integrator", "--integrator direct"),
@@ -46,7 +46,7 @@ pub(super) fn with_example(option: Arg) -> Arg {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::commands::Cli;
+    use crate::commands::cli::Cli;
     use clap::{CommandFactory, Parser};
 
     #[test]
@@ -59,7 +59,8 @@ mod tests {
             let forms = [Some(format!("--{name}")), option.get_short().map(|letter| format!("-{letter}"))];
             let has_it = example.split([' ', '=']).any(|word| forms.iter().flatten().any(|form| form == word));
             assert!(has_it && !option.is_hide_short_help_set(), "{example}");
-            let words = ["lumiris", "render", "scene.pbrt"].into_iter().chain(example.split(' '));
+            let scene = (!example.contains(".pbrt")).then_some("scene.pbrt");
+            let words = ["lumiris", "render"].into_iter().chain(scene).chain(example.split(' '));
             Cli::try_parse_from(words).unwrap_or_else(|error| panic!("{example}: {error}"));
             assert!(long.contains(&format!("Example: {example}")), "{example}");
         }

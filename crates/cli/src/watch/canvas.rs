@@ -33,12 +33,19 @@ enum Content {
     Pixels(Arc<[f32]>),
 }
 
+/// Some rows of a tile.
+#[derive(Clone, Debug)]
+struct Band {
+    bounds: PixelBounds,
+    content: Content,
+}
+
 #[derive(Debug, Default)]
 struct State {
     /// Number of changes so far.
     version: u64,
-    /// Bands (rows of tiles), keyed by the version of their last change.
-    bands: BTreeMap<u64, (PixelBounds, Content)>,
+    /// Bands by the version of their last change.
+    bands: BTreeMap<u64, Band>,
     /// Keys of `bands`, by left and top of the band.
     versions: HashMap<[u32; 2], u64>,
     progress: Option<Progress>,
@@ -61,6 +68,14 @@ pub(crate) struct Canvas {
     is_finished: AtomicBool,
     /// Description of the render settings, once they are chosen.
     pub summary: OnceLock<String>,
+}
+
+/// Changes since a state.
+pub(super) struct Changes<T> {
+    /// The state that they lead to.
+    pub reached: u64,
+    /// The tiles.
+    pub changed: Vec<T>,
 }
 
 impl Canvas {
@@ -144,11 +159,12 @@ impl Canvas {
         self.state().version
     }
 
-    /// Tiles that have changed since the state `version`, in the order of their changes, and the state that they lead
-    /// to. There may be more changes unless the list is empty.
-    pub(super) fn changed_since(&self, version: u64) -> (u64, Vec<Tile>) {
-        let (reached, changed) = self.state().changed_since(version);
-        (reached, changed.into_iter().map(|(bounds, content)| self.tile(bounds, content)).collect())
+    /// Tiles that have changed since the state `version`, in the order of their changes. There may be more changes
+    /// unless the list is empty.
+    pub(super) fn changed_since(&self, version: u64) -> Changes<Tile> {
+        let Changes { reached, changed } = self.state().changed_since(version);
+        let tiles = changed.into_iter().map(|band| self.tile(band.bounds, band.content));
+        Changes { reached, changed: tiles.collect() }
     }
 
     /// The pixels of a band.
@@ -171,26 +187,26 @@ impl State {
         if let Some(former) = self.versions.insert([bounds.x0, bounds.y0], self.version) {
             self.bands.remove(&former);
         }
-        self.bands.insert(self.version, (bounds, content));
+        self.bands.insert(self.version, Band { bounds, content });
     }
 
     /// The content of the band with this top left corner.
     fn content(&self, corner: [u32; 2]) -> Option<&Content> {
-        self.bands.get(self.versions.get(&corner)?).map(|(_, content)| content)
+        self.bands.get(self.versions.get(&corner)?).map(|band| &band.content)
     }
 
     /// Bands that have changed; see [`Canvas::changed_since`].
-    fn changed_since(&self, version: u64) -> (u64, Vec<(PixelBounds, Content)>) {
+    fn changed_since(&self, version: u64) -> Changes<Band> {
         let (mut reached, mut changed, mut pixels) = (self.version, Vec::new(), 0);
-        for (&version, (bounds, content)) in self.bands.range(version.saturating_add(1)..) {
-            pixels += bounds.area();
+        for (&version, band) in self.bands.range(version.saturating_add(1)..) {
+            pixels += band.bounds.area();
             if pixels > AT_ONCE && !changed.is_empty() {
                 break;
             }
-            changed.push((*bounds, content.clone()));
+            changed.push(band.clone());
             reached = version;
         }
-        (reached, changed)
+        Changes { reached, changed }
     }
 }
 
@@ -221,17 +237,17 @@ mod tests {
             counts.iter().for_each(|&(i, count)| pixels[i].radiance.count = count);
             Film::of_pixels([100, 100], tile, &pixels)
         };
-        assert_eq!(canvas.changed_since(0).1.len(), 0);
+        assert_eq!(canvas.changed_since(0).changed.len(), 0);
         let films: Vec<Film> = tiles.iter().map(|&tile| film(tile, &[])).collect();
         films.iter().for_each(|film| canvas.set_tile(film));
-        let (state, changed) = canvas.changed_since(0);
+        let Changes { reached: state, changed } = canvas.changed_since(0);
         assert_eq!(changed.iter().map(|t| t.place).collect::<Vec<_>>(), [[0, 0, 16, 10], [16, 0, 4, 10]]);
         assert_eq!(changed[1].data.len(), 40 * canvas.channels.len());
-        assert_eq!(canvas.changed_since(state).1.len(), 0);
+        assert_eq!(canvas.changed_since(state).changed.len(), 0);
         let second = film(tiles[1], &[(3, 5)]);
         canvas.set_tile(&second);
         let places = |changed: Vec<Tile>| changed.iter().map(|t| t.place).collect::<Vec<_>>();
-        let (now, changed) = canvas.changed_since(state);
+        let Changes { reached: now, changed } = canvas.changed_since(state);
         assert_eq!(places(changed), [[16, 0, 4, 10]]);
 
         // The end of the rendering changes only the first tile
@@ -239,13 +255,13 @@ mod tests {
         let mut whole = Film::new([100, 100], bounds, whole.to_vec(), Vec::new());
         canvas.finish(&whole);
         assert!(canvas.is_finished());
-        let (state, changed) = canvas.changed_since(now);
+        let Changes { reached: state, changed } = canvas.changed_since(now);
         assert_eq!(places(changed), [[0, 0, 16, 10]]);
 
         // Corrected pixels differ from the sums
         whole.correct(vec![[-2.0, 0.0, 0.0]; bounds.area()], Vec::new());
         canvas.finish(&whole);
-        let (_, changed) = canvas.changed_since(state);
+        let Changes { changed, .. } = canvas.changed_since(state);
         assert_eq!(changed.len(), 2);
         assert!(changed.iter().any(|tile| tile.data.contains(&2.0)));
     }
@@ -270,7 +286,7 @@ mod tests {
         for canvas in [canvas, corrected] {
             let (mut counts, mut state) = (vec![f32::NAN; bounds.area()], 0);
             while state < canvas.version() {
-                let (reached, tiles) = canvas.changed_since(state);
+                let Changes { reached, changed: tiles } = canvas.changed_since(state);
                 let handed_out: u32 = tiles.iter().map(|tile| tile.place[2] * tile.place[3]).sum();
                 assert!((1..=AT_ONCE as u32).contains(&handed_out) && reached > state, "{handed_out}");
                 for Tile { place: [left, top, columns, rows], data } in tiles {

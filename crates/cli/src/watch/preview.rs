@@ -1,6 +1,6 @@
 //! A preview before the pilots run.
 
-use super::Canvas;
+use super::canvas::Canvas;
 use lumiris::film::Film;
 use lumiris::render::{Continuation, RenderError, RenderSettings, resume};
 use lumiris::scene::RenderJob;
@@ -17,7 +17,8 @@ const PART: u32 = 20;
 /// Shows tiles with one sample per pixel, until the time is over. They are not part of the image.
 pub(crate) fn preview(
     canvas: &Arc<Canvas>,
-    (job, settings): (&RenderJob, &RenderSettings),
+    job: &RenderJob,
+    settings: &RenderSettings,
     stop: &AtomicBool,
 ) -> Result<(), RenderError> {
     // Other integrators need longer preparations

@@ -12,9 +12,9 @@
 //! Clients are not trusted. One thread answers, with an [`Allowance`] of CPU time. Connections are bounded in number,
 //! length and time: 64 connections, each with 16 kB for the head of a request and 260 kB for an answer.
 
-use super::Shared;
 use super::allowance::Allowance;
-use super::canvas::Canvas;
+use super::canvas::{Canvas, Changes};
+use super::shared::Shared;
 use http_body_util::Full;
 use hyper::body::{Body, Bytes};
 use hyper::header::{self, HeaderValue};
@@ -240,10 +240,10 @@ fn tiles(state: MutexGuard<'_, State>, query: &str, is_last: &AtomicBool) -> Ans
     };
     // The order matters: a canvas that is finished before its tiles are read gets no more of them
     let is_finished = canvas.is_finished();
-    let (version, tiles) = canvas.changed_since(since);
-    is_last.store(is_finished && tiles.is_empty(), Ordering::Relaxed);
-    let mut bytes = version.to_le_bytes().to_vec();
-    for tile in tiles {
+    let Changes { reached, changed } = canvas.changed_since(since);
+    is_last.store(is_finished && changed.is_empty(), Ordering::Relaxed);
+    let mut bytes = reached.to_le_bytes().to_vec();
+    for tile in changed {
         bytes.extend(tile.place.iter().flat_map(|n| n.to_le_bytes()));
         for pixel in tile.data.chunks_exact(canvas.channels.len()) {
             bytes.extend(pixel[layer.channels.clone()].iter().flat_map(|v| v.to_le_bytes()));

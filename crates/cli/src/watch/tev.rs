@@ -1,8 +1,8 @@
 //! Sends tiles to tev.
 
-use super::Shared;
 use super::allowance::Allowance;
-use super::canvas::{Canvas, Tile};
+use super::canvas::{Canvas, Changes, Tile};
+use super::shared::Shared;
 use std::io;
 use std::net::{TcpStream, ToSocketAddrs};
 use std::sync::Arc;
@@ -14,29 +14,39 @@ const INTERVAL: Duration = Duration::from_millis(200);
 /// Timeout of connecting and of writing.
 const PATIENCE: Duration = Duration::from_secs(5);
 
+/// A stream to the first address that answers.
+pub(super) fn open_stream(address: &str) -> io::Result<TcpStream> {
+    let mut error = io::Error::other("no such host");
+    for address in address.to_socket_addrs()? {
+        match TcpStream::connect_timeout(&address, PATIENCE) {
+            Ok(stream) => return Ok(stream),
+            Err(e) => error = e,
+        }
+    }
+    Err(error)
+}
+
+/// An image in tev.
+struct Shown {
+    canvas: Arc<Canvas>,
+    /// The state that tev has.
+    version: u64,
+}
+
 /// A connection to tev.
 pub(super) struct Tev(TevClient);
 
 impl Tev {
-    /// Connects to the first address that answers. Also returns the stream, which can end the connection.
-    pub(super) fn connect(address: &str) -> io::Result<(Self, TcpStream)> {
-        let mut error = io::Error::other("no such host");
-        for address in address.to_socket_addrs()? {
-            match TcpStream::connect_timeout(&address, PATIENCE) {
-                Ok(stream) => {
-                    stream.set_write_timeout(Some(PATIENCE))?;
-                    stream.set_nodelay(true)?;
-                    return Ok((Tev(TevClient::wrap(stream.try_clone()?)), stream));
-                }
-                Err(e) => error = e,
-            }
-        }
-        Err(error)
+    /// Connects by a stream, which can also end the connection.
+    pub(super) fn new(stream: &TcpStream) -> io::Result<Self> {
+        stream.set_write_timeout(Some(PATIENCE))?;
+        stream.set_nodelay(true)?;
+        Ok(Tev(TevClient::wrap(stream.try_clone()?)))
     }
 
     /// Sends changes until the program ends. Without tev, rendering continues.
     pub(super) fn run(mut self, shared: &Shared, warn: fn(&str)) {
-        let mut shown: Option<(Arc<Canvas>, u64)> = None;
+        let mut shown = None;
         let mut allowance = Allowance::new();
         loop {
             let is_closing = shared.is_closing();
@@ -51,18 +61,13 @@ impl Tev {
     }
 
     /// Sends the changes of the previous image and of the current one.
-    fn show(
-        &mut self,
-        shared: &Shared,
-        shown: &mut Option<(Arc<Canvas>, u64)>,
-        allowance: &mut Allowance,
-    ) -> io::Result<()> {
+    fn show(&mut self, shared: &Shared, shown: &mut Option<Shown>, allowance: &mut Allowance) -> io::Result<()> {
         // A new image: finish the previous one, and create it in tev
         if let Some(present) = shared.canvas()
-            && shown.as_ref().is_none_or(|(canvas, _)| !Arc::ptr_eq(canvas, &present))
+            && shown.as_ref().is_none_or(|shown| !Arc::ptr_eq(&shown.canvas, &present))
         {
-            if let Some((former, version)) = shown {
-                self.update(former, *version, || ())?;
+            if let Some(former) = shown {
+                self.update(&former.canvas, former.version, || ())?;
             }
             self.0.send(PacketCreateImage {
                 image_name: &present.name,
@@ -71,11 +76,11 @@ impl Tev {
                 height: present.size[1],
                 channel_names: &present.channels,
             })?;
-            *shown = Some((present, 0));
+            *shown = Some(Shown { canvas: present, version: 0 });
         }
 
         // Changes of the current image
-        let Some((canvas, version)) = shown else { return Ok(()) };
+        let Some(Shown { canvas, version }) = shown else { return Ok(()) };
         let rest = || {
             if !shared.is_closing() {
                 std::thread::sleep(allowance.rest())
@@ -93,8 +98,8 @@ impl Tev {
         let (mut sent, present) = (since, canvas.version());
         // Tiles
         while sent < present {
-            let (version, tiles) = canvas.changed_since(sent);
-            for Tile { place: [x, y, width, height], data } in tiles {
+            let Changes { reached, changed } = canvas.changed_since(sent);
+            for Tile { place: [x, y, width, height], data } in changed {
                 self.0.send(PacketUpdateImage {
                     image_name: &canvas.name,
                     grab_focus: false,
@@ -108,7 +113,7 @@ impl Tev {
                     data: &data,
                 })?;
             }
-            sent = version;
+            sent = reached;
             rest();
         }
         Ok(sent)

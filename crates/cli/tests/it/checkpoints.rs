@@ -136,6 +136,18 @@ fn renderings_that_are_killed_at_any_time_end_with_the_same_bits() {
 
 #[cfg(unix)]
 #[test]
+fn info_lists_the_samples_of_an_interrupted_rendering() {
+    let folder = tempfile::tempdir().unwrap();
+    begin("render GALLERY --resolution 40x30 --spp 200000 --estimator mis -q -o a.exr", folder.path());
+    let output = lumiris("info c.film --json", folder.path());
+    let facts: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    let mean: f64 = facts["samples done"].as_str().unwrap().split(' ').next().unwrap().parse().unwrap();
+    let stored = stored_samples(&folder.path().join("c.film")) as f64 / (40.0 * 30.0);
+    assert!(stored < 200_000.0 && (mean - stored).abs() <= 0.05, "{stored} {facts}");
+}
+
+#[cfg(unix)]
+#[test]
 fn every_method_goes_on_from_the_middle_of_an_image() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();

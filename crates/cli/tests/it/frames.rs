@@ -159,6 +159,9 @@ fn frames_have_other_noise_each_unless_it_is_to_be_the_same() {
     run("render still.#.pbrt --frames 2 --seed 7 -q -o again.#.exr");
     assert_eq!(pixels("again.2.exr"), pixels("f.2.exr"), "other frames do not matter");
     run("render still.#.pbrt --frames 1-2 --seed 7 --seed-per-frame off -q -o same.#.exr");
+    let help = String::from_utf8_lossy(&lumiris(folder.path(), "render --help").stdout).into_owned();
+    let of_option = help.split("--seed-per-frame").nth(1).unwrap();
+    assert!(of_option.split("--skip-existing").next().unwrap().contains("[possible values: on, off]"), "{of_option}");
     run("render still.1.pbrt --seed 7 -q -o alone.exr");
     assert_eq!(pixels("same.1.exr"), pixels("same.2.exr"));
     assert_eq!(pixels("same.1.exr"), pixels("alone.exr"));

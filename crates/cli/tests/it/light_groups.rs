@@ -35,6 +35,14 @@ fn a_note_says_once_that_only_exr_files_have_layers() {
         let text = said(options);
         assert!(!text.contains("note:") && text.contains("samples per pixel"), "{options}: {text}");
     }
+    // Without an output that stores the layers, the film has none
+    let film_bytes = |options: &str| {
+        said(&format!("{options} --stats a.json"));
+        let text = std::fs::read_to_string(folder.path().join("a.json")).unwrap();
+        serde_json::from_str::<serde_json::Value>(&text).unwrap()["memory"]["film_bytes"].as_u64().unwrap()
+    };
+    assert_eq!(film_bytes("-o a.png"), film_bytes("-o a.png --light-groups none"));
+    assert!(film_bytes("-o a.png -o a.exr") > film_bytes("-o a.png"));
     assert!(image("a.exr", folder.path()).image.channels.iter().any(|name| name == "light_key.R"));
 }
 

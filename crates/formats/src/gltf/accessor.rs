@@ -38,15 +38,26 @@ impl Component {
         }
     }
 
-    /// The value, and the divisor that normalises integers.
-    fn read(self, b: &[u8]) -> (f64, f64) {
+    fn read(self, b: &[u8]) -> f64 {
         match self {
-            Component::I8 => (f64::from(b[0] as i8), 127.0),
-            Component::U8 => (f64::from(b[0]), 255.0),
-            Component::I16 => (f64::from(i16::from_le_bytes([b[0], b[1]])), 32767.0),
-            Component::U16 => (f64::from(u16::from_le_bytes([b[0], b[1]])), 65535.0),
-            Component::U32 => (f64::from(u32::from_le_bytes([b[0], b[1], b[2], b[3]])), f64::from(u32::MAX)),
-            Component::F32 => (f64::from(f32::from_le_bytes([b[0], b[1], b[2], b[3]])), 1.0),
+            Component::I8 => f64::from(b[0] as i8),
+            Component::U8 => f64::from(b[0]),
+            Component::I16 => f64::from(i16::from_le_bytes([b[0], b[1]])),
+            Component::U16 => f64::from(u16::from_le_bytes([b[0], b[1]])),
+            Component::U32 => f64::from(u32::from_le_bytes([b[0], b[1], b[2], b[3]])),
+            Component::F32 => f64::from(f32::from_le_bytes([b[0], b[1], b[2], b[3]])),
+        }
+    }
+
+    /// The divisor that normalises integers.
+    fn divisor(self) -> f64 {
+        match self {
+            Component::I8 => 127.0,
+            Component::U8 => 255.0,
+            Component::I16 => 32767.0,
+            Component::U16 => 65535.0,
+            Component::U32 => f64::from(u32::MAX),
+            Component::F32 => 1.0,
         }
     }
 }
@@ -105,8 +116,8 @@ impl Elements<'_> {
     fn read(&self, index: usize) -> impl Iterator<Item = f64> {
         let Elements { bytes, stride, component, width, normalized } = *self;
         (0..width).map(move |c| {
-            let (value, divisor) = component.read(&bytes[index * stride + c * component.bytes()..]);
-            if normalized { (value / divisor).max(-1.0) } else { value }
+            let value = component.read(&bytes[index * stride + c * component.bytes()..]);
+            if normalized { (value / component.divisor()).max(-1.0) } else { value }
         })
     }
 }
@@ -119,8 +130,15 @@ pub struct Accessor<'a> {
     width: usize,
     /// Dense elements; `None` for zeros.
     elements: Option<Elements<'a>>,
-    /// Sparse elements: the position by element index, and the values.
-    sparse: Option<(HashMap<usize, usize>, Elements<'a>)>,
+    sparse: Option<Sparse<'a>>,
+}
+
+/// Elements that replace others.
+#[derive(Debug)]
+struct Sparse<'a> {
+    /// Position in `values` by element index.
+    positions: HashMap<usize, usize>,
+    values: Elements<'a>,
 }
 
 impl Accessor<'_> {
@@ -138,9 +156,9 @@ impl Accessor<'_> {
     pub fn numbers(&self, indices: impl ExactSizeIterator<Item = usize>) -> Numbers {
         let mut values = Vec::with_capacity(indices.len() * self.width);
         for index in indices {
-            let replaced = self.sparse.as_ref().and_then(|(of, elements)| Some((*of.get(&index)?, elements)));
+            let replaced = self.sparse.as_ref().and_then(|s| Some(s.values.read(*s.positions.get(&index)?)));
             match (replaced, &self.elements) {
-                (Some((index, elements)), _) => values.extend(elements.read(index)),
+                (Some(element), _) => values.extend(element),
                 (None, Some(elements)) => values.extend(elements.read(index)),
                 (None, None) => values.extend(std::iter::repeat_n(0.0, self.width)),
             }
@@ -201,8 +219,7 @@ impl Document {
         Ok(Elements { bytes: &bytes[offset..end], stride, component, width, normalized })
     }
 
-    /// The sparse elements: the position by element index, and the values.
-    fn sparse(&self, sparse: &Place<'_>, layout: &Layout) -> Result<(HashMap<usize, usize>, Elements<'_>), GltfError> {
+    fn sparse(&self, sparse: &Place<'_>, layout: &Layout) -> Result<Sparse<'_>, GltfError> {
         let count = sparse.key("count").index().unwrap_or(0);
         let place = sparse.key("indices");
         let Some(component) = place.key("componentType").index().and_then(Component::of) else {
@@ -210,15 +227,15 @@ impl Document {
         };
         let indices = self.elements(&place, &Layout { component, width: 1, count, normalized: false })?;
         let values = self.elements(&sparse.key("values"), &Layout { count, ..*layout })?;
-        let mut replaced = HashMap::with_capacity(count);
+        let mut positions = HashMap::with_capacity(count);
         for nth in 0..count {
             let index = indices.read(nth).next().unwrap_or_default();
             if index >= layout.count as f64 {
                 return Err(place.error(format!("element {index} is not there")));
             }
-            replaced.insert(index as usize, nth);
+            positions.insert(index as usize, nth);
         }
-        Ok((replaced, values))
+        Ok(Sparse { positions, values })
     }
 }
 

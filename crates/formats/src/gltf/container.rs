@@ -6,10 +6,19 @@ const MAGIC: &[u8; 4] = b"glTF";
 const JSON: u32 = 0x4e4f_534a;
 const BIN: u32 = 0x004e_4942;
 
-/// The JSON and the binary chunk of a file; a file without the container's magic number is JSON.
-pub fn chunks(file: &[u8]) -> Result<(&[u8], Option<&[u8]>), GltfError> {
+/// The chunks of a file.
+#[derive(Clone, Copy, Debug)]
+pub struct Chunks<'a> {
+    /// The JSON.
+    pub json: &'a [u8],
+    /// The binary chunk.
+    pub binary: Option<&'a [u8]>,
+}
+
+/// The chunks of a file; a file without the container's magic number is JSON.
+pub fn chunks(file: &[u8]) -> Result<Chunks<'_>, GltfError> {
     if !file.starts_with(MAGIC) {
-        return Ok((file, None));
+        return Ok(Chunks { json: file, binary: None });
     }
     let word = |at: usize| file.get(at..at + 4).and_then(|b| b.try_into().ok()).map(u32::from_le_bytes);
     let wrong = |at: usize, message: String| GltfError { place: format!("byte {at}"), message };
@@ -24,7 +33,7 @@ pub fn chunks(file: &[u8]) -> Result<(&[u8], Option<&[u8]>), GltfError> {
     if length > file.len() {
         return Err(wrong(8, format!("the file says that it has {length} bytes, but has {}", file.len())));
     }
-    let (mut at, mut json, mut bytes) = (12, None, None);
+    let (mut at, mut json, mut binary) = (12, None, None);
     while at < length {
         let (Some(size), Some(kind)) = (word(at), word(at + 4)) else {
             return Err(wrong(at, "the header of a chunk is cut off".to_owned()));
@@ -36,10 +45,10 @@ pub fn chunks(file: &[u8]) -> Result<(&[u8], Option<&[u8]>), GltfError> {
         let content = &file[at + 8..end];
         match kind {
             JSON if json.is_none() => json = Some(content),
-            BIN if bytes.is_none() => bytes = Some(content),
+            BIN if binary.is_none() => binary = Some(content),
             _ => {}
         }
         at = end;
     }
-    json.map(|json| (json, bytes)).ok_or_else(|| wrong(12, "the container has no JSON".to_owned()))
+    json.map(|json| Chunks { json, binary }).ok_or_else(|| wrong(12, "the container has no JSON".to_owned()))
 }

@@ -1,6 +1,6 @@
 //! A document: its validated JSON, and its buffers.
 
-use super::container::chunks;
+use super::container::{Chunks, chunks};
 use super::json::Json;
 use super::place::{GltfError, Place};
 use super::schema;
@@ -88,7 +88,7 @@ impl Document {
     ///
     /// Returns all errors of the schema.
     pub fn parse(file: &[u8], folder: &Path, required: &[&str]) -> Result<Document, Vec<GltfError>> {
-        let (text, embedded) = chunks(file).map_err(|e| vec![e])?;
+        let Chunks { json: text, binary } = chunks(file).map_err(|e| vec![e])?;
         let text = text.strip_prefix(b"\xef\xbb\xbf").unwrap_or(text);
         let json = Json::parse(text).map_err(|e| vec![syntax_error(file, text, &e)])?;
         check_asset(&json, required)?;
@@ -98,7 +98,7 @@ impl Document {
         }
         let (buffers, files, unread) = (Vec::new(), Vec::new(), Vec::new());
         let mut document = Document { json, buffers, files, unread, folder: folder.to_owned() };
-        document.read_buffers(embedded);
+        document.read_buffers(binary);
         Ok(document)
     }
 
@@ -128,34 +128,41 @@ impl Document {
         }
     }
 
-    fn read_buffers(&mut self, embedded: Option<&[u8]>) {
+    fn read_buffers(&mut self, binary: Option<&[u8]>) {
         for index in 0..self.root().key("buffers").len() {
-            let (read, file) = self.read_buffer(index, embedded);
-            self.files.extend(file);
+            let content = self.buffer_content(index, binary.filter(|_| index == 0));
+            if let Ok(Content::File(path)) = &content {
+                self.files.push(path.clone());
+            }
+            let read = content.map_err(Unread::Content).and_then(|content| self.read_buffer(index, content));
             self.buffers.push(read.map_err(|unread| self.unread.push(unread)).ok());
         }
     }
 
-    /// The bytes of a buffer, and its file if it has one.
-    fn read_buffer(&self, index: usize, embedded: Option<&[u8]>) -> (Result<Vec<u8>, Unread>, Option<PathBuf>) {
+    /// The location of a buffer, which may be the binary chunk.
+    fn buffer_content(&self, index: usize, binary: Option<&[u8]>) -> Result<Content, GltfError> {
         let place = self.root().key("buffers").item(index);
-        if !place.key("uri").exists() {
-            // A placeholder is an error only if it is used
-            let embedded = embedded.filter(|_| index == 0);
-            return (embedded.map_or(Ok(Vec::new()), |bytes| checked(bytes.to_vec(), &place)), None);
+        if place.key("uri").exists() {
+            return self.uri_content(&place);
         }
-        match self.uri_content(&place) {
-            Ok(Content::Bytes(bytes)) => (checked(bytes, &place), None),
-            Ok(Content::File(path)) => {
-                let read = std::fs::read(&path).map_err(|e| {
-                    let is_missing = e.kind() == std::io::ErrorKind::NotFound;
-                    let reason = if is_missing { "no such file".to_owned() } else { e.to_string() };
-                    Unread::File { buffer: index, path: path.clone(), reason }
-                });
-                (read.and_then(|bytes| checked(bytes, &place)), Some(path))
-            }
-            Ok(Content::Unread) => (Ok(Vec::new()), None),
-            Err(error) => (Err(Unread::Content(error)), None),
+        // A placeholder is an error only if it is used
+        Ok(binary.map_or(Content::Unread, |bytes| Content::Bytes(bytes.to_vec())))
+    }
+
+    /// The bytes of a buffer.
+    fn read_buffer(&self, index: usize, content: Content) -> Result<Vec<u8>, Unread> {
+        let place = self.root().key("buffers").item(index);
+        match content {
+            Content::Bytes(bytes) => checked(bytes, &place),
+            Content::File(path) => match std::fs::read(&path) {
+                Ok(bytes) => checked(bytes, &place),
+                Err(error) => {
+                    let is_missing = error.kind() == std::io::ErrorKind::NotFound;
+                    let reason = if is_missing { "no such file".to_owned() } else { error.to_string() };
+                    Err(Unread::File { buffer: index, path, reason })
+                }
+            },
+            Content::Unread => Ok(Vec::new()),
         }
     }
 

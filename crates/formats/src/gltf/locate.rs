@@ -1,6 +1,6 @@
 //! Maps a path in the JSON to bytes of the file, for messages.
 
-use super::container::chunks;
+use super::container::{Chunks, chunks};
 use std::ops::Range;
 
 /// Byte range of the value at a path, in the notation of errors; of its innermost existing parent if it does not exist;
@@ -9,7 +9,7 @@ pub fn locate(file: &[u8], place: &str) -> Range<usize> {
     if let Some(at) = place.strip_prefix("byte ").and_then(|at| at.parse::<usize>().ok()) {
         return at.min(file.len())..(at + 1).min(file.len());
     }
-    let Some((json, offset, mut at)) = beginning(file) else { return 0..0 };
+    let Some(Text { json, offset, root: mut at }) = text(file) else { return 0..0 };
     for part in place.split(['.', '[']).filter(|part| !part.is_empty()) {
         let next = match part.strip_suffix(']') {
             Some(index) => index.parse().ok().and_then(|index| item(json, at, index)),
@@ -23,17 +23,25 @@ pub fn locate(file: &[u8], place: &str) -> Range<usize> {
 
 /// Byte ranges of a member of each element of an array of the root, as by [`locate`], in one pass over the file.
 pub fn locate_members(file: &[u8], array: &str, key: &str) -> Vec<Range<usize>> {
-    let Some((json, offset, root)) = beginning(file) else { return Vec::new() };
+    let Some(Text { json, offset, root }) = text(file) else { return Vec::new() };
     let first = member(json, root, array).and_then(|array| item(json, array, 0));
     let items = std::iter::successors(first, |&at| next(json, at));
     items.map(|at| shifted(value_at(json, member(json, at, key).unwrap_or(at)), offset)).collect()
 }
 
-/// The JSON of a file, its offset, and the offset of its root within.
-fn beginning(file: &[u8]) -> Option<(&[u8], usize, usize)> {
-    let (json, _) = chunks(file).ok()?;
+/// The JSON of a file.
+struct Text<'a> {
+    json: &'a [u8],
+    /// Its offset in the file.
+    offset: usize,
+    /// Offset of the root in the JSON.
+    root: usize,
+}
+
+fn text(file: &[u8]) -> Option<Text<'_>> {
+    let Chunks { json, .. } = chunks(file).ok()?;
     let offset = json.as_ptr() as usize - file.as_ptr() as usize;
-    Some((json, offset, skip_blanks(json, if json.starts_with(b"\xef\xbb\xbf") { 3 } else { 0 })))
+    Some(Text { json, offset, root: skip_blanks(json, if json.starts_with(b"\xef\xbb\xbf") { 3 } else { 0 }) })
 }
 
 /// Bytes of the value at `at`; the first byte of arrays and objects.

@@ -4,8 +4,8 @@
 //! per byte of a number. Each stream begins with its compressed size and is uncompressed if this equals its full size.
 //! With shuffling, the first bytes of all numbers of the block are contiguous, then the second bytes, and so on.
 
-use super::NanoError;
 use super::bytes::Bytes;
+use super::error::NanoError;
 use std::io::Read;
 
 const HEAD: usize = 16;

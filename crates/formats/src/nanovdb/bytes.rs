@@ -1,6 +1,6 @@
 //! Bounds-checked numbers at offsets.
 
-use super::NanoError;
+use super::error::NanoError;
 
 /// The bytes of a grid.
 #[derive(Clone, Copy, Debug)]

@@ -3,8 +3,10 @@
 //! A segment begins with 16 bytes: magic number, version, number of grids, and compression. For each grid follow 176
 //! bytes and its name; then the data of all grids, with the sizes in the list.
 
+use super::blosc;
 use super::bytes::Bytes;
-use super::{NanoError, TYPES, ValueType, blosc};
+use super::error::NanoError;
+use super::grid::{TYPES, ValueType};
 use flate2::read::ZlibDecoder;
 use std::io::{Read, Seek, SeekFrom};
 
@@ -50,26 +52,29 @@ struct Entry {
     codec: Codec,
 }
 
-/// Name and bytes of the first grid with a name. Of the rest of the file, only headers are read.
-pub(super) fn grid_bytes(
-    reader: &mut (impl Read + Seek),
-    size: u64,
-    name: &str,
-) -> Result<(String, Vec<u8>), NanoError> {
+/// Part of a file.
+struct Segment {
+    entries: Vec<Entry>,
+    /// Its end in the file; `None` if the sizes are wrong.
+    end: Option<u64>,
+}
+
+/// Bytes of the first grid with a name. Of the rest of the file, only headers are read.
+pub(super) fn grid_bytes(reader: &mut (impl Read + Seek), size: u64, name: &str) -> Result<Vec<u8>, NanoError> {
     let mut found = Vec::new();
     let mut at = 0;
     while at < size {
         let mut magic = [0; 8];
         reader.seek(SeekFrom::Start(at))?;
         reader.read_exact(&mut magic).map_err(|_| foreign(at, &[]))?;
-        let (entries, end) = match &magic {
+        let Segment { entries, end } = match &magic {
             MAGIC_GRID => raw_grid(reader, at)?,
             MAGIC_EITHER | MAGIC_FILE => segment(reader, at)?,
             other => return Err(foreign(at, other)),
         };
         for entry in entries {
             if entry.name == name {
-                return Ok((entry.name.clone(), read_entry(reader, &entry, size)?));
+                return read_entry(reader, &entry, size);
             }
             found.push(entry.name);
         }
@@ -99,7 +104,7 @@ fn check_version(version: u32) -> Result<(), NanoError> {
 }
 
 /// A grid without a list, after its magic number.
-fn raw_grid(reader: &mut impl Read, at: u64) -> Result<(Vec<Entry>, Option<u64>), NanoError> {
+fn raw_grid(reader: &mut impl Read, at: u64) -> Result<Segment, NanoError> {
     // Its magic number has been read
     let mut head = [0; GRID];
     reader.read_exact(&mut head[8..])?;
@@ -108,11 +113,11 @@ fn raw_grid(reader: &mut impl Read, at: u64) -> Result<(Vec<Entry>, Option<u64>)
     let size = head.u64(32)?;
     let (name, ty) = (head.text(40, 256)?, head.u32(636)?);
     let entry = Entry { name, start: at, stored: size, size, ty, codec: Codec::None };
-    Ok((vec![entry], at.checked_add(size)))
+    Ok(Segment { entries: vec![entry], end: at.checked_add(size) })
 }
 
-/// The grids of a segment, and the offset of its end.
-fn segment(reader: &mut impl Read, at: u64) -> Result<(Vec<Entry>, Option<u64>), NanoError> {
+/// A segment, after its magic number.
+fn segment(reader: &mut impl Read, at: u64) -> Result<Segment, NanoError> {
     let mut head = [0; SEGMENT];
     reader.read_exact(&mut head[8..])?;
     let head = Bytes(&head);
@@ -144,7 +149,7 @@ fn segment(reader: &mut impl Read, at: u64) -> Result<(Vec<Entry>, Option<u64>),
         entry.start = end.ok_or_else(|| NanoError::damaged("its list of grids has wrong sizes"))?;
         end = entry.start.checked_add(entry.stored);
     }
-    Ok((entries, end))
+    Ok(Segment { entries, end })
 }
 
 /// The bytes of a grid, decompressed.

@@ -7,6 +7,7 @@ use lumiris_test_support::nanovdb::{NanoSpec, VERSION, nano_file, plain_nano_fil
 use lumiris_test_support::random::{RngExt, pcg32};
 use std::collections::HashMap;
 use std::io::Write;
+use std::path::Path;
 
 /// The value of any voxel.
 fn values(grid: &NanoGrid) -> impl Fn([i32; 3]) -> f32 + '_ {

@@ -12,8 +12,9 @@
 //! A key has 21 bits for each axis, z lowest: the index in units of 4096. In nodes and leaves, z is fastest.
 
 use super::bytes::Bytes;
+use super::error::NanoError;
 use super::file::GRID;
-use super::{GridClass, LEAF, LEAF_VOXELS, NanoError, NanoGrid, Tile, ValueType};
+use super::grid::{GridClass, LEAF, LEAF_VOXELS, NanoGrid, Tile, ValueType};
 
 /// Size of a root entry.
 const ROOT_ENTRY: u64 = 32;

@@ -194,7 +194,7 @@ impl Arguments<'_> {
                 return self.fail(span, message);
             }
         };
-        let Some((ty, is_v3)) = ParamType::from_name(type_name) else {
+        let Some(ty) = ParamType::from_name(type_name) else {
             let diagnostic = self.diagnostics.error(span, format!("unknown parameter type `{}`", shorten(type_name)));
             match did_you_mean(type_name, ParamType::NAMES.iter().copied()) {
                 Some(near) => diagnostic.help(format!("did you mean `{near}`?")),
@@ -202,7 +202,7 @@ impl Arguments<'_> {
             };
             return Err(Reported);
         };
-        if is_v3 {
+        if ParamType::is_v3_name(type_name) {
             let advice = if ty == ParamType::Xyz { "rgb" } else { ty.name() };
             self.v3(span, &format!("type `{type_name}` is pbrt-v3; pbrt-v4 writes `{advice}`"));
         }

@@ -3,7 +3,7 @@
 //! The text consists of bytes; non-ASCII bytes may only occur in strings and comments. Words, quoted strings and
 //! brackets are tokens; lists of numbers are parsed without creating tokens.
 
-use crate::number::{NumberError, is_delimiter, parse_f32, parse_f64, parse_i32};
+use crate::number::{NumberError, Parsed, is_delimiter, parse_f32, parse_f64, parse_i32};
 use crate::source::{FileId, Span};
 use std::borrow::Cow;
 
@@ -174,7 +174,7 @@ impl<'a> Lexer<'a> {
     fn numbers<T>(
         &mut self,
         out: &mut Vec<T>,
-        parse: impl Fn(&[u8]) -> Result<(T, usize), NumberError> + Copy,
+        parse: impl Fn(&[u8]) -> Result<Parsed<T>, NumberError> + Copy,
         what: &str,
     ) -> Result<(), LexError> {
         let bytes = self.bytes;
@@ -192,7 +192,7 @@ impl<'a> Lexer<'a> {
                     i = self.position;
                 }
                 Some(_) => match parse(&bytes[i..]) {
-                    Ok((value, length)) => {
+                    Ok(Parsed { value, length }) => {
                         out.push(value);
                         i += length;
                     }
@@ -210,13 +210,13 @@ impl<'a> Lexer<'a> {
     /// Does not consume other tokens, since they may start the next directive.
     fn number<T>(
         &mut self,
-        parse: impl Fn(&[u8]) -> Result<(T, usize), NumberError>,
+        parse: impl Fn(&[u8]) -> Result<Parsed<T>, NumberError>,
         what: &str,
     ) -> Result<T, LexError> {
         self.skip_blank();
         let start = self.position;
         match self.bytes.get(start..).map(&parse) {
-            Some(Ok((value, length))) => {
+            Some(Ok(Parsed { value, length })) => {
                 self.position += length;
                 Ok(value)
             }

@@ -30,28 +30,30 @@ pub enum ParamType {
 }
 
 impl ParamType {
-    /// The type of a declaration, and true if the spelling is from pbrt-v3.
-    pub fn from_name(name: &str) -> Option<(Self, bool)> {
+    /// The type of a declaration, in the spelling of pbrt-v4 or pbrt-v3.
+    pub fn from_name(name: &str) -> Option<Self> {
         Some(match name {
-            "integer" => (ParamType::Integer, false),
-            "float" => (ParamType::Float, false),
-            "point2" => (ParamType::Point2, false),
-            "vector2" => (ParamType::Vector2, false),
-            "point3" => (ParamType::Point3, false),
-            "vector3" => (ParamType::Vector3, false),
-            "normal" | "normal3" => (ParamType::Normal, false),
-            "spectrum" => (ParamType::Spectrum, false),
-            "rgb" => (ParamType::Rgb, false),
-            "blackbody" => (ParamType::Blackbody, false),
-            "texture" => (ParamType::Texture, false),
-            "string" => (ParamType::String, false),
-            "bool" => (ParamType::Bool, false),
-            "point" => (ParamType::Point3, true),
-            "vector" => (ParamType::Vector3, true),
-            "color" => (ParamType::Rgb, true),
-            "xyz" => (ParamType::Xyz, true),
+            "integer" => ParamType::Integer,
+            "float" => ParamType::Float,
+            "point2" => ParamType::Point2,
+            "vector2" => ParamType::Vector2,
+            "point3" | "point" => ParamType::Point3,
+            "vector3" | "vector" => ParamType::Vector3,
+            "normal" | "normal3" => ParamType::Normal,
+            "spectrum" => ParamType::Spectrum,
+            "rgb" | "color" => ParamType::Rgb,
+            "blackbody" => ParamType::Blackbody,
+            "texture" => ParamType::Texture,
+            "string" => ParamType::String,
+            "bool" => ParamType::Bool,
+            "xyz" => ParamType::Xyz,
             _ => return None,
         })
+    }
+
+    /// True for spellings of types that pbrt-v4 does not have.
+    pub fn is_v3_name(name: &str) -> bool {
+        matches!(name, "point" | "vector" | "color" | "xyz")
     }
 
     /// The spelling of pbrt-v4.

@@ -1,10 +1,11 @@
 //! Face lists and triangle strips.
 
+use super::error::{Place, PlyError};
 use super::header::{Element, Property, Scalar};
+use super::mesh::PlyMesh;
 use super::numbers::{ByteOrder, Numbers, number_at};
 use super::stream::{MAX_FILL, Stream};
 use super::wedges::{self, NONE};
-use super::{Place, PlyError, PlyMesh};
 use lumiris_numbers::math::{Vec2, Vec3};
 
 /// The property with the number of a face.
@@ -31,6 +32,15 @@ pub(super) struct Faces {
     textures: Option<[i64; 2]>,
 }
 
+/// A face as it is read.
+#[derive(Clone, Copy)]
+struct Polygon<'a> {
+    /// Vertices.
+    corners: &'a [u32],
+    /// Texture coordinates of the corners, or empty.
+    uvs: &'a [[f32; 2]],
+}
+
 /// Faces of `N` corners.
 #[derive(Default)]
 struct FaceList<const N: usize> {
@@ -43,7 +53,8 @@ struct FaceList<const N: usize> {
 
 impl<const N: usize> FaceList<N> {
     /// Adds a face made of the corners `at` of a polygon, with its number.
-    fn push(&mut self, (corners, uvs): (&[u32], &[[f32; 2]]), at: [usize; N], number: Option<u32>) {
+    fn push(&mut self, polygon: Polygon<'_>, at: [usize; N], number: Option<u32>) {
+        let Polygon { corners, uvs } = polygon;
         if !uvs.is_empty() {
             self.uvs.resize(self.indices.len(), [NONE; N]);
             self.uvs.push(at.map(|i| Vec2::from(uvs[i])));
@@ -171,7 +182,7 @@ impl Faces {
         let is_whole = uvs.len() == 2 * corners.len();
         self.odd_uvs += u64::from(!is_whole && !uvs.is_empty());
         let uvs = if is_whole { uvs.as_chunks::<2>().0 } else { &[] };
-        let face = (corners, uvs);
+        let face = Polygon { corners, uvs };
         match corners.len() {
             0..3 => self.degenerate += 1,
             3 => self.triangles.push(face, [0, 1, 2], number),

@@ -1,9 +1,9 @@
 //! Sequences of numbers in the three encodings.
 
+use super::error::{Place, PlyError};
 use super::header::{Element, Property, Scalar};
 use super::stream::Stream;
-use super::{Place, PlyError};
-use crate::number::{NumberError, parse_f32, parse_f64, parse_i32};
+use crate::number::{NumberError, Parsed, parse_f32, parse_f64, parse_i32};
 
 /// Maximum length of a word in text (bytes).
 const MAX_WORD: usize = 256;
@@ -170,19 +170,21 @@ impl<'a, const BIG: bool> Numbers<'a> for Binary<'_, 'a, BIG> {
 pub(super) struct Ascii<'s, 'a>(pub &'s mut Stream<'a>);
 
 impl Ascii<'_, '_> {
-    /// Passes the next word to `parse`, which returns a value and the length of the word.
+    /// Passes the next word to `parse`.
     #[inline]
     fn word<T>(
         &mut self,
         element: &str,
         expected: &'static str,
-        parse: impl Fn(&[u8]) -> Result<(T, usize), NumberError>,
+        parse: impl Fn(&[u8]) -> Result<Parsed<T>, NumberError>,
     ) -> Result<T, PlyError> {
         self.skip_blanks()?;
         let bytes = self.0.fill(MAX_WORD)?;
         match parse(bytes) {
             // The end of the buffer may cut a longer word; only blanks are delimiters here.
-            Ok((value, length)) if length < MAX_WORD && bytes.get(length).is_none_or(u8::is_ascii_whitespace) => {
+            Ok(Parsed { value, length })
+                if length < MAX_WORD && bytes.get(length).is_none_or(u8::is_ascii_whitespace) =>
+            {
                 self.0.consume(length);
                 Ok(value)
             }
@@ -228,48 +230,51 @@ fn word_length(bytes: &[u8]) -> usize {
 
 /// As [`parse_f32`], including the spellings of `nan` and `inf` that exporters write for invalid vertices.
 #[inline]
-fn parse_any_f32(bytes: &[u8]) -> Result<(f32, usize), NumberError> {
+fn parse_any_f32(bytes: &[u8]) -> Result<Parsed<f32>, NumberError> {
     parse_f32(bytes).or_else(|error| odd_float(&bytes[..word_length(bytes)], error))
 }
 
 /// As [`parse_any_f32`] in f64 precision.
 #[inline]
-fn parse_any_f64(bytes: &[u8]) -> Result<(f64, usize), NumberError> {
+fn parse_any_f64(bytes: &[u8]) -> Result<Parsed<f64>, NumberError> {
     parse_f64(bytes).or_else(|error| {
-        odd_float(&bytes[..word_length(bytes)], error).map(|(value, length)| (f64::from(value), length))
+        let Parsed { value, length } = odd_float(&bytes[..word_length(bytes)], error)?;
+        Ok(Parsed { value: f64::from(value), length })
     })
 }
 
 #[cold]
-fn odd_float(word: &[u8], error: NumberError) -> Result<(f32, usize), NumberError> {
+fn odd_float(word: &[u8], error: NumberError) -> Result<Parsed<f32>, NumberError> {
     let name = word.strip_prefix(b"-").or(word.strip_prefix(b"+")).unwrap_or(word).to_ascii_lowercase();
     let negative = word.starts_with(b"-");
     let infinity = if negative { f32::NEG_INFINITY } else { f32::INFINITY };
-    match name.as_slice() {
-        _ if error == NumberError::Overflow => Ok((infinity, word.len())),
-        b"inf" | b"infinity" => Ok((infinity, word.len())),
-        name if name.starts_with(b"nan") => Ok((f32::NAN, word.len())),
-        _ => Err(error),
-    }
+    let value = match name.as_slice() {
+        _ if error == NumberError::Overflow => infinity,
+        b"inf" | b"infinity" => infinity,
+        name if name.starts_with(b"nan") => f32::NAN,
+        _ => return Err(error),
+    };
+    Ok(Parsed { value, length: word.len() })
 }
 
 /// An integer; also accepted with a decimal point, as some exporters write it.
 #[inline]
-fn parse_whole(bytes: &[u8]) -> Result<(i64, usize), NumberError> {
+fn parse_whole(bytes: &[u8]) -> Result<Parsed<i64>, NumberError> {
     match parse_i32(bytes) {
-        Ok((value, length)) => Ok((i64::from(value), length)),
+        Ok(Parsed { value, length }) => Ok(Parsed { value: i64::from(value), length }),
         Err(error) => odd_whole(&bytes[..word_length(bytes)], error),
     }
 }
 
 #[cold]
-fn odd_whole(word: &[u8], error: NumberError) -> Result<(i64, usize), NumberError> {
+fn odd_whole(word: &[u8], error: NumberError) -> Result<Parsed<i64>, NumberError> {
     let text = std::str::from_utf8(word).map_err(|_| error)?;
-    if let Ok(value) = text.parse::<i64>() {
-        return Ok((value, word.len()));
-    }
-    let value = text.parse::<f64>().map_err(|_| error)?;
-    if value.fract() == 0.0 { Ok((value as i64, word.len())) } else { Err(error) }
+    let value = match (text.parse::<i64>(), text.parse::<f64>()) {
+        (Ok(value), _) => value,
+        (Err(_), Ok(value)) if value.fract() == 0.0 => value as i64,
+        _ => return Err(error),
+    };
+    Ok(Parsed { value, length: word.len() })
 }
 
 impl<'a> Numbers<'a> for Ascii<'_, 'a> {

@@ -1,6 +1,6 @@
 //! A reader with a buffer of fixed size.
 
-use super::{Place, PlyError};
+use super::error::{Place, PlyError};
 use std::io::{self, Read};
 
 /// Size of the buffer (bytes): fits the second-level cache.

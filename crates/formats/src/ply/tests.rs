@@ -1,8 +1,10 @@
 use super::*;
 use flate2::{Compression, write::GzEncoder};
 use header::Scalar::{self, *};
+use lumiris_numbers::math::{DVec3, Vec2, Vec3};
 use lumiris_test_support::random::{Pcg32, RngExt, pcg32};
 use std::io::Write as _;
+use stream::Stream;
 
 const FORMATS: [&str; 3] = ["ascii", "binary_little_endian", "binary_big_endian"];
 const SCALARS: [(Scalar, [&str; 2]); 8] = [

@@ -1,10 +1,11 @@
 //! The vertex table.
 
+use super::error::PlyError;
 use super::header::{Element, Scalar};
+use super::mesh::PlyMesh;
 use super::numbers::{ByteOrder, Numbers, double_at, number_at};
 use super::stream::{MAX_FILL, Stream};
-use super::{PlyError, PlyMesh};
-use lumiris_numbers::math::origin::{near_origin, relative};
+use lumiris_numbers::math::origin::{LocalPoints, near_origin, relative};
 use lumiris_numbers::math::{DVec3, Vec2, Vec3};
 
 /// Reads all vertices.
@@ -35,7 +36,7 @@ pub(super) fn read<'a, N: Numbers<'a>>(element: &Element, numbers: &mut N, mesh:
             mesh.positions.iter_mut().for_each(|p| *p = (p.as_dvec3() - mesh.origin).as_vec3());
         }
     } else {
-        (mesh.positions, mesh.origin) = relative(doubles.iter().copied());
+        LocalPoints { points: mesh.positions, origin: mesh.origin } = relative(doubles.iter().copied());
     }
     // Usually a no-op; compressed files may exceed the reserved memory.
     mesh.positions.reserve_exact(1);

@@ -1,7 +1,7 @@
 //! Texture coordinates of the corners of faces, as photogrammetry programs write them. A vertex at a texture seam has
 //! several coordinates and is split into several vertices.
 
-use super::PlyMesh;
+use super::mesh::PlyMesh;
 use lumiris_numbers::math::Vec2;
 use std::collections::HashMap;
 

@@ -1,6 +1,6 @@
 //! Numbers and compressed blocks.
 
-use super::PtexError;
+use super::error::PtexError;
 use flate2::read::ZlibDecoder;
 use half::f16;
 use std::io::Read;
@@ -127,16 +127,21 @@ pub(super) enum Encoding {
     Tiled,
 }
 
-impl Encoding {
-    /// Encoding and size of a block.
-    pub(super) fn of(word: u32) -> (Self, usize) {
+/// Encoding and size (bytes) of a block.
+pub(super) struct BlockHeader {
+    pub(super) encoding: Encoding,
+    pub(super) size: usize,
+}
+
+impl BlockHeader {
+    pub(super) fn of(word: u32) -> Self {
         let encoding = match word >> 30 {
             0 => Encoding::Constant,
             1 => Encoding::Compressed,
             2 => Encoding::Differences,
             _ => Encoding::Tiled,
         };
-        (encoding, (word & 0x3fff_ffff) as usize)
+        BlockHeader { encoding, size: (word & 0x3fff_ffff) as usize }
     }
 }
 
@@ -213,7 +218,7 @@ fn read_tiles(block: &[u8], log2: [u8; 2], numbers: (usize, NumberType), at: usi
     let sizes = inflate(blocks.take(header_size, "the sizes of tiles")?, count.checked_mul(4), at)?;
     let mut tiles = Vec::with_capacity(count);
     for size in sizes.chunks_exact(4) {
-        let (encoding, size) = Encoding::of(u32::from_le_bytes([size[0], size[1], size[2], size[3]]));
+        let BlockHeader { encoding, size } = BlockHeader::of(u32::from_le_bytes([size[0], size[1], size[2], size[3]]));
         if matches!(encoding, Encoding::Tiled) {
             return Err(PtexError::wrong(at, "a tile has tiles"));
         }

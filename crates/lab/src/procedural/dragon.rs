@@ -137,11 +137,15 @@ fn body() -> Vec<Knot> {
     spline(&points, 5)
 }
 
-/// The knot of the body at a fraction of its winding, and its direction.
-fn body_at(body: &[Knot], t: f32) -> (Knot, Vec3) {
-    let i = ((body.len() - 1) as f32 * t) as usize;
+/// Index of the knot of the body at a fraction of its winding.
+fn body_at(body: &[Knot], t: f32) -> usize {
+    ((body.len() - 1) as f32 * t) as usize
+}
+
+/// Direction of the body at a knot.
+fn tangent_at(body: &[Knot], i: usize) -> Vec3 {
     let (low, high) = (i.saturating_sub(1), (i + 1).min(body.len() - 1));
-    (body[i], (body[high].center - body[low].center).normalize())
+    (body[high].center - body[low].center).normalize()
 }
 
 /// Spines along the back.
@@ -186,7 +190,8 @@ fn tail_tuft(body: &[Knot]) -> Vec<Stroke> {
 fn mane(body: &[Knot]) -> Vec<Stroke> {
     let mut out = Vec::new();
     for row in 0..11 {
-        let (k, tangent) = body_at(body, 0.985 - 0.0085 * row as f32);
+        let i = body_at(body, 0.985 - 0.0085 * row as f32);
+        let (k, tangent) = (body[i], tangent_at(body, i));
         let side = tangent.cross(k.dorsal);
         for column in -3..=3_i32 {
             let angle = (column as f32 + 0.5 * (row % 2) as f32 - 0.25) * 0.42;
@@ -204,7 +209,7 @@ fn mane(body: &[Knot]) -> Vec<Stroke> {
 /// A leg that reaches to the shaft: the limb with its toes, the claws, and flames at the elbow.
 fn leg(body: &[Knot], at: f32, direction: f32) -> [Vec<Stroke>; 3] {
     // Points around the shaft, relative to the angle and height of the root
-    let (k, _) = body_at(body, at);
+    let k = body[body_at(body, at)];
     let angle = k.center.y.atan2(k.center.x);
     let z = k.center.z;
     let place = |turn: f32, radius: f32, up: f32| around(angle + direction * turn, radius, z + up);

@@ -32,13 +32,19 @@ pub struct Stroke {
 }
 
 impl Stroke {
-    /// Distance of a point from the surface (negative inside), and the position along the axis, 0..1.
+    /// The position along the axis that is nearest to a point, 0..1.
     #[inline]
-    pub fn distance(&self, p: Vec3) -> (f32, f32) {
+    pub fn position(&self, p: Vec3) -> f32 {
         let [a, b] = &self.knots;
         let axis = b.center - a.center;
-        let t = ((p - a.center).dot(axis) / axis.length_squared().max(1e-12)).clamp(0.0, 1.0);
-        ((p - a.center - axis * t).length() - (a.radius + (b.radius - a.radius) * t), t)
+        ((p - a.center).dot(axis) / axis.length_squared().max(1e-12)).clamp(0.0, 1.0)
+    }
+
+    /// Distance of a point from the surface (negative inside), given its position along the axis.
+    #[inline]
+    pub fn distance(&self, p: Vec3, t: f32) -> f32 {
+        let [a, b] = &self.knots;
+        (p - a.center - (b.center - a.center) * t).length() - (a.radius + (b.radius - a.radius) * t)
     }
 
     /// The coordinates at `t` for carving.
@@ -109,7 +115,8 @@ impl Part {
                 // The nearest selected stroke, with the relief at its nearest point
                 let (mut nearest, mut at) = (f32::INFINITY, (0, 0.0));
                 for &i in selected {
-                    let (d, t) = strokes[i as usize].distance(p);
+                    let t = strokes[i as usize].position(p);
+                    let d = strokes[i as usize].distance(p, t);
                     if d < nearest {
                         (nearest, at) = (d, (i, t));
                     }
@@ -190,9 +197,11 @@ mod tests {
     #[test]
     fn distances_of_strokes_and_turned_profiles_are_right() {
         let stroke = Stroke { knots: [knot(0.0, 0.2), knot(2.0, 0.1)] };
-        let (d, t) = stroke.distance(Vec3::new(1.0, 0.0, 1.0));
+        let p = Vec3::new(1.0, 0.0, 1.0);
+        let t = stroke.position(p);
+        let d = stroke.distance(p, t);
         assert!((d - 0.85).abs() < 1e-6 && (t - 0.5).abs() < 1e-6);
-        assert!((stroke.distance(Vec3::new(-1.0, 0.0, 0.0)).0 - 0.8).abs() < 1e-6);
+        assert!((stroke.distance(Vec3::new(-1.0, 0.0, 0.0), 0.0) - 0.8).abs() < 1e-6);
         let turned = Turned { profile: [(0.0, 0.0), (1.0, 0.0), (1.0, 2.0), (0.0, 2.0)].map(Vec2::from).to_vec() };
         assert!((turned.distance(Vec3::new(0.0, 0.0, 1.0)) + 1.0).abs() < 1e-6);
         assert!((turned.distance(Vec3::new(0.0, 0.0, 2.5)) - 0.5).abs() < 1e-6);

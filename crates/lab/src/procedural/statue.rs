@@ -7,7 +7,7 @@
 
 use super::dragon;
 use super::nets::{Ball, Field, Grid, largest_piece, mesh_field};
-use super::solids::{LIPSCHITZ, Part, Shape, smooth_min};
+use super::solids::{LIPSCHITZ, Part, Shape, Stroke, smooth_min};
 use lumiris::geometry::TriangleMesh;
 use lumiris_numbers::math::Vec3;
 
@@ -76,8 +76,8 @@ impl StatueField {
         let distance = match &part.shape {
             Shape::Turned(turned) => turned.distance(ball.center),
             Shape::Strokes(strokes) => {
-                let distances: Vec<(u32, f32)> =
-                    candidates.map(|i| (i, strokes[i as usize].distance(ball.center).0)).collect();
+                let distance = |stroke: &Stroke| stroke.distance(ball.center, stroke.position(ball.center));
+                let distances: Vec<(u32, f32)> = candidates.map(|i| (i, distance(&strokes[i as usize]))).collect();
                 let min = distances.iter().map(|&(_, d)| d).fold(f32::INFINITY, f32::min);
                 selected.extend(distances.iter().filter(|&&(_, d)| d - reach <= min + reach).map(|&(i, _)| i));
                 min
@@ -129,7 +129,7 @@ impl Field for StatueField {
 
 #[cfg(test)]
 mod tests {
-    use super::super::nets::tests::assert_closed;
+    use super::super::nets::assert_closed;
     use super::*;
     use lumiris_test_support::random::{RngExt, pcg32};
 

@@ -1,10 +1,11 @@
 //! Figures of a paper and their page: a table of the paper's results and the measured ones, the figures in order, and a
 //! file with all numbers.
 
+use super::error::write_file;
 use super::images::significant;
 use super::measure::Estimate;
 use super::page::{Block, Cell, Page, Table};
-use super::{Options, ReproduceError, write_file};
+use super::{Options, ReproduceError};
 use serde_json::{Value, json};
 use std::path::PathBuf;
 use std::time::Duration;

@@ -75,6 +75,15 @@ pub enum View {
     Unshadowed,
 }
 
+/// The best allocation per pixel.
+#[derive(Clone, Debug)]
+pub struct PixelPlan {
+    /// M/N of every pixel.
+    pub ratios: Vec<f32>,
+    /// Processor time of the pilot.
+    pub seconds: f64,
+}
+
 impl Stage {
     /// Loads a scene for an image of `size` (width, height) pixels.
     pub fn load(path: &Path, size: [u32; 2], threads: Option<usize>) -> Result<Self, ReproduceError> {
@@ -105,9 +114,9 @@ impl Stage {
     }
 
     /// Numbers of triangles and lights, for the page.
-    pub fn facts(&self) -> (usize, usize) {
+    pub fn facts(&self) -> [usize; 2] {
         let scene = &self.job.world.scene;
-        (scene.geometry.primitive_counts().triangles, scene.lights.lights.len())
+        [scene.geometry.primitive_counts().triangles, scene.lights.lights.len()]
     }
 
     fn set(&mut self, method: &Method) {
@@ -115,8 +124,8 @@ impl Stage {
     }
 
     /// Determines the best allocation of an estimate's time to proposals and samples in each pixel, by the renderer's
-    /// own pilot. Returns M/N of every pixel, and the processor time (s).
-    pub fn plan_per_pixel(&mut self, times: Costs, budget: f64) -> Result<(Vec<f32>, f64), ReproduceError> {
+    /// own pilot.
+    pub fn plan_per_pixel(&mut self, times: Costs, budget: f64) -> Result<PixelPlan, ReproduceError> {
         let start = processor_time::of_process();
         self.set(&Method { per_pixel: true, ..Method::ris(1, 1) });
         self.job.world.scene.film.filter = PixelFilter::Box { rx: CENTRE, ry: CENTRE };
@@ -126,7 +135,7 @@ impl Stage {
         let seconds = processor_time::of_process().saturating_sub(start).as_secs_f64();
         let ratios = map.ratios.clone();
         self.job.sample_count_map = Some(map);
-        Ok((ratios, seconds))
+        Ok(PixelPlan { ratios, seconds })
     }
 
     /// Renders `spp` camera rays per pixel.
@@ -394,6 +403,12 @@ pub fn reference(all: &[Measured]) -> Vec<[f64; 3]> {
         p.map(|v| v / turns.max(1) as f64)
     };
     (0..pixels).map(mean).collect()
+}
+
+/// Size (width, height) of an image with the aspect ratio of `shape`, whose longer edge has `size` pixels.
+pub(super) fn scaled(shape: [u32; 2], size: u32) -> [u32; 2] {
+    let longer = shape[0].max(shape[1]).max(1);
+    shape.map(|s| (s * size / longer).max(1))
 }
 
 #[cfg(test)]

@@ -37,13 +37,14 @@ pub fn sample_rectangle(
     u: [&[f32]; 2],
     out: &mut PointsOnLight<'_>,
 ) {
-    dispatch!(level, simd => sample_rectangle_lanes(simd, (rectangle, flatness_error), from, u, out));
+    dispatch!(level, simd => sample_rectangle_lanes(simd, rectangle, flatness_error, from, u, out));
 }
 
 #[inline(always)]
 fn sample_rectangle_lanes<S: Simd>(
     simd: S,
-    (rectangle, flatness_error): (&Rectangle, f32),
+    rectangle: &Rectangle,
+    flatness_error: f32,
     from: [&[f32]; 3],
     u: [&[f32]; 2],
     out: &mut PointsOnLight<'_>,
@@ -83,7 +84,7 @@ impl<S: Simd> Place<S> {
     #[inline(always)]
     fn new(rectangle: &Rectangle, seen: &SphericalSetup<S>, from: Vec3s<S>, [u0, u1]: [F<S>; 2]) -> Self {
         let (simd, size) = (u0.token(), rectangle.size);
-        let (s, t) = seen.sample(widened(u0), widened(u1));
+        let [s, t] = seen.sample(widened(u0), widened(u1));
         // Infinity where the solid angle is inaccurate
         let solid_angle = seen.is_accurate(rectangle).select(seen.solid_angle, f64x8::splat(simd, f64::INFINITY));
         let density = F::splat(simd, 1.0) / narrowed(solid_angle);

@@ -4,6 +4,7 @@ use super::shapes::Rectangle;
 use crate::lane::{F, narrowed, widened};
 use fearless_simd::{Simd, f64x8, mask64x8, prelude::*};
 use lumiris_numbers::math::DVec3;
+use lumiris_numbers::math::elementary::SinCos;
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, FRAC_PI_8, PI, TAU};
 
 /// Smallest solid angle (sr) that is sampled by solid angle. Above it, f64 angles are accurate even for rectangles that
@@ -20,7 +21,7 @@ pub(super) struct SphericalSetup<S: Simd> {
     z0: f64x8<S>,
     pub(super) solid_angle: f64x8<S>,
     /// cos and −sin of g2 + g3.
-    rotation: (f64x8<S>, f64x8<S>),
+    rotation: [f64x8<S>; 2],
     /// z of the normals of the planes through the edges y0 and y1.
     b: [f64x8<S>; 2],
     /// 1 − b0².
@@ -29,7 +30,7 @@ pub(super) struct SphericalSetup<S: Simd> {
 
 impl<S: Simd> SphericalSetup<S> {
     #[inline(always)]
-    fn new(x: [f64x8<S>; 2], y: [f64x8<S>; 2], z0: f64x8<S>, g23: (f64x8<S>, f64x8<S>), solid_angle: f64x8<S>) -> Self {
+    fn new(x: [f64x8<S>; 2], y: [f64x8<S>; 2], z0: f64x8<S>, g23: [f64x8<S>; 2], solid_angle: f64x8<S>) -> Self {
         let z2 = z0 * z0;
         // One division serves all: |g2·g3| = (x0² + z0²)·√(y0² + z0²)·√(y1² + z0²)
         let side = x[0] * x[0] + z2;
@@ -37,15 +38,15 @@ impl<S: Simd> SphericalSetup<S> {
         let scale = f64x8::splat(z0.token(), 1.0) / (side * below * above);
         let (by_below, by_above) = (scale * side * above, scale * side * below);
         let (b, k) = ([-y[0] * by_below, y[1] * by_above], z2 * by_below * by_below);
-        SphericalSetup { x, y, z0, solid_angle, rotation: (g23.0 * scale, -(g23.1 * scale)), b, k }
+        SphericalSetup { x, y, z0, solid_angle, rotation: [g23[0] * scale, -(g23[1] * scale)], b, k }
     }
 
     /// Memory of a setup.
     #[inline(always)]
     pub(super) fn empty(simd: S) -> Self {
         let zero = f64x8::splat(simd, 0.0);
-        let (two, rotation) = ([zero; 2], (zero, zero));
-        SphericalSetup { x: two, y: two, z0: zero, solid_angle: zero, rotation, b: two, k: zero }
+        let two = [zero; 2];
+        SphericalSetup { x: two, y: two, z0: zero, solid_angle: zero, rotation: two, b: two, k: zero }
     }
 
     /// The setup for the points `from`.
@@ -58,23 +59,23 @@ impl<S: Simd> SphericalSetup<S> {
         let y = [y0, y0 + f64::from(rectangle.size.y)];
         let (xx, yy, zz) = ([x[0] * x[0], x[1] * x[1]], [y[0] * y[0], y[1] * y[1]], z0 * z0);
         // e^{ig} of the inner angles up to a positive factor, and pairwise products
-        let g0 = (x[1] * y[0], -(z0 * (xx[1] + yy[0] + zz).sqrt()));
-        let g1 = (-(x[1] * y[1]), -(z0 * (xx[1] + yy[1] + zz).sqrt()));
-        let g2 = (x[0] * y[1], -(z0 * (xx[0] + yy[1] + zz).sqrt()));
-        let g3 = (-(x[0] * y[0]), -(z0 * (xx[0] + yy[0] + zz).sqrt()));
+        let g0 = [x[1] * y[0], -(z0 * (xx[1] + yy[0] + zz).sqrt())];
+        let g1 = [-(x[1] * y[1]), -(z0 * (xx[1] + yy[1] + zz).sqrt())];
+        let g2 = [x[0] * y[1], -(z0 * (xx[0] + yy[1] + zz).sqrt())];
+        let g3 = [-(x[0] * y[0]), -(z0 * (xx[0] + yy[0] + zz).sqrt())];
         let (g01, g23) = (product(g0, g1), product(g2, g3));
         Self::new(x, y, z0, g23, angle(product(g01, g23)))
     }
 
     /// Distances from the corner along the edges.
     #[inline(always)]
-    pub(super) fn sample(&self, u0: f64x8<S>, u1: f64x8<S>) -> (F<S>, F<S>) {
+    pub(super) fn sample(&self, u0: f64x8<S>, u1: f64x8<S>) -> [F<S>; 2] {
         let simd = u0.token();
         let (one, least) = (f64x8::splat(simd, 1.0), F::splat(simd, f32::MIN_POSITIVE));
         // cos and sin of u·S − (g2 + g3)
-        let (sin_us, cos_us) = sin_cos_turns_f64(u0 * (self.solid_angle * (1.0 / TAU)));
-        let cos = cos_us * self.rotation.0 - sin_us * self.rotation.1;
-        let sin = cos_us * self.rotation.1 + sin_us * self.rotation.0;
+        let SinCos { sin: sin_us, cos: cos_us } = sin_cos_turns_f64(u0 * (self.solid_angle * (1.0 / TAU)));
+        let cos = cos_us * self.rotation[0] - sin_us * self.rotation[1];
+        let sin = cos_us * self.rotation[1] + sin_us * self.rotation[0];
         // With fu = f/sin, x = −z0·sgn(fu)/√(fu² + b0² − 1). Differences are in f64, roots and quotients in f32
         let f = cos * self.b[0] - self.b[1];
         let under_root = narrowed(f * f - sin * sin * self.k).max(least);
@@ -88,7 +89,7 @@ impl<S: Simd> SphericalSetup<S> {
         let h = h0 + u1 * (h1 - h0);
         let slope = (narrowed(d2) / narrowed(one - h * h).max(least)).sqrt();
         let y = (h * widened(slope)).max(self.y[0]).min(self.y[1]);
-        (narrowed(x - self.x[0]), narrowed(y - self.y[0]))
+        [narrowed(x - self.x[0]), narrowed(y - self.y[0])]
     }
 
     /// True unless the rectangle is edge-on, or so small that its angles lose precision.
@@ -106,14 +107,15 @@ fn dot<S: Simd>(v: [f64x8<S>; 3], w: DVec3) -> f64x8<S> {
     v[0] * w.x + v[1] * w.y + v[2] * w.z
 }
 
+/// The product of two complex numbers.
 #[inline(always)]
-fn product<S: Simd>(a: (f64x8<S>, f64x8<S>), b: (f64x8<S>, f64x8<S>)) -> (f64x8<S>, f64x8<S>) {
-    (a.0 * b.0 - a.1 * b.1, a.0 * b.1 + a.1 * b.0)
+fn product<S: Simd>(a: [f64x8<S>; 2], b: [f64x8<S>; 2]) -> [f64x8<S>; 2] {
+    [a[0] * b[0] - a[1] * b[1], a[0] * b[1] + a[1] * b[0]]
 }
 
 /// The argument of a complex number in [0, 2π); 0 for numbers slightly below the positive real axis.
 #[inline(always)]
-fn angle<S: Simd>((x, y): (f64x8<S>, f64x8<S>)) -> f64x8<S> {
+fn angle<S: Simd>([x, y]: [f64x8<S>; 2]) -> f64x8<S> {
     let simd = x.token();
     let zero = f64x8::splat(simd, 0.0);
     let a = atan2(y, x);
@@ -161,7 +163,7 @@ const TAN_3_PI_16: f64 = 0.668_178_637_919_298_9;
 
 /// sin 2πt and cos 2πt for |t| < 2²⁰, from series around the nearest quarter turn; errors below 2⁻⁴⁵.
 #[inline(always)]
-pub fn sin_cos_turns_f64<S: Simd>(t: f64x8<S>) -> (f64x8<S>, f64x8<S>) {
+pub fn sin_cos_turns_f64<S: Simd>(t: f64x8<S>) -> SinCos<f64x8<S>> {
     let simd = t.token();
     let quarters = (t * 4.0).round_ties_even();
     let x = (t - quarters * 0.25) * TAU;
@@ -191,5 +193,5 @@ pub fn sin_cos_turns_f64<S: Simd>(t: f64x8<S>) -> (f64x8<S>, f64x8<S>) {
         (k.simd_eq(one), k.simd_eq(two), k.simd_eq(three));
     let is_odd = is_1 | is_3;
     let (s, c) = (is_odd.select(cos, sin), is_odd.select(sin, cos));
-    ((is_2 | is_3).select(-s, s), (is_1 | is_2).select(-c, c))
+    SinCos { sin: (is_2 | is_3).select(-s, s), cos: (is_1 | is_2).select(-c, c) }
 }

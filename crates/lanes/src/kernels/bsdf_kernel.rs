@@ -26,6 +26,15 @@ pub struct Value<N> {
     pub pdf: N,
 }
 
+/// As [`Value`], the same in all channels.
+#[derive(Clone, Copy, Debug)]
+pub struct GreyValue<N> {
+    /// f·|cos θi| (1/sr), without deltas.
+    pub f_cos: N,
+    /// Density of the samples (1/sr), without deltas.
+    pub pdf: N,
+}
+
 /// A sampled direction. The weight of the path is `f_cos`/`pdf`.
 #[derive(Clone, Copy, Debug)]
 pub struct Drawn<N> {

@@ -11,7 +11,7 @@
 //!
 //! [`SmoothCoated`] has a smooth interface. Parameters: b, the albedo as above, η, thickness.
 
-use super::bsdf_kernel::{BsdfKernel, Drawn, Value, flags, lobe, same_side};
+use super::bsdf_kernel::{BsdfKernel, Drawn, GreyValue, Value, flags, lobe, same_side};
 use super::facets::Facets;
 use super::fresnel::{fr_dielectric, reflect};
 use lumiris_numbers::math::elementary::{cosine_hemisphere, exp};
@@ -82,19 +82,19 @@ fn base<N: Number>(p: &[N], t: N, cos: N) -> Value<N> {
     Value { f_cos: [p[0] * factor, p[1] * factor, p[2] * factor], pdf: cos * FRAC_1_PI }
 }
 
-/// Density of reflection by a rough interface, and its f·cos θi. Both directions are in the upper hemisphere.
+/// Reflection by a rough interface. Both directions are in the upper hemisphere.
 #[inline(always)]
-pub fn interface<N: Number>(p: &[N], wo: V3<N>, wi: V3<N>) -> (N, N) {
+pub fn interface<N: Number>(p: &[N], wo: V3<N>, wi: V3<N>) -> GreyValue<N> {
     let h = wo.plus(wi);
     let fresnel = fr_dielectric(wo.dot(h).magnitude() / h.dot(h).root(), p[4]);
-    let (d_g, pdf) = Facets { alpha_x: p[5], alpha_y: p[6] }.reflection(wo, wi, h);
-    (pdf.or_zero(fresnel.above(pdf.constant(0.0))), d_g * fresnel)
+    let GreyValue { f_cos, pdf } = Facets { alpha_x: p[5], alpha_y: p[6] }.reflection(wo, wi, h);
+    GreyValue { f_cos: f_cos * fresnel, pdf: pdf.or_zero(fresnel.above(pdf.constant(0.0))) }
 }
 
 /// Value and density of a rough coat for directions in the upper hemisphere, given T and R of `wo` and T of `wi`.
 #[inline(always)]
 pub fn rough_value<N: Number>(p: &[N], wo: V3<N>, wi: V3<N>, of_wo: [N; 2], t_wi: N) -> Value<N> {
-    let (density, reflected) = interface(p, wo, wi);
+    let GreyValue { f_cos: reflected, pdf: density } = interface(p, wo, wi);
     let Value { f_cos: [r, g, b], pdf } = base(p, of_wo[0] * t_wi, wi.z);
     let choice = p_interface(p[3], of_wo);
     Value { f_cos: [r + reflected, g + reflected, b + reflected], pdf: choice * density + (-choice + 1.0) * pdf }

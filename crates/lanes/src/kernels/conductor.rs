@@ -1,7 +1,7 @@
 //! Reflection by a metal, smooth or with GGX microfacets: f = D F G / (4 cos θo cos θi) [Cook and Torrance 1982; Walter
 //! et al. 2007]. Single scattering only. Parameters: alphas, η, k.
 
-use super::bsdf_kernel::{BsdfKernel, Drawn, Value, flags, lobe, same_side};
+use super::bsdf_kernel::{BsdfKernel, Drawn, GreyValue, Value, flags, lobe, same_side};
 use super::facets::Facets;
 use super::fresnel::{fr_complex, reflect};
 use lumiris_numbers::math::number::{Mask as _, Number};
@@ -29,7 +29,7 @@ impl BsdfKernel for Conductor {
     fn evaluate<N: Number>(p: &[N], _tables: &[f32], wo: V3<N>, wi: V3<N>) -> Value<N> {
         let h = wo.plus(wi);
         let cos_m = wo.dot(h).magnitude() / h.dot(h).root();
-        let (d_g, pdf) = facets(p).reflection(wo, wi, h);
+        let GreyValue { f_cos: d_g, pdf } = facets(p).reflection(wo, wi, h);
         Value { f_cos: metal(p, cos_m, d_g), pdf }.kept(same_side(wo, wi) & !facets(p).is_smooth())
     }
 
@@ -43,7 +43,7 @@ impl BsdfKernel for Conductor {
         if !is_smooth.all() {
             let m = facets(p).sample_m(wo, [u[1], u[2]]);
             let rough = reflect(wo, m);
-            let (of_rough, pdf_rough) = facets(p).reflection(wo, rough, m);
+            let GreyValue { f_cos: of_rough, pdf: pdf_rough } = facets(p).reflection(wo, rough, m);
             wi = V3::choose(is_smooth, mirror, rough);
             (d_g, pdf) = (N::choose(is_smooth, one, of_rough), N::choose(is_smooth, one, pdf_rough));
             cos_m = N::choose(is_smooth, cos_m, wo.dot(m).magnitude());

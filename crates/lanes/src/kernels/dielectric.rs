@@ -5,9 +5,9 @@
 //! refraction on the side of `wi` relative to the side of `wo`. Single scattering only. Parameters: η on the side of −z
 //! relative to the side of +z, alphas.
 
-use super::bsdf_kernel::{BsdfKernel, Drawn, Value, flags, lobe, same_side};
+use super::bsdf_kernel::{BsdfKernel, Drawn, GreyValue, Value, flags, lobe, same_side};
 use super::facets::Facets;
-use super::fresnel::{fr_inverse, inverse_eta, reflect, refract};
+use super::fresnel::{Refracted, fr_inverse, inverse_eta, reflect, refract};
 use lumiris_numbers::math::number::{Mask as _, Number};
 use lumiris_numbers::math::v3::V3;
 
@@ -49,14 +49,24 @@ pub struct Interface<N> {
 }
 
 impl Select {
-    /// Probability of reflection among the selected lobes, and the mask of lanes in which these carry light.
+    /// Probability of reflection among the selected lobes.
     #[inline(always)]
-    fn p_reflect<N: Number>(self, fresnel: N) -> (N, N::Mask) {
+    fn p_reflect<N: Number>(self, fresnel: N) -> N {
+        match self {
+            Select::All => fresnel,
+            Select::Reflection => fresnel.constant(1.0),
+            Select::Transmission => fresnel.constant(0.0),
+        }
+    }
+
+    /// True where the selected lobes carry light.
+    #[inline(always)]
+    fn is_lit<N: Number>(self, fresnel: N) -> N::Mask {
         let (zero, one) = (fresnel.constant(0.0), fresnel.constant(1.0));
         match self {
-            Select::All => (fresnel, one.above(zero)),
-            Select::Reflection => (one, fresnel.above(zero)),
-            Select::Transmission => (zero, one.above(fresnel)),
+            Select::All => one.above(zero),
+            Select::Reflection => fresnel.above(zero),
+            Select::Transmission => one.above(fresnel),
         }
     }
 }
@@ -97,7 +107,7 @@ impl<N: Number> Interface<N> {
 
     /// f·|cos θi| and density (1/sr); 0 where specular.
     #[inline(always)]
-    pub fn evaluate(self, wo: V3<N>, wi: V3<N>, select: Select, transport: Transport) -> (N, N) {
+    pub fn evaluate(self, wo: V3<N>, wi: V3<N>, select: Select, transport: Transport) -> GreyValue<N> {
         let (zero, one) = (wo.z.constant(0.0), wo.z.constant(1.0));
         let inverse = inverse_eta(wo.z, self.eta);
         let h = wo.times(N::choose(same_side(wo, wi), one, inverse)).plus(wi);
@@ -108,7 +118,7 @@ impl<N: Number> Interface<N> {
         let at = Microfacet { h, o_m, i_m };
         let Value { f_cos, pdf } =
             self.of_normal(wo, wi, at, inverse, select, transport).kept(faces & !self.is_specular());
-        (f_cos[0], pdf)
+        GreyValue { f_cos: f_cos[0], pdf }
     }
 
     /// f·|cos θi| and density (1/sr) for a half vector.
@@ -125,8 +135,8 @@ impl<N: Number> Interface<N> {
         // Reflection or transmission
         let is_reflection = same_side(wo, wi);
         let fresnel = fr_inverse(o_m, inverse);
-        let (p, exists) = select.p_reflect(fresnel);
-        let (d_g, density) = self.facets.reflection(wo, wi, h);
+        let (p, exists) = (select.p_reflect(fresnel), select.is_lit(fresnel));
+        let GreyValue { f_cos: d_g, pdf: density } = self.facets.reflection(wo, wi, h);
         let sum = i_m + o_m * inverse;
         let jacobian = i_m.magnitude() * o_m.magnitude() * 4.0 / (sum * sum);
         let scale = match transport {
@@ -149,9 +159,9 @@ impl<N: Number> Interface<N> {
         let m =
             if is_specular.all() { up } else { V3::choose(is_specular, up, self.facets.sample_m(wo, [u[1], u[2]])) };
         let o_m = wo.dot(m);
-        let (refracted, inverse, passes) = refract(wo, m, self.eta);
+        let Refracted { wi: refracted, inverse_eta: inverse, passes } = refract(wo, m, self.eta);
         let fresnel = fr_inverse(o_m, inverse);
-        let (p, exists) = select.p_reflect(fresnel);
+        let (p, exists) = (select.p_reflect(fresnel), select.is_lit(fresnel));
         let reflects = p.above(u[0]);
         let wi = V3::choose(reflects, reflect(wo, m), refracted);
 
@@ -183,7 +193,7 @@ impl BsdfKernel for Dielectric {
 
     #[inline(always)]
     fn evaluate<N: Number>(p: &[N], _tables: &[f32], wo: V3<N>, wi: V3<N>) -> Value<N> {
-        let (f_cos, pdf) = Interface::new(p).evaluate(wo, wi, Select::All, Transport::Radiance);
+        let GreyValue { f_cos, pdf } = Interface::new(p).evaluate(wo, wi, Select::All, Transport::Radiance);
         Value::grey(f_cos, pdf)
     }
 
@@ -198,7 +208,7 @@ impl BsdfKernel for Exit {
 
     #[inline(always)]
     fn evaluate<N: Number>(p: &[N], _tables: &[f32], wo: V3<N>, wi: V3<N>) -> Value<N> {
-        let (f_cos, pdf) = Interface::new(p).evaluate(wo, wi, Select::Transmission, Transport::Radiance);
+        let GreyValue { f_cos, pdf } = Interface::new(p).evaluate(wo, wi, Select::Transmission, Transport::Radiance);
         Value::grey(f_cos, pdf)
     }
 

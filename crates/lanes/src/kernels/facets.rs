@@ -7,7 +7,8 @@
 //! With L(w) = √(cos²θ + (αx x)² + (αy y)²), which avoids the tangent,
 //! G/(4 |cos θo|) = |cos θi|/(2 (|cos θi| L(wo) + |cos θo| L(wi))) and G1(wo)/(4 |cos θo|) = 1/(2 (|cos θo| + L(wo))).
 
-use lumiris_numbers::math::elementary::sin_cos_turn;
+use super::bsdf_kernel::GreyValue;
+use lumiris_numbers::math::elementary::{SinCos, sin_cos_turn};
 use lumiris_numbers::math::number::Number;
 use lumiris_numbers::math::v3::V3;
 use std::f32::consts::PI;
@@ -59,12 +60,12 @@ impl<N: Number> Facets<N> {
         cos_o.constant(0.5) / (cos_o.magnitude() + l_o)
     }
 
-    /// D G/(4 |cos θo|), which is f·|cos θi| divided by the reflectance, and the density (1/sr) of reflection by
-    /// normals visible from `wo`. `h` is along the half vector.
+    /// Reflection by normals visible from `wo`: D G/(4 |cos θo|), as of a surface that reflects all light, and its
+    /// density. `h` is along the half vector.
     #[inline(always)]
-    pub fn reflection(self, wo: V3<N>, wi: V3<N>, h: V3<N>) -> (N, N) {
+    pub fn reflection(self, wo: V3<N>, wi: V3<N>, h: V3<N>) -> GreyValue<N> {
         let (d, l_o) = (self.d(h), self.l(wo));
-        (d * Self::g_cos(wo.z, wi.z, l_o, self.l(wi)), d * Self::g1_over_cos(wo.z, l_o))
+        GreyValue { f_cos: d * Self::g_cos(wo.z, wi.z, l_o, self.l(wi)), pdf: d * Self::g1_over_cos(wo.z, l_o) }
     }
 
     /// Density (1/sr) of reflection by normals visible from `wo`.
@@ -85,7 +86,7 @@ impl<N: Number> Facets<N> {
         // A uniform point of the cap of directions that reflect `h` to the upper hemisphere
         let z = (one - u[1]) * (h.z + 1.0) - h.z;
         let sin = (one - z * z).safe_root();
-        let (sin_phi, cos_phi) = sin_cos_turn(u[0]);
+        let SinCos { sin: sin_phi, cos: cos_phi } = sin_cos_turn(u[0]);
         let m = V3 { x: sin * cos_phi, y: sin * sin_phi, z }.plus(h);
         V3 { x: m.x * self.alpha_x, y: m.y * self.alpha_y, z: m.z.greater(w.z.constant(1e-6)) }.unit()
     }

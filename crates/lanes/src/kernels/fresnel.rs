@@ -11,17 +11,27 @@ pub fn reflect<N: Number>(w: V3<N>, n: V3<N>) -> V3<N> {
     n.times(w.dot(n) * 2.0).minus(w)
 }
 
-/// The refracted direction of `w` at a surface with normal `n`, and 1/η along the path (η if `w` is on the side of
-/// `-n`). The mask is false at total internal reflection.
+/// A refracted direction.
+#[derive(Clone, Copy, Debug)]
+pub struct Refracted<N: Number> {
+    /// The direction.
+    pub wi: V3<N>,
+    /// 1/η along the path.
+    pub inverse_eta: N,
+    /// False at total internal reflection.
+    pub passes: N::Mask,
+}
+
+/// Refracts `w` at a surface with normal `n`. 1/η is η if `w` is on the side of `-n`.
 #[inline(always)]
-pub fn refract<N: Number>(w: V3<N>, n: V3<N>, eta: N) -> (V3<N>, N, N::Mask) {
+pub fn refract<N: Number>(w: V3<N>, n: V3<N>, eta: N) -> Refracted<N> {
     let (cos, one) = (w.dot(n), eta.constant(1.0));
     let inverse = inverse_eta(cos, eta);
     let cos_i = cos.magnitude();
     let sin2_t = (one - cos * cos).greater(eta.constant(0.0)) * (inverse * inverse);
     let along = cos_i * inverse - (one - sin2_t).safe_root();
     let along = N::choose(eta.constant(0.0).above(cos), -along, along);
-    (n.times(along).minus(w.times(inverse)), inverse, one.above(sin2_t))
+    Refracted { wi: n.times(along).minus(w.times(inverse)), inverse_eta: inverse, passes: one.above(sin2_t) }
 }
 
 /// 1/η along a path, one direction of which has the cosine `cos` with the normal.

@@ -21,7 +21,7 @@ pub mod rows;
 pub mod sheen;
 pub mod thin_dielectric;
 
-pub use bsdf_kernel::{BsdfKernel, Drawn, Value, lobe};
+pub use bsdf_kernel::{BsdfKernel, Drawn, GreyValue, Value, lobe};
 pub use coated::{Coated, SmoothCoated};
 pub use conductor::Conductor;
 pub use dielectric::{Dielectric, Exit};

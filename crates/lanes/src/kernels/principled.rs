@@ -17,7 +17,7 @@
 //! Smooth facets get the smallest roughness that counts as rough, so there are no deltas. Parameters: see [`Params`].
 
 use super::albedo::{self, Place, roughness};
-use super::bsdf_kernel::{BsdfKernel, Drawn, Value, flags, lobe};
+use super::bsdf_kernel::{BsdfKernel, Drawn, GreyValue, Value, flags, lobe};
 use super::dielectric::{Interface, Select, Transport};
 use super::facets::Facets;
 use super::fresnel::{inverse_eta, reflect};
@@ -250,11 +250,17 @@ impl<N: Number> Surface<N> {
         Surface { p, diffuse, thin, solid, roughness, mean, dielectric, facets }
     }
 
-    /// Schlick's reflectance of the coat, and the Ē of its roughness.
+    /// Ē of the roughness of the coat.
     #[inline(always)]
-    fn coat(&self) -> (Schlick<N>, N) {
+    fn coat_mean(&self) -> N {
         let [mean, _] = albedo::tables().mean(roughness(self.p.coat_alpha));
-        (Schlick::new(splat(mean.constant(COAT_F0)), splat(mean.constant(1.0)), mean), mean)
+        mean
+    }
+
+    /// Schlick's reflectance of a coat with this Ē.
+    #[inline(always)]
+    fn coat(mean: N) -> Schlick<N> {
+        Schlick::new(splat(mean.constant(COAT_F0)), splat(mean.constant(1.0)), mean)
     }
 
     #[inline(always)]
@@ -267,7 +273,7 @@ impl<N: Number> Surface<N> {
         }
         if self.p.has_coat().any() {
             let e = albedo::tables().directional(cos, roughness(self.p.coat_alpha));
-            (seen.coat_e, seen.coat) = (e[0], self.p.coat * self.coat().0.albedo(e).y);
+            (seen.coat_e, seen.coat) = (e[0], self.p.coat * Self::coat(self.coat_mean()).albedo(e).y);
         }
         seen
     }
@@ -314,7 +320,7 @@ impl<N: Number> Surface<N> {
         let (up_o, up_i) = (wo.with_z(wo.z.magnitude()), wi.with_z(wi.z.magnitude()));
         let h = up_o.plus(up_i);
         let cos_m = up_o.dot(h) / h.dot(h).root();
-        let (single, density) = self.p.facets.reflection(up_o, up_i, h);
+        let GreyValue { f_cos: single, pdf: density } = self.p.facets.reflection(up_o, up_i, h);
         let of_wi = self.seen(up_i.z);
         let cosine = up_i.z * FRAC_1_PI;
         let multiple = (-of_wo.e[0] + 1.0) * (-of_wi.e[0] + 1.0) * cosine / left(self.mean[0]);
@@ -332,7 +338,7 @@ impl<N: Number> Surface<N> {
         let is_solid = self.solid.above(zero);
         if is_solid.any() {
             let glass = Interface { eta: self.p.eta, facets: self.p.facets };
-            let (of_glass, of_pdf) = glass.evaluate(wo, wi, Select::All, Transport::Radiance);
+            let GreyValue { f_cos: of_glass, pdf: of_pdf } = glass.evaluate(wo, wi, Select::All, Transport::Radiance);
             let colored = V3::choose(reflects, splat(zero.constant(1.0)), self.p.base_color);
             f = f.plus(colored.times((of_glass * self.solid).or_zero(is_solid)));
             pdf = pdf + (choice.solid * of_pdf).or_zero(is_solid);
@@ -347,8 +353,9 @@ impl<N: Number> Surface<N> {
 
         // Coat
         if self.p.has_coat().any() {
-            let (single, density) = self.p.coat_facets().reflection(up_o, up_i, h);
-            let (schlick, mean) = self.coat();
+            let GreyValue { f_cos: single, pdf: density } = self.p.coat_facets().reflection(up_o, up_i, h);
+            let mean = self.coat_mean();
+            let schlick = Self::coat(mean);
             let multiple = (-of_wo.coat_e + 1.0) * (-of_wi.coat_e + 1.0) * cosine / left(mean);
             let coat = schlick.fresnel(cos_m).times(single).plus(schlick.fms.times(multiple)).times(self.p.coat);
             let passes = -of_wo.coat.greater(of_wi.coat) + 1.0;

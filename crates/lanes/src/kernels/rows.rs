@@ -255,7 +255,7 @@ fn frames<S: Simd>(simd: S, rows: &Rows<'_>, i: usize) -> [V3<Wide<S>>; 3] {
         let x: V3<Wide<S>> = Vec3s::load(simd, tangents, i).into();
         return [x, z.cross(x), z];
     }
-    let (x, y) = z.tangents();
+    let [x, y] = z.tangents();
     [x, y, z]
 }
 

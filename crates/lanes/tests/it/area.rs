@@ -5,6 +5,7 @@ use fearless_simd::{Simd, dispatch, f64x8, prelude::*};
 use lumiris_lanes::area::Rectangle;
 use lumiris_lanes::area::many::{PointsOnLight, sample_rectangle, sample_triangle};
 use lumiris_lanes::area::spherical::{atan2, sin_cos_turns_f64};
+use lumiris_numbers::math::elementary::SinCos;
 use lumiris_numbers::math::{Vec2, Vec3};
 use lumiris_test_support::random::{RngExt, pcg32};
 use std::array::from_fn;
@@ -58,7 +59,7 @@ fn arguments_of_complex_numbers_are_accurate() {
 fn sines_of_f64_are_accurate() {
     #[inline(always)]
     fn run<S: Simd>(simd: S, t: &[f64; 8]) -> [[f64; 8]; 2] {
-        let (s, c) = sin_cos_turns_f64(f64x8::load_array(simd, *t));
+        let SinCos { sin: s, cos: c } = sin_cos_turns_f64(f64x8::load_array(simd, *t));
         [s.to_array(), c.to_array()]
     }
     for i in -300..1000 {

@@ -5,16 +5,17 @@ use fearless_simd::dispatch;
 use fearless_simd::{Simd, prelude::*};
 use lumiris_lanes::lane::*;
 use lumiris_lanes::wide::*;
+use lumiris_numbers::math::elementary::SinCos;
 
 #[inline(always)]
 fn run<S: Simd>(simd: S, t: &[f32], [s, c, qs, qc]: [&mut [f32]; 4]) {
     for i in (0..t.len()).step_by(LANES) {
         let i = begin(i, t.len());
         let v = load(simd, t, i);
-        let (sin, cos) = sin_cos_turns(v);
+        let SinCos { sin, cos } = sin_cos_turns(v);
         store(sin, s, i);
         store(cos, c, i);
-        let (sin, cos) = sin_cos_quadrant(v.min(1.0).max(-1.0));
+        let SinCos { sin, cos } = sin_cos_quadrant(v.min(1.0).max(-1.0));
         store(sin, qs, i);
         store(cos, qc, i);
     }

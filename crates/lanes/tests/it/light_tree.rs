@@ -5,9 +5,9 @@ use lumiris_lanes::lane::LANES;
 use lumiris_lanes::level;
 use lumiris_lanes::light_tree::{GlossyLobes, Receivers, first_probabilities, importances};
 use lumiris_lanes::vertex::Columns3;
-use lumiris_numbers::math::Vec3;
 use lumiris_numbers::math::light_bound::{GlossyLobe, LightBound, Receiver, first_probability};
 use lumiris_numbers::math::warp::sample_uniform_sphere;
+use lumiris_numbers::math::{Sphere, Vec3};
 use lumiris_test_support::random::{Pcg32, RngExt, pcg32};
 
 const N: usize = 16 * LANES;
@@ -24,7 +24,8 @@ fn bound(stream: &mut Pcg32, two_sided: bool) -> LightBound {
     let center = Vec3::from_array(stream.random::<[f32; 3]>()) * 2.0 - 1.0;
     let cosines = [stream.random::<f32>(), stream.random::<f32>() - 0.5];
     let axis = sample_uniform_sphere(stream.random::<[f32; 2]>());
-    LightBound::new((center, 0.3 * stream.random::<f32>()), axis, cosines, two_sided, 1.0 + stream.random::<f32>())
+    let sphere = Sphere { center, radius: 0.3 * stream.random::<f32>() };
+    LightBound::new(sphere, axis, cosines, two_sided, 1.0 + stream.random::<f32>())
 }
 
 #[test]

@@ -51,7 +51,7 @@ impl ParameterGrid {
     /// The tables around a point, which is clamped to the grid.
     #[inline]
     pub fn at(&self, parameters: [f32; 2]) -> Blend {
-        let [(i, s), (j, t)] = [0, 1].map(|a| place(&self.axes[a], parameters[a]));
+        let [Cell { index: i, t: s }, Cell { index: j, t }] = [0, 1].map(|a| place(&self.axes[a], parameters[a]));
         let n = self.axes[1].len();
         let mut blend = Blend { tables: [(0, 0.0); 4], count: 0 };
         for (table, weight) in [
@@ -69,17 +69,24 @@ impl ParameterGrid {
     }
 }
 
-/// Index of the greatest value up to `x` among increasing values, and the relative position of `x` between it and the
-/// next one (0 at the last value).
+/// A cell between two neighbouring values, and a position in it.
+struct Cell {
+    /// Index of the first value.
+    index: usize,
+    /// Relative position between both values.
+    t: f32,
+}
+
+/// The cell that contains `x` among increasing values; the position is 0 at the last value.
 #[inline]
-fn place(axis: &[f32], x: f32) -> (usize, f32) {
+fn place(axis: &[f32], x: f32) -> Cell {
     let last = axis.len() - 1;
     let i = axis.partition_point(|&a| a <= x).saturating_sub(1);
     if i == last {
-        return (last, 0.0);
+        return Cell { index: last, t: 0.0 };
     }
     // NaN is treated as the first value
-    (i, ((x - axis[i]) / (axis[i + 1] - axis[i])).max(0.0))
+    Cell { index: i, t: ((x - axis[i]) / (axis[i + 1] - axis[i])).max(0.0) }
 }
 
 /// A type that can be interpolated linearly.
@@ -113,7 +120,7 @@ impl<T: Linear> BilinearTables<T> {
     /// The value at a point of a table.
     #[inline]
     pub fn at(&self, blend: &Blend, p: Vec2) -> T {
-        let [(x, s), (y, t)] = [cell(p.x, self.size[0]), cell(p.y, self.size[1])];
+        let [Cell { index: x, t: s }, Cell { index: y, t }] = [cell(p.x, self.size[0]), cell(p.y, self.size[1])];
         let row = |y: usize| lerp(self.blended(blend, x, y), self.blended(blend, x + 1, y), s);
         lerp(row(y), row(y + 1), t)
     }
@@ -125,12 +132,12 @@ impl<T: Linear> BilinearTables<T> {
     }
 }
 
-/// The cell among n − 1 that contains `x` in [0, 1], and the relative position in it.
+/// The cell among n − 1 that contains `x` in [0, 1].
 #[inline]
-fn cell(x: f32, n: usize) -> (usize, f32) {
+fn cell(x: f32, n: usize) -> Cell {
     let x = x.clamp(0.0, 1.0) * (n - 1) as f32;
     let i = (x as usize).min(n - 2);
-    (i, x - i as f32)
+    Cell { index: i, t: x - i as f32 }
 }
 
 /// A family of densities over [0, 1]².
@@ -178,14 +185,16 @@ impl PiecewiseBilinear2D {
 
         // Find the row
         let target = u.y * self.marginal(blend, rows - 1);
-        let (y, rest) = find(rows, target, |y| self.marginal(blend, y));
+        let y = find(rows, target, |y| self.marginal(blend, y));
+        let rest = (target - self.marginal(blend, y)).max(0.0);
         let [r0, r1] = [y, y + 1].map(|y| self.conditional(blend, columns - 1, y));
         let t = invert_linear(r0, r1, rest * (rows - 1) as f32);
 
         // Find the column
         let target = u.x * lerp(r0, r1, t);
         let along = |x: usize| lerp(self.conditional(blend, x, y), self.conditional(blend, x, y + 1), t);
-        let (x, rest) = find(columns, target, along);
+        let x = find(columns, target, along);
+        let rest = (target - along(x)).max(0.0);
         let value = |x: usize| lerp(self.density.blended(blend, x, y), self.density.blended(blend, x, y + 1), t);
         let (c0, c1) = (value(x), value(x + 1));
         let s = invert_linear(c0, c1, rest * (columns - 1) as f32);
@@ -204,7 +213,7 @@ impl PiecewiseBilinear2D {
     #[inline]
     pub fn invert(&self, blend: &Blend, p: Vec2) -> Vec2 {
         let [columns, rows] = self.density.size;
-        let [(x, s), (y, t)] = [cell(p.x, columns), cell(p.y, rows)];
+        let [Cell { index: x, t: s }, Cell { index: y, t }] = [cell(p.x, columns), cell(p.y, rows)];
         let [r0, r1] = [y, y + 1].map(|y| self.conditional(blend, columns - 1, y));
         let above = self.marginal(blend, y) + integral_linear(r0, r1, t) / (rows - 1) as f32;
         let value = |x: usize| lerp(self.density.blended(blend, x, y), self.density.blended(blend, x, y + 1), t);
@@ -242,15 +251,15 @@ fn running(values: impl ExactSizeIterator<Item = f32>) -> Vec<f64> {
     values.map(next).collect()
 }
 
-/// The last of n − 1 cells that begins below `target`, and the rest of `target` in it; `begin` must increase.
+/// The last of n − 1 cells that begins below `target`; `begin` must increase.
 #[inline]
-fn find(n: usize, target: f32, begin: impl Fn(usize) -> f32) -> (usize, f32) {
+fn find(n: usize, target: f32, begin: impl Fn(usize) -> f32) -> usize {
     let (mut low, mut high) = (0, n - 1);
     while high - low > 1 {
         let middle = usize::midpoint(low, high);
         if begin(middle) < target { low = middle } else { high = middle }
     }
-    (low, (target - begin(low)).max(0.0))
+    low
 }
 
 /// ∫ from 0 to t of the linear function with the values `a` at 0 and `b` at 1.

@@ -74,13 +74,13 @@ impl Bounds3 {
         p.cmpge(self.min).all() && p.cmple(self.max).all()
     }
 
-    /// Centre and radius of a sphere about the box; radius 0 if empty.
-    pub fn bounding_sphere(&self) -> (Vec3, f32) {
+    /// A sphere about the box; its radius is 0 if the box is empty.
+    pub fn bounding_sphere(&self) -> Sphere {
         if self.is_empty() {
-            return (Vec3::ZERO, 0.0);
+            return Sphere { center: Vec3::ZERO, radius: 0.0 };
         }
         let center = self.center();
-        (center, (self.max - center).length())
+        Sphere { center, radius: (self.max - center).length() }
     }
 
     /// The box of the eight transformed corners.
@@ -100,6 +100,15 @@ impl Bounds3 {
     }
 }
 
+/// A sphere.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sphere {
+    /// Centre.
+    pub center: Vec3,
+    /// Radius (m).
+    pub radius: f32,
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -111,10 +120,10 @@ mod tests {
         assert_eq!(Bounds3::from_points([BOX.max, BOX.min, Vec3::new(0.0, 3.0, 4.0)]), BOX);
         assert_eq!((BOX.center(), BOX.diagonal()), (Vec3::new(0.0, 3.5, 6.5), Vec3::new(2.0, 3.0, 7.0)));
         assert_eq!(BOX.half_area(), 2.0 * 3.0 + 3.0 * 7.0 + 7.0 * 2.0);
-        assert_eq!(BOX.bounding_sphere(), (BOX.center(), 0.5 * 62.0_f32.sqrt()));
+        assert_eq!(BOX.bounding_sphere(), Sphere { center: BOX.center(), radius: 0.5 * 62.0_f32.sqrt() });
         assert_eq!(Bounds3::default(), Bounds3::EMPTY);
         assert!(Bounds3::EMPTY.is_empty() && !BOX.is_empty());
-        assert_eq!((Bounds3::EMPTY.half_area(), Bounds3::EMPTY.bounding_sphere()), (0.0, (Vec3::ZERO, 0.0)));
+        assert_eq!((Bounds3::EMPTY.half_area(), Bounds3::EMPTY.bounding_sphere().radius), (0.0, 0.0));
         let point = Bounds3::from_points([Vec3::X]);
         assert!(!point.is_empty() && point.half_area() == 0.0);
     }

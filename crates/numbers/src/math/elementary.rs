@@ -5,28 +5,37 @@ use super::number::Number;
 use super::v3::V3;
 use std::f32::consts::{FRAC_PI_4, LN_2, LOG2_E, SQRT_2, TAU};
 
+/// Sine and cosine of an angle.
+#[derive(Clone, Copy, Debug)]
+pub struct SinCos<N> {
+    /// The sine.
+    pub sin: N,
+    /// The cosine.
+    pub cos: N,
+}
+
 /// sin x and cos x for |x| ≤ π/4, by Chebyshev interpolation; errors below 2⁻²⁴.
 #[inline(always)]
-pub fn sin_cos_eighth<N: Number>(x: N) -> (N, N) {
+pub fn sin_cos_eighth<N: Number>(x: N) -> SinCos<N> {
     let x2 = x * x;
     let sin = ((x2 * -1.951_528_96e-4 + 8.332_161_3e-3) * x2 - 1.666_665_46e-1) * x2 * x + x;
     let cos = ((x2 * 2.443_315_71e-5 - 1.388_731_63e-3) * x2 + 4.166_664_57e-2) * x2 * x2 - x2 * 0.5 + 1.0;
-    (sin, cos)
+    SinCos { sin, cos }
 }
 
 /// sin 2πt and cos 2πt for 0 ≤ t ≤ 1; errors below 2⁻²³.
 #[inline(always)]
-pub fn sin_cos_turn<N: Number>(t: N) -> (N, N) {
+pub fn sin_cos_turn<N: Number>(t: N) -> SinCos<N> {
     // The nearest quarter turn, and the exact remainder.
     let quarters = (t * 4.0).nearest();
-    let (sin, cos) = sin_cos_eighth((t - quarters * 0.25) * TAU);
+    let SinCos { sin, cos } = sin_cos_eighth((t - quarters * 0.25) * TAU);
     let (half, later) = (t.constant(0.5), t.constant(2.5));
     let from_half = (quarters - 2.0).magnitude();
     let is_odd = from_half.above(half) & t.constant(1.5).above(from_half);
     let (s, c) = (N::choose(is_odd, cos, sin), N::choose(is_odd, sin, cos));
     let is_second_half = quarters.above(t.constant(1.5)) & t.constant(3.5).above(quarters);
     let is_far_side = quarters.above(half) & later.above(quarters);
-    (N::choose(is_second_half, -s, s), N::choose(is_far_side, -c, c))
+    SinCos { sin: N::choose(is_second_half, -s, s), cos: N::choose(is_far_side, -c, c) }
 }
 
 /// tan π/8.
@@ -60,7 +69,7 @@ pub fn exp<N: Number>(x: N) -> N {
 /// ln x for normal x > 0, by the area tangent series; errors below 2⁻²² of the larger of ln x and 1.
 #[inline(always)]
 pub fn ln<N: Number>(x: N) -> N {
-    let (exponent, m) = x.parts();
+    let (exponent, m) = (x.exponent(), x.significand());
     let is_large = m.above(x.constant(SQRT_2));
     let (m, exponent) = (N::choose(is_large, m * 0.5, m), N::choose(is_large, exponent + 1.0, exponent));
     let s = (m - 1.0) / (m + 1.0);
@@ -84,7 +93,7 @@ pub fn concentric_disk<N: Number>(u: [N; 2]) -> (N, N) {
     let is_x = x.magnitude().above(y.magnitude());
     let (radius, other) = (N::choose(is_x, x, y), N::choose(is_x, y, x));
     let ratio = (other / radius).or_zero(radius.magnitude().above(zero));
-    let (sin, cos) = sin_cos_eighth(ratio * FRAC_PI_4);
+    let SinCos { sin, cos } = sin_cos_eighth(ratio * FRAC_PI_4);
     (radius * N::choose(is_x, cos, sin), radius * N::choose(is_x, sin, cos))
 }
 
@@ -104,7 +113,7 @@ mod tests {
     fn functions_are_those_of_the_library() {
         for i in 0..=10_000 {
             let t = i as f32 / 10_000.0;
-            let ((sin, cos), x) = (sin_cos_turn(t), f64::from(t) * std::f64::consts::TAU);
+            let (SinCos { sin, cos }, x) = (sin_cos_turn(t), f64::from(t) * std::f64::consts::TAU);
             assert!((f64::from(sin) - x.sin()).abs() < 2e-7 && (f64::from(cos) - x.cos()).abs() < 2e-7, "{t}");
             let x = t * 173.0 - 85.5;
             assert!((f64::from(exp(x)) / f64::from(x).exp() - 1.0).abs() < 3e-7, "{x}");

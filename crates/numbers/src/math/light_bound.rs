@@ -15,7 +15,7 @@
 //! any α.
 
 use super::number::Number;
-use super::{Vec3, safe_sqrt, sqr};
+use super::{Sphere, Vec3, safe_sqrt, sqr};
 
 /// Slack of the cosines, for rounding: a light that can contribute never has importance 0.
 const COSINE_SLACK: f32 = 1e-3;
@@ -102,10 +102,10 @@ fn sin_of_difference<N: Number>([sin_a, cos_a]: [N; 2], [sin_b, cos_b]: [N; 2]) 
 }
 
 impl LightBound {
-    /// Lights within the sphere of the given `center` and `radius`, with normals in the cone of half-angle θo about
-    /// `axis`, and emission within the angle θe of the normals; on both sides if `two_sided`.
+    /// Lights within a sphere, with normals in the cone of half-angle θo about `axis`, and emission within the angle θe
+    /// of the normals; on both sides if `two_sided`.
     pub fn new(
-        (center, radius): (Vec3, f32),
+        Sphere { center, radius }: Sphere,
         axis: Vec3,
         [cos_theta_o, cos_theta_e]: [f32; 2],
         two_sided: bool,

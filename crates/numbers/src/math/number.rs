@@ -81,8 +81,11 @@ pub trait Number:
     /// 2 to the power of an integer from −126 to 127.
     fn power_of_two(self) -> Self;
 
-    /// Exponent e and significand m of a normal positive number m·2^e, 1 ≤ m < 2.
-    fn parts(self) -> (Self, Self);
+    /// Exponent e of a normal positive number m·2^e, 1 ≤ m < 2.
+    fn exponent(self) -> Self;
+
+    /// The significand m of such a number.
+    fn significand(self) -> Self;
 
     /// The table entries at `row`·`stride` + `column`, which are integers; 0 beyond its end.
     fn entry(table: &[f32], row: Self, stride: usize, column: Self) -> Self;
@@ -200,9 +203,13 @@ impl Number for f32 {
     }
 
     #[inline(always)]
-    fn parts(self) -> (f32, f32) {
-        let bits = self.to_bits() as i32;
-        (((bits >> 23) - 127) as f32, f32::from_bits((bits & 0x007f_ffff | 0x3f80_0000) as u32))
+    fn exponent(self) -> f32 {
+        ((self.to_bits() as i32 >> 23) - 127) as f32
+    }
+
+    #[inline(always)]
+    fn significand(self) -> f32 {
+        f32::from_bits(self.to_bits() & 0x007f_ffff | 0x3f80_0000)
     }
 
     #[inline(always)]
@@ -230,7 +237,7 @@ mod tests {
         assert_eq!([0.5, 1.5, -2.5, 7.3].map(Number::nearest), [0.0, 2.0, -2.0, 7.0]);
         assert_eq!([0.5, 1.9, -2.5].map(Number::whole), [0.0, 1.0, -2.0]);
         assert_eq!([(-126.0_f32).power_of_two(), 127.0.power_of_two()], [2.0_f32.powi(-126), 2.0_f32.powi(127)]);
-        assert_eq!([12.0.parts(), 0.75.parts()], [(3.0, 1.5), (-1.0, 1.5)]);
+        assert_eq!([12.0, 0.75].map(|x: f32| (x.exponent(), x.significand())), [(3.0, 1.5), (-1.0, 1.5)]);
         assert_eq!(([1.0, 2.0].map(|c| f32::entry(&[1.0, 2.0, 3.0, 4.0, 5.0], 1.0, 3, c))), [5.0, 0.0]);
     }
 }

@@ -17,14 +17,22 @@ pub fn near_origin(p: DVec3) -> DVec3 {
     if origin.is_finite() { origin } else { DVec3::ZERO }
 }
 
-/// Points relative to a nearby origin, and this origin. It is chosen by the middle point of the list, since some
-/// programs write an unused first point.
-pub fn relative(points: impl ExactSizeIterator<Item = DVec3> + Clone) -> (Vec<Vec3>, DVec3) {
+/// Points relative to a nearby origin.
+#[derive(Clone, Debug)]
+pub struct LocalPoints {
+    /// The differences.
+    pub points: Vec<Vec3>,
+    /// The origin.
+    pub origin: DVec3,
+}
+
+/// Points relative to the origin near the middle point of the list, since some programs write an unused first point.
+pub fn relative(points: impl ExactSizeIterator<Item = DVec3> + Clone) -> LocalPoints {
     let origin = points.clone().nth(points.len() / 2).map_or(DVec3::ZERO, near_origin);
     // Space for the element that a mesh appends
     let mut out = Vec::with_capacity(points.len() + 1);
     out.extend(points.map(|p| (p - origin).as_vec3()));
-    (out, origin)
+    LocalPoints { points: out, origin }
 }
 
 /// Rebases a map between two spaces to points relative to the origins `to` and `from`.
@@ -43,12 +51,12 @@ mod tests {
         assert_eq!(near_origin(DVec3::splat(-0.1)).to_array().map(f64::to_bits), [0; 3]);
         assert_eq!(near_origin(DVec3::new(f64::NAN, 1e9, 0.0)), DVec3::ZERO);
         let points = [DVec3::new(0.1, -0.0, 7e30), DVec3::new(0.3, 1.0, 2.0)];
-        let (near, origin) = relative(points.into_iter());
+        let LocalPoints { points: near, origin } = relative(points.into_iter());
         assert_eq!(
             (near[0].to_array().map(f32::to_bits), origin),
             ([0.1, -0.0, 7e30_f32].map(f32::to_bits), DVec3::ZERO)
         );
-        let (near, origin) = relative(points.map(|p| p + DVec3::X * 4e6).into_iter());
+        let LocalPoints { points: near, origin } = relative(points.map(|p| p + DVec3::X * 4e6).into_iter());
         assert_eq!((near[1].x, origin.x), (0.3 + 4e6_f64.rem_euclid(128.0) as f32, 4e6 - 4e6_f64.rem_euclid(128.0)));
     }
 

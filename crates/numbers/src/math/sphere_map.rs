@@ -35,12 +35,12 @@ pub fn pdf_equal_area_square_to_sphere() -> f32 {
 /// Inverse of [`equal_area_square_to_sphere`]; `w` is unit.
 #[inline]
 pub fn equal_area_sphere_to_square(w: Vec3) -> Vec2 {
-    equal_area_squares(V3 { x: w.x, y: w.y, z: w.z }).into()
+    Vec2::from_array(equal_area_squares(V3 { x: w.x, y: w.y, z: w.z }))
 }
 
 /// [`equal_area_sphere_to_square`] of one direction or of many.
 #[inline(always)]
-pub fn equal_area_squares<N: Number>(w: V3<N>) -> (N, N) {
+pub fn equal_area_squares<N: Number>(w: V3<N>) -> [N; 2] {
     let (x, y, z) = (w.x.magnitude(), w.y.magnitude(), w.z.magnitude());
     let (zero, one) = (x.constant(0.0), x.constant(1.0));
     // r = sqrt(1 − z), without cancellation near the poles.
@@ -51,7 +51,7 @@ pub fn equal_area_squares<N: Number>(w: V3<N>) -> (N, N) {
     let (u, v) = (r - phi * r, phi * r);
     let is_below = zero.above(w.z);
     let (u, v) = (N::choose(is_below, one - v, u), N::choose(is_below, one - u, v));
-    ((u.signed_as(w.x) + 1.0) * 0.5, (v.signed_as(w.y) + 1.0) * 0.5)
+    [(u.signed_as(w.x) + 1.0) * 0.5, (v.signed_as(w.y) + 1.0) * 0.5]
 }
 
 /// The point of [0, 1]² with the same direction as `p`, which may be outside by less than 1: each edge of the
@@ -74,8 +74,7 @@ pub fn wrap_equal_area_square(p: Vec2) -> Vec2 {
 
 /// [`wrap_equal_area_square`] for texels of an image of `size`² texels; indices may be out of range by at most `size`.
 #[inline]
-pub fn wrap_equal_area_texel(x: isize, y: isize, size: isize) -> (isize, isize) {
-    let (mut x, mut y) = (x, y);
+pub fn wrap_equal_area_texel([mut x, mut y]: [isize; 2], size: isize) -> [isize; 2] {
     if x < 0 {
         (x, y) = (-1 - x, size - 1 - y);
     } else if x >= size {
@@ -86,7 +85,7 @@ pub fn wrap_equal_area_texel(x: isize, y: isize, size: isize) -> (isize, isize) 
     } else if y >= size {
         (x, y) = (size - 1 - x, 2 * size - 1 - y);
     }
-    (x, y)
+    [x, y]
 }
 
 /// The direction of longitude 2π·p.x (from +x to +y) and colatitude π·p.y (from +z).
@@ -183,7 +182,7 @@ mod tests {
         for k in 0..size {
             for (x, y) in [(-1, k), (size, k), (k, -1), (k, size)] {
                 let center = |x: isize, y: isize| (Vec2::new(x as f32, y as f32) + 0.5) / size as f32;
-                let (wx, wy) = wrap_equal_area_texel(x, y, size);
+                let [wx, wy] = wrap_equal_area_texel([x, y], size);
                 assert!((wrap_equal_area_square(center(x, y)) - center(wx, wy)).length() < 1e-6);
             }
         }

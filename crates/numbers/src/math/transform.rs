@@ -30,19 +30,26 @@ pub fn lerp_affine(a: &Affine3A, b: &Affine3A, t: f32) -> Affine3A {
 #[inline]
 pub fn transform_at(samples: &[Affine3A], time: f32) -> Affine3A {
     match segment_at(samples.len(), time) {
-        Some((i, t)) => lerp_affine(&samples[i], &samples[i + 1], t),
+        Some(Segment { index: i, t }) => lerp_affine(&samples[i], &samples[i + 1], t),
         None => samples[0],
     }
 }
 
-/// The last of `count` samples at equidistant times 0..=1 before `time`, and the relative position towards the next;
-/// `None` for a single sample.
+/// A time between two samples.
+struct Segment {
+    /// Index of the first sample.
+    index: usize,
+    /// Relative position between both.
+    t: f32,
+}
+
+/// The segment that contains `time` among `count` samples at equidistant times 0..=1; `None` for a single sample.
 #[inline]
-fn segment_at(count: usize, time: f32) -> Option<(usize, f32)> {
+fn segment_at(count: usize, time: f32) -> Option<Segment> {
     let last = count - 1;
     let x = time.clamp(0.0, 1.0) * last as f32;
-    let i = (x as usize).min(last.checked_sub(1)?);
-    Some((i, x - i as f32))
+    let index = (x as usize).min(last.checked_sub(1)?);
+    Some(Segment { index, t: x - index as f32 })
 }
 
 /// The transforms of a motion within a motion. Their product is not linear between samples; the result has the number
@@ -51,7 +58,7 @@ pub fn compose_placements(outer: &[DAffine3], inner: &[DAffine3]) -> Vec<DAffine
     let count = outer.len().max(inner.len());
     let time = |i: usize| if count == 1 { 0.0 } else { i as f32 / (count - 1) as f32 };
     let at = |samples: &[DAffine3], time: f32| match segment_at(samples.len(), time) {
-        Some((i, t)) => {
+        Some(Segment { index: i, t }) => {
             let (a, b, t) = (samples[i], samples[i + 1], f64::from(t));
             let (matrix3, translation) = (a.matrix3 * (1.0 - t) + b.matrix3 * t, a.translation.lerp(b.translation, t));
             DAffine3 { matrix3, translation }

@@ -79,13 +79,13 @@ impl<N: Number> V3<N> {
 
     /// x and y of [`super::Frame::from_z`] about the unit vector [Duff et al. 2017].
     #[inline(always)]
-    pub fn tangents(self) -> (Self, Self) {
+    pub fn tangents(self) -> [Self; 2] {
         let one = self.x.constant(1.0);
         let sign = one.signed_as(self.z);
         let a = -(one / (sign + self.z));
         let b = self.x * self.y * a;
         let x = V3 { x: one + sign * self.x * self.x * a, y: sign * b, z: -(sign * self.x) };
-        (x, V3 { x: b, y: sign + self.y * self.y * a, z: -self.y })
+        [x, V3 { x: b, y: sign + self.y * self.y * a, z: -self.y }]
     }
 }
 
@@ -98,7 +98,7 @@ mod tests {
     fn tangents_are_those_of_the_frame_in_all_bits() {
         for i in 0..1000 {
             let z = warp::sample_uniform_sphere([i as f32 / 1000.0, (i * 7 % 13) as f32 / 13.0]);
-            let (frame, (x, y)) = (Frame::from_z(z), V3::from(z).tangents());
+            let (frame, [x, y]) = (Frame::from_z(z), V3::from(z).tangents());
             assert_eq!((frame.x, frame.y), (x.into(), y.into()), "{z}");
             let w = Vec3::new(0.2, -0.7, z.x);
             assert_eq!(V3::from(w).dot(x), frame.to_local(w).x);

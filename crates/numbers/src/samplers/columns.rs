@@ -1,6 +1,8 @@
 //! Sample streams of a batch in columns, for kernels that draw the numbers of all of them.
 
-use super::{Kind, Net, SampleStream, SamplerKind};
+use super::kind::SamplerKind;
+use super::net::Net;
+use super::stream::{Kind, SampleStream};
 use std::ops::Range;
 
 /// The sequence of the streams of a batch.

@@ -101,11 +101,24 @@ fn way_to_sphere(r: f32, mu: f32, radius: f32) -> Option<f32> {
     (t > 0.0).then_some(t as f32)
 }
 
-/// Radius after a distance `t` from radius `r` along cosine `mu`, and the local zenith cosine of a direction with the
-/// zenith cosine `mu_s` at the start and the cosine `nu` to the ray.
-fn advance(r: f32, mu: f32, t: f32, mu_s: f32, nu: f32) -> (f32, f32) {
-    let r_t = (f64::from(r).powi(2) + f64::from(t).powi(2) + 2.0 * f64::from(r * mu) * f64::from(t)).sqrt() as f32;
-    (r_t, ((r * mu_s + t * nu) / r_t).clamp(-1.0, 1.0))
+/// Radius after a distance `t` from radius `r` along cosine `mu`.
+fn radius_at(r: f32, mu: f32, t: f32) -> f32 {
+    (f64::from(r).powi(2) + f64::from(t).powi(2) + 2.0 * f64::from(r * mu) * f64::from(t)).sqrt() as f32
+}
+
+/// The local zenith cosine, at radius `r_t` after a distance `t` from radius `r`, of a direction with the zenith cosine
+/// `mu_s` at the start and the cosine `nu` to the ray.
+fn cosine_at(r_t: f32, r: f32, t: f32, mu_s: f32, nu: f32) -> f32 {
+    ((r * mu_s + t * nu) / r_t).clamp(-1.0, 1.0)
+}
+
+/// Light along a ray.
+struct March {
+    scattered: Scattered,
+    /// f.
+    returned: Spectrum,
+    /// Radiance of the sunlit ground.
+    lit: Spectrum,
 }
 
 impl Atmosphere {
@@ -142,7 +155,7 @@ impl Atmosphere {
             // Steps that increase with distance: the air is densest near the start.
             let edge = |i: usize| way * (i as f32 / STEPS[1] as f32).powi(2);
             let (low, high) = (edge(i), edge(i + 1));
-            let here = densities(advance(r, mu, 0.5 * (low + high), 0.0, 0.0).0 - GROUND);
+            let here = densities(radius_at(r, mu, 0.5 * (low + high)) - GROUND);
             for (sum, x) in depth.iter_mut().zip(here) {
                 *sum += x * (high - low);
             }
@@ -174,11 +187,11 @@ impl Atmosphere {
     /// Light scattered into the observer's view ray with the zenith cosine `mu`. The sun has the zenith cosine `mu_s`
     /// and the cosine `nu` to the view ray, which ends at the ground.
     pub fn scattered(&self, mu: f32, mu_s: f32, nu: f32) -> Scattered {
-        self.march(GROUND + OBSERVER, mu, mu_s, nu).0
+        self.march(GROUND + OBSERVER, mu, mu_s, nu).scattered
     }
 
-    /// As [`scattered`](Self::scattered) from radius `r`; also f, and the radiance of the sunlit ground along the ray.
-    fn march(&self, r: f32, mu: f32, mu_s: f32, nu: f32) -> (Scattered, Spectrum, Spectrum) {
+    /// As [`scattered`](Self::scattered) from radius `r`.
+    fn march(&self, r: f32, mu: f32, mu_s: f32, nu: f32) -> March {
         let zero = [0.0; BANDS];
         let mut out = Scattered { air: zero, haze: zero, multiple: zero, transmittance: [1.0; BANDS] };
         let mut returned = zero;
@@ -187,7 +200,9 @@ impl Atmosphere {
         let edge = |i: usize| way * (i as f32 / STEPS[0] as f32).powi(2);
         for i in 0..STEPS[0] {
             let (low, high) = (edge(i), edge(i + 1));
-            let (r_t, mu_t) = advance(r, mu, 0.5 * (low + high), mu_s, nu);
+            let t = 0.5 * (low + high);
+            let r_t = radius_at(r, mu, t);
+            let mu_t = cosine_at(r_t, r, t, mu_s, nu);
             let here = densities(r_t - GROUND);
             let sun = self.transmittance(r_t.max(GROUND + 1e-3), mu_t);
             let multiple = self.multiple_at(r_t - GROUND, mu_t);
@@ -206,13 +221,13 @@ impl Atmosphere {
         }
         let mut lit = zero;
         if let Some(t) = ground {
-            let mu_t = advance(r, mu, t, mu_s, nu).1;
+            let mu_t = cosine_at(radius_at(r, mu, t), r, t, mu_s, nu);
             if mu_t > 0.0 {
                 let sun = self.transmittance(GROUND + 1e-3, mu_t);
                 lit = std::array::from_fn(|b| self.ground_albedo / PI * mu_t * sun[b]);
             }
         }
-        (out, returned, lit)
+        March { scattered: out, returned, lit }
     }
 
     /// Ψ for all heights and sun directions.
@@ -230,7 +245,7 @@ impl Atmosphere {
                 let mu = 2.0 * ((k / columns) as f32 + 0.5) / rows as f32 - 1.0;
                 let phi = PI * ((k % columns) as f32 + 0.5) / columns as f32;
                 let nu = mu * mu_s + ((1.0 - mu * mu) * (1.0 - mu_s * mu_s)).max(0.0).sqrt() * phi.cos();
-                let (s, returned, lit) = self.march(r, mu, mu_s, nu);
+                let March { scattered: s, returned, lit } = self.march(r, mu, mu_s, nu);
                 for b in 0..BANDS {
                     let isotropic = (s.air[b] + s.haze[b]) / (2.0 * TAU);
                     second[b] += (isotropic + s.transmittance[b] * lit[b]) / (rows * columns) as f32;

@@ -1,14 +1,14 @@
 //! Irradiance caching: records with direct light estimated by `mis` or by `ocv` [Fan et al. 2006, Fig. 4].
 
+use super::super::ReproduceError;
 use super::super::figure::Figure;
 use super::super::images::{Image, gain, significant};
-use super::super::measure::{Measured, Stage, View, turns};
+use super::super::measure::{Measured, Stage, View, scaled, turns};
 use super::super::method::{Method, Transport};
 use super::super::page::{Block, Shown, Table};
-use super::super::{ReproduceError, scaled};
-use super::Setup;
 use super::cases::LONG_TURNS;
 use super::report::{Asked, HEADER, method_json, method_row, summary, variances};
+use super::setup::Setup;
 use super::truth::{Errors, Truth};
 use lumiris::settings::OcvForm;
 use lumiris_numbers::estimators::heuristics::Heuristic;

@@ -2,15 +2,16 @@
 
 use super::super::calibrate::{calibrate, match_samples};
 use super::super::figure::Figure;
-use super::super::measure::{Stage, View, turns};
+use super::super::measure::{Stage, View, scaled, turns};
 use super::super::method::Method;
-use super::super::{Observer, ReproduceError, scaled};
+use super::super::{Observer, ReproduceError};
 use super::cases::{Case, LONG, LONG_TURNS, SHOWN, SHOWN_WAYS};
 use super::growth::{cost as growth_cost, measure as measure_growth};
 use super::outcome::Outcome;
+use super::report;
 use super::roster::{Numbers, Role, methods};
+use super::setup::Setup;
 use super::truth::Truth;
-use super::{Setup, report};
 use lumiris::settings::SampleCounts;
 use std::time::{Duration, Instant};
 
@@ -32,8 +33,15 @@ fn truth(stage: &mut Stage, method: Method, view: View, observer: Observer<'_>) 
     Ok(Truth::new(&turns(stage, &[method], view, LONG.0, range, observer)?[0]))
 }
 
-/// Times of a stage: the numbers of samples for equal time, and the time of a camera ray per pixel (s).
-fn pilot(stage: &mut Stage, case: &Case, observer: Observer<'_>) -> Result<(Numbers, f64), ReproduceError> {
+/// Times of a stage.
+struct Pilot {
+    /// Numbers of samples for equal time.
+    numbers: Numbers,
+    /// Time of a camera ray per pixel.
+    seconds: f64,
+}
+
+fn pilot(stage: &mut Stage, case: &Case, observer: Observer<'_>) -> Result<Pilot, ReproduceError> {
     let unknown = Numbers {
         samples: case.samples,
         equal_time: case.samples,
@@ -42,7 +50,8 @@ fn pilot(stage: &mut Stage, case: &Case, observer: Observer<'_>) -> Result<(Numb
     let base = Role::Balance.method(unknown);
     let calibration = calibrate(stage, &base, observer)?;
     let equal_time = match_samples(stage, &base, &Role::Progressive.method(unknown), case.spp, observer)?;
-    Ok((Numbers { equal_time, ris: calibration.sample_counts, ..unknown }, calibration.seconds))
+    let numbers = Numbers { equal_time, ris: calibration.sample_counts, ..unknown };
+    Ok(Pilot { numbers, seconds: calibration.seconds })
 }
 
 /// Camera rays per pixel for everything except the turns.
@@ -61,7 +70,7 @@ pub(super) fn run(setup: &Setup<'_>, case: &Case, time: Duration) -> Result<Figu
     // Image size that fits the time
     let pilot_size = setup.size.min(PILOT_SIZE[usize::from(quick)]);
     let mut stage = Stage::load(&path, scaled(case.shape, pilot_size), setup.options.threads)?;
-    let (mut numbers, mut seconds) = pilot(&mut stage, case, observer)?;
+    let Pilot { mut numbers, mut seconds } = pilot(&mut stage, case, observer)?;
     let count = methods(numbers).len() as f64;
     let fixed = fixed_cost(case, quick);
     let turn = count * f64::from(case.spp);
@@ -70,7 +79,7 @@ pub(super) fn run(setup: &Setup<'_>, case: &Case, time: Duration) -> Result<Figu
     let size = ((f64::from(pilot_size) * fits) as u32 / 8 * 8).max(MIN_SIZE[usize::from(quick)]).min(setup.size);
     if size != pilot_size {
         stage = Stage::load(&path, scaled(case.shape, size), setup.options.threads)?;
-        (numbers, seconds) = pilot(&mut stage, case, observer)?;
+        Pilot { numbers, seconds } = pilot(&mut stage, case, observer)?;
     }
 
     // Number of turns that fits the time

@@ -3,9 +3,9 @@
 
 use super::super::ReproduceError;
 use super::super::measure::{Estimate, Stage, View, turns};
-use super::Setup;
 use super::cases::{Case, LONG, LONG_TURNS};
 use super::roster::{FULL_WAYS, Numbers, Role, methods};
+use super::setup::Setup;
 use super::truth::Truth;
 
 /// Numbers of camera rays: normal and quick.

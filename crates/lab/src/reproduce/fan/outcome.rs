@@ -9,7 +9,7 @@ use super::truth::{Errors, Truth};
 /// All measurements of a case.
 pub(super) struct Outcome<'a> {
     pub case: &'a Case,
-    pub facts: (usize, usize),
+    pub facts: [usize; 2],
     pub size: [u32; 2],
     pub numbers: Numbers,
     pub measured: Vec<Measured>,

@@ -7,10 +7,10 @@ use super::super::images::{HEAT, Image, Scale, crop, gain, significant};
 use super::super::measure::{Estimate, Measured};
 use super::super::page::{Block, Cell, Shown, Table};
 use super::super::verdicts::reduced_by;
-use super::Setup;
 use super::cases::{Case, LONG, SHOWN, SHOWN_WAYS};
 use super::outcome::Outcome;
 use super::roster::{FULL_WAYS, Role, WAYS};
+use super::setup::Setup;
 use super::truth::{CANDELAS, Errors, Interval, Truth};
 use serde_json::{Value, json};
 
@@ -106,7 +106,7 @@ pub(super) fn summary(
 /// The section of a case.
 pub(super) fn direct(setup: &Setup<'_>, o: &Outcome<'_>) -> Result<Figure, ReproduceError> {
     // Facts
-    let (triangles, lights) = o.facts;
+    let [triangles, lights] = o.facts;
     let n = o.numbers;
     let base = &o.measured[0];
     let mut blocks = vec![

@@ -4,12 +4,12 @@
 use super::super::calibrate::{Calibration, calibrate};
 use super::super::figure::{Figure, Summary, estimate_json, plus_minus};
 use super::super::images::{HEAT, Image, Scale, gain, significant};
-use super::super::measure::{Estimate, Measured, Stage, View, reference, same_mean, turns};
+use super::super::measure::{Estimate, Measured, Stage, View, reference, same_mean, scaled, turns};
 use super::super::method::Method;
 use super::super::page::{Block, Cell, Shown, Table};
 use super::super::verdicts::hardly_perceivable;
-use super::super::{Observer, ReproduceError, scaled};
-use super::{SHAPE, Setup};
+use super::super::{Observer, ReproduceError};
+use super::setup::{SHAPE, Setup};
 use lumiris::lights::LightSamplerKind;
 use lumiris::planning::visibility_cache::build_visibility_cache;
 use lumiris::settings::{SampleCounts, Strata, Target};
@@ -85,7 +85,7 @@ struct Outcome {
     named: Vec<Named>,
     measured: Vec<Measured>,
     /// Number of photons in the visibility cache, and the time to build it (s).
-    visibility_cache: (u64, f64),
+    visibility_cache: CachePhotons,
 }
 
 impl Outcome {
@@ -155,19 +155,26 @@ fn measure(setup: &Setup<'_>, file: &str, time: Duration) -> Result<Outcome, Rep
     let list: Vec<Method> = named.iter().map(|n| n.method).collect();
     let max = if setup.options.quick { QUICK_TURNS } else { TURNS[1] };
     let count_turns = ((left(start.elapsed()) / turn(&calibration)) as u32).clamp(TURNS[0], max);
-    let (size, lights) = (stage.size(), stage.facts().1);
+    let (size, lights) = (stage.size(), stage.facts()[1]);
     say(&format!("  {lights} lights, {} × {} pixels, {count_turns} turns of {count} methods", size[0], size[1]));
     let measured = turns(&mut stage, &list, View::Centres, SPP, 0..count_turns, setup.observer)?;
     Ok(Outcome { lights, size, calibration, named, measured, visibility_cache })
 }
 
-/// Builds the visibility cache from photons that come straight from lights. Returns their number, and the time (s).
-fn prepare_visibility_cache(setup: &Setup<'_>, stage: &mut Stage) -> (u64, f64) {
+/// Photons of a visibility cache.
+struct CachePhotons {
+    count: u64,
+    /// Time of the build.
+    seconds: f64,
+}
+
+/// Builds the visibility cache from photons that come straight from lights.
+fn prepare_visibility_cache(setup: &Setup<'_>, stage: &mut Stage) -> CachePhotons {
     let start = Instant::now();
     let visibility_cache = setup.pool.install(|| build_visibility_cache(stage.job()));
     let count = visibility_cache.as_ref().map_or(0, |cache| cache.photon_count() as u64);
     stage.set_visibility_cache(visibility_cache);
-    (count, start.elapsed().as_secs_f64())
+    CachePhotons { count, seconds: start.elapsed().as_secs_f64() }
 }
 
 fn figure(setup: &Setup<'_>, few: &Outcome, many: &Outcome) -> Result<Figure, ReproduceError> {
@@ -262,8 +269,8 @@ fn facts(o: &Outcome) -> Block {
             "photons".to_owned(),
             format!(
                 "{} that came straight from lights, in {} s, which no time below includes",
-                o.visibility_cache.0,
-                significant(o.visibility_cache.1)
+                o.visibility_cache.count,
+                significant(o.visibility_cache.seconds)
             ),
         ),
         ("ris".to_owned(), format!("M = {proposals}, N = {samples} in the time of mis with N = {SAMPLES}")),
@@ -351,5 +358,5 @@ fn outcome_json(o: &Outcome) -> Value {
         })
     };
     let methods: Vec<Value> = o.measured.iter().enumerate().map(method).collect();
-    json!({ "lights": o.lights, "size": o.size, "camera_rays": SPP, "photons": o.visibility_cache.0, "photon_seconds": o.visibility_cache.1, "methods": methods })
+    json!({ "lights": o.lights, "size": o.size, "camera_rays": SPP, "photons": o.visibility_cache.count, "photon_seconds": o.visibility_cache.seconds, "methods": methods })
 }

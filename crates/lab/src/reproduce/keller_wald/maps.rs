@@ -5,9 +5,9 @@ use super::super::images::Image;
 use super::super::measure::{Stage, View, turns};
 use super::super::method::{Method, Transport};
 use super::super::page::{Block, Shown};
-use super::Setup;
 use super::above::Plan;
 use super::seen::{Reference, Seen};
+use super::setup::Setup;
 use lumiris::photons::{
     GatherPoint, GatherScratch, Importance, Photon, PhotonBudget, PhotonMap, Search, Traced, Tracing, trace_photons,
 };

@@ -1,13 +1,13 @@
 //! The caustic of a ring for three ratios q of global to caustic paths [Keller and Wald 2000, Fig. 3].
 
+use super::super::ReproduceError;
 use super::super::figure::{Figure, Summary};
 use super::super::images::{crop, gain, significant};
-use super::super::measure::Stage;
+use super::super::measure::{Stage, scaled};
 use super::super::page::{Block, Cell, Table};
-use super::super::{ReproduceError, scaled};
 use super::maps::{Maps, Print, prints, show, speed, trace};
 use super::seen::{Seen, relative_rmse, seen};
-use super::{SHAPE, Setup};
+use super::setup::{SHAPE, Setup};
 use lumiris::photons::{PhotonBudget, Tracing};
 use lumiris::scene::RenderJob;
 use serde_json::{Value, json};
@@ -86,7 +86,7 @@ fn measure(setup: &Setup<'_>, scene: &'static Scene, time: Duration) -> Result<O
     let mask: Vec<bool> = seen.iter().map(Option::is_some).collect();
     let mut rows = Vec::new();
     for q in RATIOS {
-        rows.push(row(setup, &seen, (q, trace_ratio(setup, job, 1, q, count)?), |caustic| {
+        rows.push(row(setup, &seen, q, trace_ratio(setup, job, 1, q, count)?, |caustic| {
             relative_rmse(caustic, &reference, &mask)
         }));
     }
@@ -99,7 +99,7 @@ fn trace_ratio(setup: &Setup<'_>, job: &RenderJob, seed: u32, finer: u64, count:
     trace(setup, job, &tracing, None, PhotonBudget::Paths(count * finer))
 }
 
-fn row(setup: &Setup<'_>, seen: &[Option<Seen>], (q, maps): (u64, Maps), error: impl Fn(&[[f32; 3]]) -> f64) -> Row {
+fn row(setup: &Setup<'_>, seen: &[Option<Seen>], q: u64, maps: Maps, error: impl Fn(&[[f32; 3]]) -> f64) -> Row {
     let caustic = show(setup, seen, &[&maps.caustic], COUNT);
     let all = maps.image(setup, seen, COUNT);
     Row { q, error: error(&caustic), maps, caustic, all }

@@ -1,15 +1,15 @@
 //! The visible room among a hundred, with and without importance [Keller and Wald 2000, Figs. 1 and 2].
 
+use super::super::ReproduceError;
 use super::super::chart::Chart;
 use super::super::figure::{Figure, Summary};
 use super::super::images::{gain, significant};
-use super::super::measure::Stage;
+use super::super::measure::{Stage, scaled};
 use super::super::page::{Block, Cell, Table};
-use super::super::{ReproduceError, scaled};
 use super::above::Area;
 use super::maps::{Cloud, Maps, Print, clouds, path_traced, plan, positions, prints, speed, trace};
 use super::seen::{Reference, Seen, seen};
-use super::{SHAPE, Setup};
+use super::setup::{SHAPE, Setup};
 use crate::procedural::keller_wald::rooms::{Building, PITCH};
 use lumiris::photons::{Importance, ImportanceSettings, PhotonBudget, Tracing, trace_importons};
 use lumiris::scene::RenderJob;

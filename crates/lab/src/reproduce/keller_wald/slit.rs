@@ -1,16 +1,16 @@
 //! A room lit through a slit: the distribution of photons stored by importance, and the loss by the cut-off [Keller and
 //! Wald 2000, Fig. 4].
 
+use super::super::ReproduceError;
 use super::super::figure::{Figure, Summary};
 use super::super::images::{gain, significant};
-use super::super::measure::{Estimate, Stage};
+use super::super::measure::{Estimate, Stage, scaled};
 use super::super::page::{Block, Cell, Table};
 use super::super::verdicts::hardly_perceivable;
-use super::super::{ReproduceError, scaled};
 use super::above::Area;
 use super::maps::{Cloud, Maps, Print, clouds, plan, positions, prints, speed, trace};
 use super::seen::{Seen, seen};
-use super::{SHAPE, Setup};
+use super::setup::{SHAPE, Setup};
 use lumiris::photons::{Importance, ImportanceSettings, LowImportance, PhotonBudget, Tracing, trace_importons};
 use lumiris::scene::RenderJob;
 use lumiris_numbers::estimators::stats::Welford;
@@ -74,19 +74,20 @@ pub(super) fn run(setup: &Setup<'_>, time: Duration) -> Result<Figure, Reproduce
     let left = time.saturating_sub(start.elapsed()).as_secs_f64() * PHOTON_FRACTION;
     let photons = (left / each).clamp(MIN_COUNT, MAX_COUNT[usize::from(setup.options.quick)]) as u64;
     (setup.observer.say)(&format!("  {} × {} pixels, {photons} photons, {SEEDS} maps of each kind", size[0], size[1]));
-    let of = |name, id, importance| row(setup, (job, &seen), (name, id), importance, photons);
+    let of = |name, id, importance| row(setup, job, &seen, [name, id], importance, photons);
     let rows = [
         of("standard map", "standard", None)?,
         of("by importance, p ≥ ε: unbiased", "floor", Some(&floor))?,
         of("by importance, cut off at p < ε: biased", "cut-off", Some(&cut))?,
     ];
-    figure(setup, (job, size), &floor, &rows)
+    figure(setup, job, size, &floor, &rows)
 }
 
 fn row(
     setup: &Setup<'_>,
-    (job, seen): (&RenderJob, &[Option<Seen>]),
-    (name, id): (&'static str, &'static str),
+    job: &RenderJob,
+    seen: &[Option<Seen>],
+    [name, id]: [&'static str; 2],
     importance: Option<&Importance>,
     photons: u64,
 ) -> Result<Row, ReproduceError> {
@@ -120,7 +121,8 @@ fn percent(e: Estimate) -> String {
 
 fn figure(
     setup: &Setup<'_>,
-    (job, size): (&RenderJob, [u32; 2]),
+    job: &RenderJob,
+    size: [u32; 2],
     importance: &Importance,
     rows: &[Row; 3],
 ) -> Result<Figure, ReproduceError> {

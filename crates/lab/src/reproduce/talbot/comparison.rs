@@ -8,8 +8,9 @@ use super::super::{Observer, ReproduceError};
 use super::cases::Case;
 use super::classes::Classes;
 use super::outcome::Outcome;
-use super::roster::methods;
-use super::{Setup, portrait, report};
+use super::report;
+use super::roster::{Roster, roster};
+use super::setup::{Setup, portrait};
 use lumiris::settings::SampleCounts;
 use std::time::{Duration, Instant};
 
@@ -36,7 +37,7 @@ pub(super) fn run(setup: &Setup<'_>, case: &Case, time: Duration) -> Result<Figu
     let pilot_size = setup.size.min(PILOT_SIZE);
     let mut stage = Stage::load(&path, portrait(pilot_size), setup.options.threads)?;
     let mut calibration = calibrate(&mut stage, &base, setup.observer)?;
-    let count = methods(case, calibration.sample_counts).0.len() as f64;
+    let count = roster(case, calibration.sample_counts).methods.len() as f64;
     let cost = |c: &Calibration| c.seconds * f64::from(case.primary) * 1.1;
     let antialiased = 3.0 * f64::from(PAIR_TURNS);
     let wanted = cost(&calibration) * (WANTED_TURNS * count + antialiased);
@@ -48,7 +49,7 @@ pub(super) fn run(setup: &Setup<'_>, case: &Case, time: Duration) -> Result<Figu
     }
 
     // Number of turns that fits the time
-    let (named, roles) = methods(case, calibration.sample_counts);
+    let Roster { methods: named, roles } = roster(case, calibration.sample_counts);
     let list: Vec<Method> = named.iter().map(|n| n.method).collect();
     let left = time.saturating_sub(start.elapsed()).as_secs_f64() / cost(&calibration) - antialiased;
     let count_turns = ((left / count) as u32).clamp(TURNS[0], if setup.options.quick { QUICK_TURNS } else { TURNS[1] });

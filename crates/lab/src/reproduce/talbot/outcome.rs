@@ -9,7 +9,7 @@ use super::roster::{Named, Roles};
 /// All measurements of a case.
 pub(super) struct Outcome<'a> {
     pub case: &'a Case,
-    pub stage_facts: (usize, usize),
+    pub stage_facts: [usize; 2],
     pub size: [u32; 2],
     pub calibration: Calibration,
     pub methods: Vec<Named>,

@@ -6,14 +6,14 @@ use super::super::calibrate::{Calibration, calibrate, counts_for_budget};
 use super::super::chart::Chart;
 use super::super::figure::{Figure, Summary, estimate_json, plus_minus};
 use super::super::images::{HEAT, Image, RED_GREEN, Scale, gain, significant};
-use super::super::measure::{Measured, Stage, View, radiance, reference, turns};
+use super::super::measure::{Measured, PixelPlan, Stage, View, radiance, reference, turns};
 use super::super::method::Method;
 use super::super::page::{Block, Cell, Shown, Table};
 use super::super::{Observer, ReproduceError};
 use super::classes::{Classes, NAMES};
 use super::report::method_json;
 use super::scenes::Which;
-use super::{Setup, portrait};
+use super::setup::{Setup, portrait};
 use lumiris::settings::SampleCounts;
 use lumiris_numbers::estimators::ris::sample_counts::{Costs, Variances, clamp_ratio, optimal_ratio};
 use serde_json::json;
@@ -96,11 +96,6 @@ impl Outcome {
         &self.measured[..self.swept.len()]
     }
 
-    /// Times, and the available time per point (ns).
-    fn costs(&self) -> (Costs, f64) {
-        (self.calibration.times, self.calibration.budget)
-    }
-
     fn auto(&self) -> &Measured {
         &self.measured[self.swept.len()]
     }
@@ -137,7 +132,8 @@ pub(super) fn run(setup: &Setup<'_>, time: Duration) -> Result<Figure, Reproduce
     let mut methods: Vec<Method> = swept.iter().map(of).collect();
     let per_pixel = Method { per_pixel: true, ..of(&calibration.sample_counts) };
     methods.extend([of(&calibration.sample_counts), per_pixel, Method::ris(1, 1), Method::ris(MANY, 1)]);
-    let (pilot, pilot_seconds) = stage.plan_per_pixel(calibration.times, calibration.budget)?;
+    let PixelPlan { ratios: pilot, seconds: pilot_seconds } =
+        stage.plan_per_pixel(calibration.times, calibration.budget)?;
 
     // Turns, and camera rays per turn, that fit the time
     let quick = usize::from(setup.options.quick);
@@ -182,7 +178,7 @@ fn images(setup: &Setup<'_>, stage: &mut Stage, o: &Outcome) -> Result<Vec<Block
     }
 
     // Maps of the best M/N: from the measured variances, and from the pilot
-    let (costs, time) = o.costs();
+    let Calibration { times: costs, budget: time, .. } = o.calibration;
     let is_surface = o.classes.visibility.iter().map(|v| !v.is_nan());
     let ratios: Vec<Option<f64>> =
         o.terms.ratios(costs, time).into_iter().zip(is_surface).map(|(k, is)| k.filter(|_| is)).collect();
@@ -283,7 +279,7 @@ fn figure(o: &Outcome, size: [u32; 2], blocks: Vec<Block>) -> Figure {
     let excess = auto.value / min.value.max(1e-300);
 
     // Predicted variances with the M/N of auto and with the best M/N of every pixel
-    let (costs, time) = o.costs();
+    let Calibration { times: costs, budget: time, .. } = o.calibration;
     let k = ratio_of(&o.calibration.sample_counts);
     let is_surface = o.classes.visibility.iter().map(|v| !v.is_nan());
     let ratios: Vec<Option<f64>> =

@@ -6,11 +6,11 @@ use super::super::images::{HEAT, Image, Scale, gain, significant};
 use super::super::measure::{Estimate, Measured, Seconds, same_mean};
 use super::super::page::{Block, Cell, Shown, Table};
 use super::super::verdicts::{falls, helps_most_in_shadow, reduced_by_resampling};
-use super::Setup;
 use super::cases::Kind;
 use super::classes::{Classes, LIT, NAMES, SHADOWED};
 use super::outcome::Outcome;
 use super::roster::Roles;
+use super::setup::Setup;
 use lumiris::settings::SampleCounts;
 use serde_json::{Value, json};
 
@@ -45,7 +45,7 @@ pub(super) fn method_json(name: &str, all: &[Measured], method: usize, classes: 
 pub(super) fn comparison(setup: &Setup<'_>, o: &Outcome<'_>) -> Result<Figure, ReproduceError> {
     // Facts
     let SampleCounts { samples, proposals } = o.calibration.sample_counts;
-    let (triangles, lights) = o.stage_facts;
+    let [triangles, lights] = o.stage_facts;
     let base = &o.measured[o.roles.base];
     let mut blocks = vec![
         Block::Text(o.case.intro.to_owned()),
@@ -84,17 +84,23 @@ pub(super) fn comparison(setup: &Setup<'_>, o: &Outcome<'_>) -> Result<Figure, R
         "size": o.size, "camera_rays": o.case.primary, "turns": base.turns(),
         "t1_ns": o.calibration.times.t1, "t2_ns": o.calibration.times.t2, "budget_ns": o.calibration.budget,
         "proposals": proposals, "samples": samples,
-        "visibility_share_of_ris": visibility(o).1, "visibility_bound": visibility(o).0,
+        "visibility_share_of_ris": visibility(o).share, "visibility_bound": visibility(o).bound,
         "judged": o.roles.judged, "equal_halves": o.roles.equal_halves,
         "methods": rows, "antialiased": antialiased,
     });
     Ok(Figure { id: o.case.id, title: o.case.title, summary, also, blocks, numbers })
 }
 
-/// Variance of unstratified resampling due to visibility alone, relative to the baseline, both at the time of the
-/// baseline; and its fraction of the total variance of unstratified resampling. V(f/q) comes from one sample of many
-/// proposals by [Talbot 2005, Eq. 4.2].
-fn visibility(o: &Outcome<'_>) -> (f64, f64) {
+/// Variance of unstratified resampling due to visibility alone.
+struct VisibilityVariance {
+    /// Relative to the baseline, both at the time of the baseline.
+    bound: f64,
+    /// Fraction of the total variance of unstratified resampling.
+    share: f64,
+}
+
+/// V(f/q) comes from one sample of many proposals by [Talbot 2005, Eq. 4.2].
+fn visibility(o: &Outcome<'_>) -> VisibilityVariance {
     let (base, plain) = (&o.measured[o.roles.base], &o.measured[o.roles.plain]);
     let many = &o.measured[o.roles.visibility];
     let (m, n) = (f64::from(plain.method.proposals), f64::from(plain.method.samples));
@@ -105,7 +111,7 @@ fn visibility(o: &Outcome<'_>) -> (f64, f64) {
     let q = if determinant.abs() > 1e-12 { (share * v_plain - v_many / m) / determinant } else { v_many };
     let left = (1.0 - 1.0 / m) * q.max(0.0) / n;
     let base_variance = base.variance(None).value.max(1e-300);
-    (left / base_variance * plain.time_ratio(base), left / v_plain.max(1e-300))
+    VisibilityVariance { bound: left / base_variance * plain.time_ratio(base), share: left / v_plain.max(1e-300) }
 }
 
 /// The row of resampling number `i`.
@@ -116,7 +122,7 @@ fn reduction(o: &Outcome<'_>, i: usize, [paper, target]: [f64; 2]) -> Summary {
     let at = |i: usize| o.measured[i].at_equal_time(base, None);
     let counts = [m.method.proposals, m.method.samples];
     let reached = reduced_by_resampling(counts, at(i), target);
-    let (bound, share) = visibility(o);
+    let VisibilityVariance { bound, share } = visibility(o);
 
     // M, N, and the effect of stratification
     let mut reason = format!("M = {}, N = {}", m.method.proposals, m.method.samples);

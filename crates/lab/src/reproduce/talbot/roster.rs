@@ -14,7 +14,7 @@ pub(super) struct Named {
 /// Proposals of the rendering that measures the variance of visibility alone.
 const MANY: u32 = 96;
 
-/// Indices of the methods of [`methods`].
+/// Indices of the methods of [`roster`].
 pub(super) struct Roles {
     /// The baseline.
     pub base: usize,
@@ -30,8 +30,14 @@ pub(super) struct Roles {
     pub visibility: usize,
 }
 
+/// The methods of a case.
+pub(super) struct Roster {
+    pub methods: Vec<Named>,
+    pub roles: Roles,
+}
+
 /// The methods of a case, with M and N of equal halves of the time.
-pub(super) fn methods(case: &Case, sample_counts: SampleCounts) -> (Vec<Named>, Roles) {
+pub(super) fn roster(case: &Case, sample_counts: SampleCounts) -> Roster {
     // Resampling methods
     let SampleCounts { samples: n, proposals: m } = sample_counts;
     let named = |name: &str, method: Method| Named { name: name.to_owned(), method };
@@ -65,7 +71,8 @@ pub(super) fn methods(case: &Case, sample_counts: SampleCounts) -> (Vec<Named>, 
                 Judged::EqualHalves => 6,
                 Judged::Printed => list.len() - 1,
             };
-            (list, Roles { base: 0, judged, equal_halves: 6, plain: 4, base_stratified: Some(1), visibility: 7 })
+            let roles = Roles { base: 0, judged, equal_halves: 6, plain: 4, base_stratified: Some(1), visibility: 7 };
+            Roster { methods: list, roles }
         }
         Kind::Stratification => {
             let strata = |s: Strata| ris.stratified().strata(s);
@@ -77,7 +84,8 @@ pub(super) fn methods(case: &Case, sample_counts: SampleCounts) -> (Vec<Named>, 
                 systematic,
                 visibility,
             ];
-            (list, Roles { base: 0, judged: 4, equal_halves: 4, plain: 0, base_stratified: None, visibility: 5 })
+            let roles = Roles { base: 0, judged: 4, equal_halves: 4, plain: 0, base_stratified: None, visibility: 5 };
+            Roster { methods: list, roles }
         }
     }
 }

@@ -1,6 +1,7 @@
 //! Locations of the scenes of the figures.
 
-use super::super::{Options, ReproduceError, scenes_folder};
+use super::super::options::scenes_folder;
+use super::super::{Options, ReproduceError};
 use crate::procedural::statue::StatueOptions;
 use crate::procedural::talbot::{TalbotOptions, write_scenes};
 use std::path::PathBuf;

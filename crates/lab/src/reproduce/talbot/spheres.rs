@@ -5,7 +5,7 @@ use super::super::figure::{Figure, Summary};
 use super::super::images::{HEAT, Image, Scale, gain, significant};
 use super::super::page::{Block, Cell, Shown, Table};
 use super::super::{ReproduceError, page};
-use super::Setup;
+use super::setup::Setup;
 use crate::sphere_study::{SphereSettings, SphereStudy, sphere_image};
 use lumiris::bsdfs::models::CookTorrance;
 use lumiris::bsdfs::{Bsdf, Evaluated, Model, ProposalDensity};

@@ -108,8 +108,8 @@ impl NormalEquations {
         }
     }
 
-    /// Adds `count` samples of y = 0 in which only column `j` is non-zero.
-    pub fn add_zeros(self, sums: &mut [f32], (j, c): (usize, f32), count: u32) {
+    /// Adds `count` samples of y = 0 in which only column `j` is non-zero, with the value `c`.
+    pub fn add_zeros(self, sums: &mut [f32], j: usize, c: f32, count: u32) {
         let count = (count as f32).min(MAX_SAMPLES - sums[self.count()]);
         sums[self.count()] += count;
         if c.is_finite() {
@@ -255,7 +255,7 @@ mod tests {
             equations.add_sparse(&mut sparse, &columns, y);
             equations.add_sparse(&mut dense, &centred(&columns), y);
         }
-        equations.add_zeros(&mut sparse, (2, 2.0), 7);
+        equations.add_zeros(&mut sparse, 2, 2.0, 7);
         (0..7).for_each(|_| equations.add_sparse(&mut dense, &centred(&[(2, 2.0)]), [0.0; 3]));
         equations.centre(&mut sparse, &integrals);
         for (a, b) in dense.iter().zip(&sparse) {

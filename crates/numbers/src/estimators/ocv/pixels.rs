@@ -171,7 +171,7 @@ impl Picture {
         beta.resize(self.width * width, 0.0);
         scales.clear();
         for (column, sums) in sums.chunks_mut(len).enumerate() {
-            scales.push(self.sum_around(row * self.width + column, (first, terms), sums));
+            scales.push(self.sum_around(row * self.width + column, first, terms, sums));
         }
         self.equations.solve(System::OTHER_SAMPLES, sums, beta);
         let around = &self.around[row * self.width..];
@@ -198,7 +198,7 @@ impl Picture {
     /// Sums over the pixels around `p` that are similar to it. `terms` are the precomputed terms of pixels that are not
     /// direct neighbours, starting at pixel `first`. Controls are scaled by the inverse of their root mean square,
     /// which is returned; 0 without pixels.
-    fn sum_around(&self, p: usize, (first, terms): (usize, &[f32]), sums: &mut [f32]) -> f32 {
+    fn sum_around(&self, p: usize, first: usize, terms: &[f32], sums: &mut [f32]) -> f32 {
         let Some(light) = self.around[p].light() else { return 0.0 };
         let len = self.equations.len();
         let is_as_lit = |l: f64| l <= MAX_RATIO * light && light <= MAX_RATIO * l;

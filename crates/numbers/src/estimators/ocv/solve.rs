@@ -189,7 +189,7 @@ fn solve_lanes(lanes: &Lanes<'_>, system: System) -> ([F; 3 * MAX_COMPONENTS], [
     let (zero, one) = (F::ZERO, F::ONE);
     let n = lanes.get(lanes.equations.count());
     let per_n = one / n.max(1.0);
-    let (a, b) = assemble(lanes, system, per_n);
+    let Assembled { a, b } = assemble(lanes, system, per_n);
     let factors = factorise(m, &a, system.ridge);
     let left = n - 1.0 - factors.effective(m, system.ridge);
 
@@ -237,8 +237,15 @@ fn solve_lanes(lanes: &Lanes<'_>, system: System) -> ([F; 3 * MAX_COMPONENTS], [
 /// The lower triangle of a matrix.
 type Triangle = [[F; MAX_COMPONENTS]; MAX_COMPONENTS];
 
-/// The matrix without ridge, and three right-hand sides.
-fn assemble(lanes: &Lanes<'_>, system: System, per_n: F) -> (Triangle, [[F; MAX_COMPONENTS]; 3]) {
+/// Systems of equations.
+struct Assembled {
+    /// The matrix without ridge.
+    a: Triangle,
+    /// Three right-hand sides.
+    b: [[F; MAX_COMPONENTS]; 3],
+}
+
+fn assemble(lanes: &Lanes<'_>, system: System, per_n: F) -> Assembled {
     let (m, zero) = (lanes.equations.components(), F::ZERO);
     let [mixed, means, values] = [lanes.equations.products(), lanes.equations.columns(), lanes.equations.values()];
     let (mut a, mut b) = ([[zero; MAX_COMPONENTS]; MAX_COMPONENTS], [[zero; MAX_COMPONENTS]; 3]);
@@ -271,7 +278,7 @@ fn assemble(lanes: &Lanes<'_>, system: System, per_n: F) -> (Triangle, [[F; MAX_
             b[i][m - 1] = lanes.get(values + i);
         }
     }
-    (a, b)
+    Assembled { a, b }
 }
 
 /// L below the diagonal, and 1/D, which is 0 for dropped columns.

@@ -34,10 +34,16 @@ impl<T> Reservoir<T> {
         }
     }
 
-    /// The kept item, and the sum of all weights; `None` if there was no weight.
+    /// The sum of all weights.
     #[inline]
-    pub fn into_kept(self) -> Option<(T, f64)> {
-        Some((self.kept?, self.sum))
+    pub fn sum(&self) -> f64 {
+        self.sum
+    }
+
+    /// The kept item; `None` if there was no weight.
+    #[inline]
+    pub fn into_kept(self) -> Option<T> {
+        self.kept
     }
 }
 
@@ -53,8 +59,8 @@ mod tests {
         for k in 0..GRID {
             let mut reservoir = Reservoir::new((f32::from(k) + 0.5) / f32::from(GRID));
             weights.iter().enumerate().for_each(|(i, &w)| reservoir.offer(i, w));
-            let (i, sum) = reservoir.into_kept().expect("three have weight");
-            assert_eq!(sum, 8.0);
+            assert_eq!(reservoir.sum(), 8.0);
+            let i = reservoir.into_kept().expect("three have weight");
             counts[i] += 1;
         }
         // An item may be chosen in several intervals, whose ends may round either way
