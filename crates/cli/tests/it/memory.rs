@@ -69,5 +69,5 @@ fn textures_are_stored_in_tiles_if_the_scene_fits_only_so() {
         serde_json::from_str::<serde_json::Value>(&stats).unwrap()["memory"]["texture_tiles"].clone()
     };
     assert!(tiles(&["--memory-limit", "4GB"]).is_null());
-    assert!(tiles(&["--memory-limit", "500MB"])["stored"].as_u64().unwrap_or(0) > 67 << 20);
+    assert!(tiles(&["--memory-limit", "500MB"])["stored_bytes"].as_u64().unwrap_or(0) > 67 << 20);
 }
