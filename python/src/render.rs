@@ -88,8 +88,6 @@ struct Request {
     plan: Given,
 }
 
-/// Layers by their names.
-
 /// Results of a rendering.
 struct Done {
     layers: NamedImages,
