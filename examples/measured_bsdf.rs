@@ -1,5 +1,6 @@
-//! Evaluates and samples a measured BSDF: `measured_bsdf FILE.bsdf < LINES`. Each line has wo, wi and two random numbers,
-//! eight in all; the answer is f and the density of wi, and the direction sampled by the random numbers with its f and density.
+//! Evaluates and samples a measured BSDF: `measured_bsdf FILE.bsdf < LINES`. Each line has wo, wi and two random
+//! numbers, eight in all; the answer is f and the density of wi, and the direction sampled by the random numbers with
+//! its f and density.
 
 use lumiris::bsdfs::{Bsdf, Measured, MeasuredTables};
 use lumiris_formats::bsdf_file::read_bsdf;

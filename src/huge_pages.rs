@@ -50,7 +50,7 @@ fn advised(block: *mut u8, size: usize) -> *mut u8 {
 fn advise(block: *mut u8, size: usize) {
     let first = block.align_offset(PAGE);
     let whole = size.saturating_sub(first) / PAGE * PAGE;
-    // SAFETY: the pages lie inside the block, and the advice changes nothing that is stored there. Without huge pages it
-    // fails, which is no harm.
+    // SAFETY: the pages lie inside the block, and the advice changes nothing that is stored there. Without huge pages
+    // it fails, which is no harm.
     let _ = unsafe { madvise(block.wrapping_add(first).cast(), whole, Advice::LinuxHugepage) };
 }

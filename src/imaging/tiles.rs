@@ -1,4 +1,5 @@
-//! Texels that do not fit into memory, or need not be there: tiles of files, and a bounded cache of recently used tiles.
+//! Texels that do not fit into memory, or need not be there: tiles of files, and a bounded cache of recently used
+//! tiles.
 //!
 //! Images without a file of tiles go into a temporary file, which has no name and vanishes with the program. Tiles have
 //! the same content as the levels of a pyramid in memory, so lookups give the same values.

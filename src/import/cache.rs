@@ -5,9 +5,10 @@
 //! dropped when the next one has been loaded ([`FileCache::end_scene`]), so memory holds the content of two scenes at
 //! most. Text of scene files is not cached, since it changes between scenes.
 //!
-//! If the textures of a scene exceed their memory limit, or the memory that a limit of the process leaves, the largest of them are stored in tiles of a temporary file
-//! ([`crate::imaging::tiles`]), and all others in memory. At least half of the limit remains for the tiles in use. With a
-//! folder for textures ([`super::texture_cache`]), all are read by tiles of its files.
+//! If the textures of a scene exceed their memory limit, or the memory that a limit of the process leaves, the largest
+//! of them are stored in tiles of a temporary file ([`crate::imaging::tiles`]), and all others in memory. At least half
+//! of the limit remains for the tiles in use. With a folder for textures ([`super::texture_cache`]), all are read by
+//! tiles of its files.
 
 use super::face_maps::{FaceMapRequest, load_face_map};
 use super::images::{ImageChannels, ImageEncoding, ImageRequest, RgbImage, load_map, load_rgb, load_tiled_map};
@@ -179,9 +180,9 @@ impl FileCache {
         self.texture_memory.get_or_init(|| bytes);
     }
 
-    /// Refuses the first scene if it exceeds the limit, and stores textures in tiles where it fits only so, unless their
-    /// memory is limited already. Later scenes have the same limit of textures. The first call is effective, later ones
-    /// are ignored.
+    /// Refuses the first scene if it exceeds the limit, and stores textures in tiles where it fits only so, unless
+    /// their memory is limited already. Later scenes have the same limit of textures. The first call is effective,
+    /// later ones are ignored.
     pub fn limit_memory(&self, limit: MemoryLimit) {
         self.memory.get_or_init(|| limit);
     }

@@ -5,8 +5,8 @@
 //! [`LoadOptions`], and returns a [`Loaded`] scene.
 //!
 //! The files themselves are parsed by the crate `lumiris_formats`. User input never panics: problems are collected,
-//! with their source locations, in [`lumiris_formats::diagnostic::Diagnostics`]. A scene that exceeds a limit of memory is
-//! refused before its files are read ([`memory`]).
+//! with their source locations, in [`lumiris_formats::diagnostic::Diagnostics`]. A scene that exceeds a limit of memory
+//! is refused before its files are read ([`memory`]).
 
 pub mod cache;
 pub mod face_maps;

@@ -7,9 +7,9 @@ use crate::settings::IntegratorSettings;
 use lumiris_numbers::math::Rgb;
 use lumiris_numbers::samplers::SampleStream;
 
-/// Russian roulette before bounce `bounce`, for a path that leaves a vertex with the throughput `beta`; `stream` has the
-/// numbers of the vertex. The survival probability is the maximum of β · `eta_scale`, so refraction does not count as a
-/// loss. Returns the probability if the path survives, else 0.
+/// Russian roulette before bounce `bounce`, for a path that leaves a vertex with the throughput `beta`; `stream` has
+/// the numbers of the vertex. The survival probability is the maximum of β · `eta_scale`, so refraction does not count
+/// as a loss. Returns the probability if the path survives, else 0.
 #[inline]
 pub(super) fn survival(
     beta: Rgb,

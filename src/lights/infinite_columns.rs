@@ -1,5 +1,5 @@
-//! Samples of one infinite light for columns of random numbers. [`super::choice::sample_columns`] has area lights, where
-//! the points differ.
+//! Samples of one infinite light for columns of random numbers. [`super::choice::sample_columns`] has area lights,
+//! where the points differ.
 
 use super::light::Light;
 

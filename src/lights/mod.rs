@@ -2,8 +2,8 @@
 //!
 //! Reading order: [`light_sample`] has arguments and results, [`kinds`] the kinds of lights, [`light`] the type
 //! that stands for all of them, with [`emit`] (rays that leave it), [`infinite_columns`] (many samples of an infinite
-//! light) and [`bounds`]. [`tree`], [`visibility`] and [`choice`] choose among the lights of a scene. [`layers`] are the light
-//! groups of the image, and [`irradiance`] has closed forms.
+//! light) and [`bounds`]. [`tree`], [`visibility`] and [`choice`] choose among the lights of a scene. [`layers`] are
+//! the light groups of the image, and [`irradiance`] has closed forms.
 
 pub mod bounds;
 pub mod choice;

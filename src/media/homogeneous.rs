@@ -186,8 +186,8 @@ mod tests {
         }
     }
 
-    /// E[w; passes] = T and E[w; scatters] = σ_s/σ_t (1 − T) per channel, with and without a focus: 2 × 3 × 2 × 3 tests at a
-    /// level of 10⁻⁵ each.
+    /// E[w; passes] = T and E[w; scatters] = σ_s/σ_t (1 − T) per channel, with and without a focus: 2 × 3 × 2 × 3 tests
+    /// at a level of 10⁻⁵ each.
     #[test]
     fn weights_of_flights_have_the_expectations_of_transport() {
         let medium =

@@ -5,9 +5,9 @@
 //! [`path_count`].
 //!
 //! The photons of the global map (from lights, and scattered by Lambertian surfaces) and those of caustics come from
-//! the same photon paths, of which there are more than the global map needs, so that the caustic map is finer [Keller and
-//! Wald 2000, §2.3]: the first ⌊qN⌋ of N paths fill both maps, the others only the caustic map. Photons are stored with
-//! probability p(x), by which their powers are divided.
+//! the same photon paths, of which there are more than the global map needs, so that the caustic map is finer [Keller
+//! and Wald 2000, §2.3]: the first ⌊qN⌋ of N paths fill both maps, the others only the caustic map. Photons are stored
+//! with probability p(x), by which their powers are divided.
 
 use super::error::PhotonError;
 use super::importance::Importance;

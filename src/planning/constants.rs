@@ -75,8 +75,8 @@ pub(super) const TUNE_GAIN: f64 = 1.1;
 /// Minimum and maximum samples per pixel of the pilot. If the budget is below the minimum, the pilot samples a fraction
 /// of the pixels.
 pub(super) const PILOT_SPP: [u32; 2] = [2, 8];
-/// Emission rays per pixel in each of two sets: 1/[`EMISSION_DIVISOR`] of the samples of the image, within a minimum and
-/// a maximum.
+/// Emission rays per pixel in each of two sets: 1/[`EMISSION_DIVISOR`] of the samples of the image, within a minimum
+/// and a maximum.
 pub(super) const EMISSION_DIVISOR: u32 = 16;
 pub(super) const EMISSION_SPP: [u32; 2] = [1, 4];
 /// Ratio of visible emission between neighbours from which on a pixel gets more emission rays, and the factor for their

@@ -1,7 +1,7 @@
 //! `--noise`: numbers of camera samples for a given noise, block by block.
 //!
-//! The noise of a block is defined in [`crate::film::image_noise`]. A *pilot* estimates its mean and variance. It renders
-//! each pixel twice with n samples, with two seeds of its own. Half the squared difference is the variance of n
+//! The noise of a block is defined in [`crate::film::image_noise`]. A *pilot* estimates its mean and variance. It
+//! renders each pixel twice with n samples, with two seeds of its own. Half the squared difference is the variance of n
 //! samples, including the gain of the sampler over independent samples. This variance falls at least as fast as 1/n,
 //! which gives the number of samples that the block needs. The pilot starts with n = 2. It doubles n for blocks that
 //! need more than [`REACH`] times its samples, until none does or the limit is reached.

@@ -22,8 +22,8 @@ const TILE_SAMPLES: u32 = 1 << 16;
 
 impl Run<'_> {
     /// Samples per pixel of the next pass over all tiles: 1, 3, 12, 48, 64, 64, …, so that a whole image is available
-    /// soon, and each pass before the longest quadruples the samples. Progressive estimators fit in blocks of samples; a
-    /// pass does not exceed the block. `done` samples per pixel are rendered, `now` of them by this run.
+    /// soon, and each pass before the longest quadruples the samples. Progressive estimators fit in blocks of samples;
+    /// a pass does not exceed the block. `done` samples per pixel are rendered, `now` of them by this run.
     pub(super) fn next_pass(&self, done: u32, now: u32) -> u32 {
         let longest = done.saturating_mul(3).clamp(1, self.pass_length());
         let length = self.in_time(now, longest).unwrap_or(longest);

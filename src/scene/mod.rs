@@ -1,7 +1,7 @@
 //! A scene owns everything that is rendered, in vectors. References are indices.
 //!
-//! [`Scene`] (`input`) is the data from an importer. [`World`] is a scene with its ray tracers. [`RenderJob`] is a world
-//! with its render settings and the data derived from both.
+//! [`Scene`] (`input`) is the data from an importer. [`World`] is a scene with its ray tracers. [`RenderJob`] is a
+//! world with its render settings and the data derived from both.
 
 mod input;
 mod job;

@@ -322,8 +322,8 @@ pub fn glow_rgb(kelvin: f32) -> Rgb {
     if y.is_finite() { blackbody_rgb(kelvin as f32) * y as f32 } else { Rgb::BLACK }
 }
 
-/// Spectral radiance of a black body at the wavelength `l` (nm), relative to 555 nm in the exponent, so that cold bodies
-/// do not underflow.
+/// Spectral radiance of a black body at the wavelength `l` (nm), relative to 555 nm in the exponent, so that cold
+/// bodies do not underflow.
 fn planck(l: f64, kelvin: f64) -> f64 {
     // Second radiation constant hc/k (m·K)
     const C2: f64 = 1.438_776_877e-2;

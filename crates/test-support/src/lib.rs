@@ -1,4 +1,5 @@
-//! What tests of several crates use: statistical assertions, integrals of known value, and files of volumes and of textures.
+//! What tests of several crates use: statistical assertions, integrals of known value, and files of volumes and of
+//! textures.
 
 pub mod integrals;
 pub mod nanovdb;

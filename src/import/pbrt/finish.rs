@@ -99,8 +99,8 @@ impl Builder<'_> {
         Some(Finished { scene, settings, given })
     }
 
-    /// Reads all files but volumes, and makes the shapes of those that need no textures. `None` if the scene does not fit
-    /// into memory.
+    /// Reads all files but volumes, and makes the shapes of those that need no textures. `None` if the scene does not
+    /// fit into memory.
     fn read_files<'a>(
         &self,
         shapes: &mut [ShapeDesc],

@@ -231,8 +231,8 @@ impl JobLights {
         self.unite_infinite(0..n, |i| at.get(i), out);
     }
 
-    /// Samples a direction for each of the points `p` to its chosen light, by the random numbers `u`. Otherwise as [`sample_many`](Self::sample_many), but infinite lights are not
-    /// combined.
+    /// Samples a direction for each of the points `p` to its chosen light, by the random numbers `u`. Otherwise as
+    /// [`sample_many`](Self::sample_many), but infinite lights are not combined.
     pub fn sample_chosen(
         &self,
         chosen: &[ChosenLight],

@@ -1,5 +1,6 @@
 //! The kinds of lights, each with its sampling, density and radiance: [`point`] and [`spot`], [`image_light`] (a point
-//! with an image), [`area`]; [`distant`], [`environment`] and [`portal`] (an environment through a rectangle); [`volume_light`] (emission of media).
+//! with an image), [`area`]; [`distant`], [`environment`] and [`portal`] (an environment through a rectangle);
+//! [`volume_light`] (emission of media).
 
 pub mod area;
 pub mod distant;

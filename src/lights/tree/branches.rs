@@ -24,8 +24,8 @@ impl<'a> Branches<'a> {
     /// No precomputed probabilities.
     pub const NONE: Branches<'static> = Branches { columns: &[], len: 0, point: 0 };
 
-    /// Probability of the left child of a node, or of the infinite lights for [`OUTSIDE_TREE`]; calls `compute` if it is
-    /// not precomputed.
+    /// Probability of the left child of a node, or of the infinite lights for [`OUTSIDE_TREE`]; calls `compute` if it
+    /// is not precomputed.
     #[inline]
     pub(in crate::lights) fn probability(&self, heap_index: usize, compute: impl FnOnce() -> f32) -> f32 {
         self.columns.get(heap_index * self.len + self.point).copied().unwrap_or_else(compute)

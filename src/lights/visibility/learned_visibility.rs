@@ -13,8 +13,8 @@
 //!
 //! The density of light samples with the least variance is proportional to E·√V̂, as the second moment of a sample is
 //! E²·V̂/p. On a glossy surface E is weighted by the reflection to the viewer, but V̂ uses the unweighted E.
-//! [`LearnedVisibility::sample_noncontributing`] chooses lights without photons in this way. For a node of the light tree,
-//! Φ/(A·N) is the sum over its lights.
+//! [`LearnedVisibility::sample_noncontributing`] chooses lights without photons in this way. For a node of the light
+//! tree, Φ/(A·N) is the sum over its lights.
 //!
 //! A node may hold many visible lights with few expected photons each. By [Good 1953], the expected contribution of its
 //! lights without photons equals the contribution of its lights with exactly one photon. Their number is therefore the
@@ -153,7 +153,8 @@ impl LearnedVisibility {
 
     /// Chooses a light by `u` in [0, 1), nearly in proportion to E·√V̂ for lights without photons. Every light that can
     /// contribute and has no photons has a positive probability. `contributing` lights may be chosen too; those with a
-    /// single photon only if no other light below their node can contribute. `singles` are their tree indices. Returns `None` if there is no light.
+    /// single photon only if no other light below their node can contribute. `singles` are their tree indices. Returns
+    /// `None` if there is no light.
     #[inline]
     pub fn sample_noncontributing(
         &self,
@@ -202,7 +203,8 @@ impl LearnedVisibility {
         self.evaluated(ctx, SampledLight { light, pmf, u: 0.0 })
     }
 
-    /// E·√V̂ of nodes at a point, as a function of the index, the node, and the number of lights below it with a single photon.
+    /// E·√V̂ of nodes at a point, as a function of the index, the node, and the number of lights below it with a single
+    /// photon.
     #[inline]
     fn by_visibility(&self, ctx: &LightCtx) -> impl Fn(usize, &Node, usize) -> f32 {
         let receiver = ctx.receiver();
@@ -243,7 +245,8 @@ mod tests {
         lights
     }
 
-    /// A cache with `count` photons of each light of `contributing` at the point, and `paths` photon paths of every light.
+    /// A cache with `count` photons of each light of `contributing` at the point, and `paths` photon paths of every
+    /// light.
     fn cache(seen: &[LightId], count: usize, paths: f32) -> VisibilityCache {
         let at = SurfacePoint { p: AT, n: Vec3::Z };
         let photons: Vec<_> = seen.iter().flat_map(|&light| vec![PrimaryPhoton { at, light }; count]).collect();

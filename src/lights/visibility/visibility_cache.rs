@@ -137,8 +137,8 @@ fn cube_index(x: f32) -> u64 {
 }
 
 impl VisibilityCache {
-    /// Built from photons. `radius` (m) is enlarged if the scene has more than 2²⁰ cubes along an axis. Photons without a
-    /// finite position or without a normal are ignored.
+    /// Built from photons. `radius` (m) is enlarged if the scene has more than 2²⁰ cubes along an axis. Photons without
+    /// a finite position or without a normal are ignored.
     pub fn new(photons: &[PrimaryPhoton], radius: f32) -> Self {
         let photon_count = photons.len();
         let photons = || photons.iter().filter(|photon| photon.at.p.is_finite());

@@ -236,7 +236,8 @@ impl VisibilityCacheSampler {
     }
 }
 
-/// The probability of a choice that has the probability `contributing` among the contributing lights and `base` in the base.
+/// The probability of a choice that has the probability `contributing` among the contributing lights and `base` in the
+/// base.
 #[inline]
 fn mixed(contributing: f32, base: f32) -> f32 {
     (1.0 - BASE_FRACTION) * contributing + BASE_FRACTION * base

@@ -3,8 +3,8 @@
 use crate::settings::value::{Integers, Kind, Value};
 use crate::settings::{EstimatorKind, IntegratorKind, Settings};
 
-/// A setting that is a field of [`Settings`], by its key, its values and the field: `named` of an enumeration, `count` and `real`;
-/// `open_…` if the renderer chooses where there is none, `count_or` a word.
+/// A setting that is a field of [`Settings`], by its key, its values and the field: `named` of an enumeration, `count`
+/// and `real`; `open_…` if the renderer chooses where there is none, `count_or` a word.
 macro_rules! row {
     (named($key:literal, $of:ty, $($field:ident).+)) => {
         Setting {

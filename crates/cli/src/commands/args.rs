@@ -128,8 +128,8 @@ pub(super) struct RenderArgs {
     /// image; .part the input of `lumiris merge` [default: the name in the file, or SCENE.exr]
     #[arg(short, long, value_name = "FILE")]
     pub output: Vec<PathBuf>,
-    /// Frames of an animation, such as 1-48, 1-48:2 or 5,10-20. `####` becomes the frame number, with zeros in front, in
-    /// SCENE and in the FILEs of --output, --checkpoint and --resume. A glTF scene needs no `####` (see --fps)
+    /// Frames of an animation, such as 1-48, 1-48:2 or 5,10-20. `####` becomes the frame number, with zeros in front,
+    /// in SCENE and in the FILEs of --output, --checkpoint and --resume. A glTF scene needs no `####` (see --fps)
     #[arg(long, value_name = "LIST", value_parser = parse_frames, requires = "output")]
     pub frames: Option<FrameList>,
     /// With --frames and a glTF scene without ####: frames per second; frame n is at the time n/F
@@ -168,8 +168,8 @@ pub(super) struct RenderArgs {
     /// Write times and counts of every stage
     #[arg(long, value_name = "FILE.json")]
     pub stats: Option<PathBuf>,
-    /// Memory limit of the process, such as 24GB, or `off`. A scene that would exceed it is refused before its files are
-    /// read, and an image before it is rendered [default: the memory of the machine and its control groups]
+    /// Memory limit of the process, such as 24GB, or `off`. A scene that would exceed it is refused before its files
+    /// are read, and an image before it is rendered [default: the memory of the machine and its control groups]
     #[arg(long, value_name = "SIZE", value_parser = parse_limit)]
     pub memory_limit: Option<MemoryLimit>,
     /// Print no progress, only warnings and errors

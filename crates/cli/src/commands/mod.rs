@@ -1,5 +1,6 @@
-//! The command line: one file per subcommand; `cli` chooses one. `args`, `*_args` and `output_options` have the options; `settings` loads
-//! scenes; `pictures`, `exr` and `parts` write results; `progress` prints; `interrupt` handles signals.
+//! The command line: one file per subcommand; `cli` chooses one. `args`, `*_args` and `output_options` have the
+//! options; `settings` loads scenes; `pictures`, `exr` and `parts` write results; `progress` prints; `interrupt`
+//! handles signals.
 //!
 //! Exit codes. A closed pipe at the standard output is no error.
 //! * 0: success

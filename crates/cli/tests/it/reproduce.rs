@@ -204,8 +204,8 @@ fn the_page_of_control_variates_holds_every_scene_and_method() {
 
 /// Number of methods for each of the three sampling strategies with uniform light selection; `mis` is the first.
 const ROLES: usize = 10;
-/// Indices of unbiased methods with a stated number of samples. The two "in the time of mis" take as many as the machine
-/// has time for: their errors have no bound that holds under load.
+/// Indices of unbiased methods with a stated number of samples. The two "in the time of mis" take as many as the
+/// machine has time for: their errors have no bound that holds under load.
 const UNBIASED: [usize; 5] = [0, 1, 2, 4, 7];
 /// Index of `ocv` in the form `paper`, which is biased.
 const PAPER: usize = 3;

@@ -20,8 +20,8 @@ const CORRECTIONS: u32 = 4;
 const LEAST_TIME: f64 = 0.1;
 /// Relative tolerance of equal times.
 const MATCH: f64 = 0.01;
-/// Maximum number of proposals and of samples, which determine the size of batch buffers. On a busy machine the measured
-/// time of one may be next to nothing.
+/// Maximum number of proposals and of samples, which determine the size of batch buffers. On a busy machine the
+/// measured time of one may be next to nothing.
 const MAX_PROPOSALS: u32 = 1024;
 
 /// M and N of the timed estimates: small and large.

@@ -16,9 +16,9 @@ pub struct BlueNoise {
 }
 
 impl BlueNoise {
-    /// The entry of a pixel of a block; x of the pixel is in the lowest byte of `pixel`, y above it. Neighbouring pixels
-    /// of a block have errors of opposite signs: they have neighbouring entries, with an offset and a reflection by the
-    /// first word of the key, and the block has a single scramble.
+    /// The entry of a pixel of a block; x of the pixel is in the lowest byte of `pixel`, y above it. Neighbouring
+    /// pixels of a block have errors of opposite signs: they have neighbouring entries, with an offset and a reflection
+    /// by the first word of the key, and the block has a single scramble.
     #[inline]
     pub fn of(key: u32, pixel: u32) -> Self {
         let [mut x, mut y] = [pixel as u8, (pixel >> 8) as u8].map(u16::from);

@@ -61,7 +61,8 @@ impl Net {
     }
 }
 
-/// The first coordinates of a point of an Owen-scrambled Sobol' sequence in four dimensions, with a second Owen scramble.
+/// The first coordinates of a point of an Owen-scrambled Sobol' sequence in four dimensions, with a second Owen
+/// scramble.
 #[inline]
 fn coordinates<const N: usize>(index: u32, seed: u32, scramble: u32) -> [f32; N] {
     let u = shuffled_scrambled_sobol::<N>(index, seed);

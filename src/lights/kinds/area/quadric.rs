@@ -58,8 +58,8 @@ pub(super) struct DirectionBounds {
     /// Axis and cosine of a cone about all normals.
     pub(super) axis: Vec3,
     pub(super) cos: f32,
-    /// Maximum intensity for a radiance of 1: a quarter of the area for full spheres, 1/π of it for full cylinders, half
-    /// of it for parts of them.
+    /// Maximum intensity for a radiance of 1: a quarter of the area for full spheres, 1/π of it for full cylinders,
+    /// half of it for parts of them.
     pub(super) max_projected_area: f32,
 }
 
