@@ -45,6 +45,7 @@ pub fn resample(
     for j in 0..proposals {
         let [uc, u0, u1] = u_proposal(j);
         let Some(s) = bsdf.sample(wo, uc, [u0, u1]) else { continue };
+        // The target is the luminance of f·|cos θ|
         let p_hat = s.f.luminance() * bsdf.cos(s.wi);
         reservoir.offer((s, p_hat), p_hat / s.pdf);
     }

@@ -114,10 +114,14 @@ impl MemoryAccount {
         if needed <= limit.bytes {
             return None;
         }
+
+        // The largest parts
         let mut parts = self.parts.clone();
         let taken = ["in memory already", "image libraries"].into_iter().zip(self.taken);
         parts.extend(taken.map(|(name, bytes)| Part { name: name.to_owned(), bytes }));
         parts.sort_by_key(|part| std::cmp::Reverse(part.bytes));
+
+        // The message
         let mut text = format!(
             "the scene would need about {} ({needed} bytes), more than the {} that {}. Its largest parts:",
             size(needed),

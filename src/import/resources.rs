@@ -78,6 +78,7 @@ impl Resources {
     /// Reads all images, in the order of their ids; errors go to `d`. `None` if the scene does not fit into memory
     /// together with what `account` has.
     pub fn load(&self, files: &FileCache, mut account: MemoryAccount, d: &mut Diagnostics) -> Option<Vec<Arc<MipMap>>> {
+        // Predict the memory before anything is read
         let requests = self.requests.list();
         let wanted: Vec<&ImageRequest> = requests.iter().map(|request| &request.file).collect();
         let plan = files.plan_textures(&wanted, &mut account).unwrap_or_else(|error| {
@@ -88,6 +89,8 @@ impl Resources {
             d.error_without_place(refusal).help(MEMORY_HELP);
             return None;
         }
+
+        // Read in parallel, and report in the order of the scene
         let numbered = requests.par_iter().enumerate();
         let loaded: Vec<_> = numbered.map(|(i, request)| files.planned_map(&plan, i, &request.file)).collect();
         for warning in files.take_texture_warnings() {

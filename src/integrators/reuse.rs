@@ -300,6 +300,7 @@ impl Group {
         let member = self.connecting[k];
         let own = member as usize - self.begin;
         let vertex = shares.members[member as usize].vertex;
+        // Members at the same vertex index to whom the vertex may be visible, selected without branches
         let g = &self.g[k * len..][..len];
         let mut count = 0;
         for (i, (other, &g)) in shares.members[self.begin..].iter().zip(g).enumerate() {
@@ -308,6 +309,8 @@ impl Group {
         }
         let kept = &self.kept[..count];
         shares.to.extend(kept.iter().map(|&i| self.begin as u32 + i));
+
+        // Their segments
         let (o, d) = (self.o.get((k + 1) * len), self.d.get((k + 1) * len));
         let RayBatch { ox, oy, oz, dx, dy, dz, .. } = &mut shares.rays;
         let columns = [ox, oy, oz, dx, dy, dz].into_iter().zip(o.into_iter().chain(d).map(|from| &from[k * len..]));

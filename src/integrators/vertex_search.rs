@@ -439,10 +439,14 @@ impl VertexSearch {
             self.rays.gather(&self.active.rays, &self.traced);
             &self.rays
         };
+
+        // Copy for measurements, if requested
         if let Some(r) = &mut self.recording {
             let batches = if coherence == Coherence::Coherent { &mut r.camera } else { &mut r.bounces };
             batches.push(rays.clone());
         }
+
+        // Trace
         let start = Instant::now();
         job.world.accel.intersect(rays, coherence, &mut self.hits);
         let (count, time) = (rays.len() as u64, start.elapsed());

@@ -90,6 +90,8 @@ impl ExactHits {
             self.instances[lane] = Hit::NO_INSTANCE;
             return None;
         }
+
+        // Embree's ids are translated to those of the scene
         let instance = world.instance(reported.instance[lane]);
         let geometry = world.geometry(reported.geometry[lane], instance);
         (self.geometries[lane], self.instances[lane]) = (geometry, instance);

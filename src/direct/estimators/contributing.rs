@@ -166,10 +166,13 @@ impl PointSamples<'_> {
             Others::BySampler { n } => return n as f32 * lights.sampler.pmf(ctx, light),
             Others::Noncontributing { n, .. } => n as f32,
         };
+        // A contributing light
         if let Some(k) = self.contributing.index_of(light) {
             let weighted = buffers.rates[self.rates.clone()].get(k).copied();
             return weighted.unwrap_or_else(|| self.rate_by_photons(k));
         }
+
+        // Another light, which survives roulette
         let (Others::Noncontributing { scale, .. }, Some(learned)) = (self.others, lights.learned_visibility()) else {
             return 0.0;
         };

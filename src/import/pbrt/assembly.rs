@@ -185,6 +185,7 @@ impl Builder<'_> {
         made: Result<Made, ShapeError>,
         d: &mut Diagnostics,
     ) {
+        // The material first, so that its errors are reported even if the shape has some
         let material = self.material_of(&desc.material, d);
         match (made, material) {
             (Ok(mut made), Some(material)) => {

@@ -56,6 +56,7 @@ impl ShapeMaker<'_> {
     /// Makes the shapes of a description in the space of their group. Moves the arrays out of the description.
     pub(super) fn make(&self, desc: &mut ShapeDesc) -> Result<Made, ShapeError> {
         let source = std::mem::replace(&mut desc.source, ShapeSource::Mesh(MeshData::default()));
+        // Points of shapes are relative to an origin of their own
         let placement = |origin| desc.placement(origin, self.origin);
         match source {
             ShapeSource::Quadric(kind) => {

@@ -48,6 +48,7 @@ const SPELLINGS: &[(&str, &[&str])] = &[
 impl Builder<'_> {
     /// The material described by the parameters.
     pub(super) fn principled(&mut self, p: &ParamSet, d: &mut Diagnostics) -> Material {
+        // Names as in the file: OpenPBR, Blender or Disney
         let mut name = |name: &'static str| spelled(p, name, d);
         let [color, metalness, roughness, ior] =
             ["base_color", "base_metalness", "specular_roughness", "specular_ior"].map(&mut name);

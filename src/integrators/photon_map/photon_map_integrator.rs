@@ -176,6 +176,7 @@ fn guide(
             Search::Nearest { max_radius, .. } => Search::Nearest { count: GUIDES, max_radius },
             Search::Radius(radius) => Search::Radius(radius),
         };
+        // Primary photons stand for direct light, which gather rays leave out
         maps.global.gather(point, search, scratch, |photon, _| {
             if !photon.is_primary() {
                 photons.push(GuidePhoton { wi: frame.to_local(photon.wi()), power: photon.power().luminance() });
