@@ -3,7 +3,7 @@
 //! Irradiance has two parts, E = E_sources + E_indirect [Fan et al. 2006, §5.1]. Records hold either E_indirect
 //! ([`Cached::Indirect`](crate::settings::Cached); direct light is estimated at every hit) or both
 //! ([`Cached::All`](crate::settings::Cached)). They are computed at points visible to the camera, before rendering
-//! ([`build()`]), and do not change afterwards.
+//! ([`build`]), and do not change afterwards.
 //!
 //! Camera paths take the light reflected by Lambertian lobes from the records, and continue with the other lobes
 //! (`diffuse.rs`).
