@@ -20,17 +20,11 @@ mod image_tests;
 
 pub use super::file::{ImageError, PartHeader, ReadLimits, Window};
 pub use ocio::{OcioView, ocio_display};
-pub use openimageio_sys::is_loaded;
 pub use part::{MetaValue, Part, Storage};
 pub use pyramid::FilePyramid;
 pub(super) use read::{Input, read_failure};
 pub use read::{
     ReadColors, ReadImage, image_texels, read_colors, read_headers, read_image, read_metadata, read_part, texture_bytes,
 };
-pub use shim::load;
+pub use shim::{library_bytes, load};
 pub use write::{ROWS_AT_ONCE, RowSource, write_image, write_rows};
-
-/// Memory of OpenImageIO with its dependencies (bytes), unless they are loaded.
-pub fn library_bytes() -> u64 {
-    if is_loaded() { 0 } else { 118 << 20 }
-}

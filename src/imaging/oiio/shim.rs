@@ -24,6 +24,11 @@ pub(super) fn api() -> Result<&'static sys::Api, ImageError> {
     Ok(api)
 }
 
+/// Memory of OpenImageIO with its dependencies (bytes), unless they are loaded.
+pub fn library_bytes() -> u64 {
+    if sys::is_loaded() { 0 } else { 118 << 20 }
+}
+
 /// Loads OpenImageIO and its dependencies, unless they are loaded. The first access to an image does so as well.
 pub fn load() -> Result<(), ImageError> {
     api().map(|_| ())

@@ -12,7 +12,6 @@
 //! So a round depends only on earlier rounds.
 
 use super::cache::IrradianceCache;
-use super::cache_integrator::CacheIntegrator;
 use super::gather::{BATCH, Gatherer, RecordRequest};
 use super::octree::Octree;
 use super::record::{Range, Record};
@@ -42,14 +41,20 @@ const CHUNK: usize = 1024;
 /// Records computed before they are added. The number of records per round is not limited.
 const MAX_AT_ONCE: usize = 1 << 14;
 
+/// A cache, and the counts and times of its build.
+pub(super) struct BuiltCache {
+    pub(super) cache: IrradianceCache,
+    pub(super) stats: BuildStats,
+}
+
 /// Builds the cache for the pixels of the image. `stop` ends the build early.
-pub(super) fn build(job: &RenderJob, cameras: Cameras<'_>, stop: &AtomicBool) -> CacheIntegrator {
+pub(super) fn build(job: &RenderJob, cameras: Cameras<'_>, stop: &AtomicBool) -> BuiltCache {
     let start = Instant::now();
     let world_bounds = job.world.scene.geometry.world_bounds();
     let mut cache = IrradianceCache::new(job.settings().integrator.cache, &world_bounds);
     let mut stats = BuildStats::default();
     if holds_nothing(job) {
-        return CacheIntegrator { cache, build: stats };
+        return BuiltCache { cache, stats };
     }
     for round in rounds() {
         if cache.is_full() || stop.load(Ordering::Relaxed) {
@@ -75,7 +80,7 @@ pub(super) fn build(job: &RenderJob, cameras: Cameras<'_>, stop: &AtomicBool) ->
         }
     }
     stats.elapsed = start.elapsed();
-    CacheIntegrator { cache, build: stats }
+    BuiltCache { cache, stats }
 }
 
 /// True if all records would be black.

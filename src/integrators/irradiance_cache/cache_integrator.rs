@@ -1,6 +1,6 @@
 //! The integrator with an irradiance cache.
 
-use super::build::build;
+use super::build::{BuiltCache, build};
 use super::cache::IrradianceCache;
 use crate::bsdfs::Lambertian;
 use crate::direct::Fits;
@@ -19,14 +19,15 @@ use std::sync::atomic::AtomicBool;
 /// Renders with a cache.
 #[derive(Debug)]
 pub struct CacheIntegrator {
-    pub(super) cache: IrradianceCache,
-    pub(super) build: BuildStats,
+    cache: IrradianceCache,
+    build: BuildStats,
 }
 
 impl CacheIntegrator {
     /// Builds the cache.
     pub fn new(job: &RenderJob, cameras: Cameras<'_>, stop: &AtomicBool) -> Self {
-        build(job, cameras, stop)
+        let BuiltCache { cache, stats } = build(job, cameras, stop);
+        CacheIntegrator { cache, build: stats }
     }
 }
 

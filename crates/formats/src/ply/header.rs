@@ -1,7 +1,8 @@
 //! The header of a PLY file: its encoding, and the layout of its elements.
 
+use super::error::PlyError;
+use super::mesh::PlySize;
 use super::stream::{MAX_FILL, Stream};
-use super::{PlyError, PlySize};
 
 /// Maximum number of header lines, and therefore of elements and properties.
 const MAX_LINES: u64 = 10_000;

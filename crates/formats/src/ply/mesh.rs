@@ -25,3 +25,12 @@ pub struct PlyMesh {
     /// Irregularities of the file.
     pub warnings: Vec<String>,
 }
+
+/// The size of a mesh, by the header of its file.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct PlySize {
+    /// Bytes of positions, normals, texture coordinates and indices in memory.
+    pub bytes: u64,
+    /// Number of triangles; of faces, if the file does not tell their corners.
+    pub triangles: u64,
+}

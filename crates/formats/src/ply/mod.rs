@@ -25,6 +25,6 @@ mod wedges;
 mod tests;
 
 pub use error::{Place, PlyError};
-pub use mesh::PlyMesh;
+pub use mesh::{PlyMesh, PlySize};
 pub use read::{parse_ply, read_ply};
-pub use size::{PlySize, ply_size};
+pub use size::ply_size;

@@ -2,20 +2,12 @@
 
 use super::error::PlyError;
 use super::header;
+use super::mesh::PlySize;
 use super::stream::Stream;
 use crate::gzip;
 use crate::source::open_regular;
 use std::io::{self, BufReader, Read};
 use std::path::Path;
-
-/// The size of a mesh, by the header of its file.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct PlySize {
-    /// Bytes of positions, normals, texture coordinates and indices in memory.
-    pub bytes: u64,
-    /// Number of triangles; of faces, if the file does not tell their corners.
-    pub triangles: u64,
-}
 
 /// The size of the mesh of a PLY file, which may be compressed by gzip. Reads the header only.
 pub fn ply_size(path: &Path) -> Result<PlySize, PlyError> {
