@@ -305,6 +305,24 @@ impl<'a> Bsdf<'a> {
         sample.filter(|s| s.pdf > 0.0 && s.pdf.is_finite() && (s.wi.z != 0.0 || !has_surface))
     }
 
+    /// True for BSDFs without a peak, which say little about the direction of the light. Phase functions may have one.
+    #[inline]
+    pub fn is_wide(&self) -> bool {
+        match self {
+            Bsdf::Diffuse(_) | Bsdf::DiffuseTransmission(_) | Bsdf::Evaluated(_) => true,
+            Bsdf::CoatedDiffuse(_)
+            | Bsdf::Conductor(_)
+            | Bsdf::Dielectric(_)
+            | Bsdf::Exit(_)
+            | Bsdf::ThinDielectric(_)
+            | Bsdf::Layered(_)
+            | Bsdf::Phase(_)
+            | Bsdf::Hair(_)
+            | Bsdf::Measured(_)
+            | Bsdf::Principled(_) => false,
+        }
+    }
+
     /// True if [`Self::f`] is not 0 everywhere: light sampling can contribute.
     #[inline]
     pub fn has_non_specular(&self) -> bool {

@@ -62,19 +62,7 @@ pub struct Contributing {
 impl Contributing {
     /// Number of BSDF samples at a point that are combined with the light samples.
     fn bsdf_samples_at(&self, bsdf: &Bsdf<'_>) -> u32 {
-        match bsdf {
-            Bsdf::Diffuse(_) | Bsdf::DiffuseTransmission(_) | Bsdf::Evaluated(_) => 0,
-            Bsdf::CoatedDiffuse(_)
-            | Bsdf::Conductor(_)
-            | Bsdf::Dielectric(_)
-            | Bsdf::Exit(_)
-            | Bsdf::ThinDielectric(_)
-            | Bsdf::Layered(_)
-            | Bsdf::Phase(_)
-            | Bsdf::Hair(_)
-            | Bsdf::Measured(_)
-            | Bsdf::Principled(_) => self.bsdf_samples,
-        }
+        if bsdf.is_wide() { 0 } else { self.bsdf_samples }
     }
 
     /// The allocation at a point. The expected number of light samples is 1, since their densities include their

@@ -204,20 +204,8 @@ fn allocation(point: &ShadingPoint<'_>) -> SampleAllocation {
     if !bsdf.has_non_specular() {
         return SampleAllocation::fixed(0, n);
     }
-    let (of_proposals, of_samples) = match bsdf {
-        Bsdf::Diffuse(_) | Bsdf::DiffuseTransmission(_) | Bsdf::Evaluated(_) => (0.0625, 0.25),
-        Bsdf::Phase(phase) if phase.g().abs() < WIDE => (0.0625, 0.25),
-        Bsdf::CoatedDiffuse(_)
-        | Bsdf::Conductor(_)
-        | Bsdf::Dielectric(_)
-        | Bsdf::Exit(_)
-        | Bsdf::ThinDielectric(_)
-        | Bsdf::Layered(_)
-        | Bsdf::Phase(_)
-        | Bsdf::Hair(_)
-        | Bsdf::Measured(_)
-        | Bsdf::Principled(_) => (0.125, 0.5),
-    };
+    let is_wide = bsdf.is_wide() || matches!(bsdf, Bsdf::Phase(phase) if phase.g().abs() < WIDE);
+    let [of_proposals, of_samples] = if is_wide { [0.0625, 0.25] } else { [0.125, 0.5] };
     let by_bsdf = (m as f32 * of_proposals).max(n as f32 * of_samples);
     // A power of two, for the best distribution of a Sobol' sequence
     let by_bsdf = 1 << (by_bsdf.log2().round().max(0.0) as u32);

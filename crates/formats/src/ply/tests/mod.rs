@@ -1,0 +1,4 @@
+mod damage;
+mod encodings;
+mod faces;
+mod writer;
