@@ -24,7 +24,7 @@ use super::path_state::PathState;
 use crate::accel::{Coherence, RayBatch};
 use crate::film::PixelSample;
 use crate::scene::RenderJob;
-use lumiris_lanes::columns::{Column, Columns3, padded, reserve};
+use lumiris_lanes::columns::{Column, Columns3, padded, reserve, select_rows};
 use lumiris_lanes::connections::{Connections, Vertices, connect};
 use lumiris_lanes::lane::LANES;
 use lumiris_lanes::level;
@@ -284,7 +284,6 @@ impl Group {
         self.first.reserve(len);
         [&mut self.o, &mut self.d].into_iter().for_each(|columns| columns.reserve(len * count));
         reserve(&mut [&mut self.g], len * count);
-        self.kept.resize(self.kept.len().max(len), 0);
         let (from, to) = (self.first.vertices(len), self.second.vertices(count));
         let (o, d) = (self.o.get_mut(len * count), self.d.get_mut(len * count));
         connect(level(), &from, &to, &mut Connections { g: &mut self.g[..len * count], o, d });
@@ -300,14 +299,11 @@ impl Group {
         let member = self.connecting[k];
         let own = member as usize - self.begin;
         let vertex = shares.members[member as usize].vertex;
-        // Members at the same vertex index to whom the vertex may be visible, selected without branches
-        let g = &self.g[k * len..][..len];
-        let mut count = 0;
-        for (i, (other, &g)) in shares.members[self.begin..].iter().zip(g).enumerate() {
-            self.kept[count] = i as u32;
-            count += usize::from(g > 0.0 && i != own && other.vertex == vertex);
-        }
-        let kept = &self.kept[..count];
+        // Members at the same vertex index to whom the vertex may be visible
+        let (g, members) = (&self.g[k * len..][..len], &shares.members[self.begin..]);
+        let n = members.len().min(len);
+        select_rows(n, |i| (g[i] > 0.0) & (i != own) & (members[i].vertex == vertex), &mut self.kept);
+        let kept = &self.kept[..];
         shares.to.extend(kept.iter().map(|&i| self.begin as u32 + i));
 
         // Their segments
