@@ -1,6 +1,6 @@
 //! Errors, limits and headers of image files.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Reason why an image cannot be read or written.
 #[derive(Debug, thiserror::Error)]
@@ -64,8 +64,9 @@ impl Default for ReadLimits {
 }
 
 impl ReadLimits {
-    /// Maximum size of the decoded image for a file of `file_bytes`.
-    pub(super) fn bytes_for(&self, file_bytes: u64) -> u64 {
+    /// Maximum size of the decoded image of a file.
+    pub(super) fn bytes_for(&self, path: &Path) -> u64 {
+        let file_bytes = path.metadata().map_or(0, |metadata| metadata.len());
         file_bytes.saturating_mul(self.max_expansion).max(self.free_bytes).min(self.max_bytes)
     }
 }

@@ -2,7 +2,7 @@
 
 use super::ColorEncoding;
 use super::file::ImageError;
-use super::oiio::FilePyramid;
+use super::oiio::{ImageFile, Values};
 use super::texels::{Level, Texels, Tiled};
 use super::tiles::{TILE, TileStore};
 use std::sync::Arc;
@@ -10,7 +10,7 @@ use std::sync::Arc;
 /// Some channels of a pyramid, with their encoding.
 #[derive(Clone, Debug)]
 pub(super) struct FileTexels {
-    pub(super) file: Arc<FilePyramid>,
+    pub(super) file: Arc<ImageFile>,
     /// Positions of one or three channels.
     pub(super) channels: Vec<usize>,
     pub(super) encoding: ColorEncoding,
@@ -24,10 +24,9 @@ impl FileTexels {
 
     /// A whole level.
     pub(super) fn level(&self, level: usize) -> Result<Level, ImageError> {
-        let values = self.file.level(level, &self.channels)?;
-        let texels = match self.channel_bytes() {
-            1 => Texels::Bytes(values.into_iter().map(byte).collect()),
-            _ => Texels::Floats(values.into_iter().map(|v| self.encoding.to_linear(v)).collect()),
+        let texels = match self.file.level(level, &self.channels)? {
+            Values::Bytes(bytes) => Texels::Bytes(bytes),
+            Values::Floats(values) => Texels::linear(values, self.encoding),
         };
         Ok(Level::new(self.file.sizes()[level], texels))
     }
@@ -57,22 +56,13 @@ impl FileTexels {
         let origin = [index % columns * TILE, index / columns * TILE];
         let size = [TILE.min(width - origin[0]), TILE.min(height - origin[1])];
         let values = self.file.region(level, origin, size, &self.channels)?;
-
-        let mut bytes = vec![0; self.tile_bytes()];
-        let rows = bytes.chunks_exact_mut(self.tile_bytes() / TILE);
-        for (row, values) in rows.zip(values.chunks_exact(size[0] * self.channels.len())) {
-            match self.channel_bytes() {
-                1 => row.iter_mut().zip(values).for_each(|(b, v)| *b = byte(*v)),
-                _ => row.chunks_exact_mut(4).zip(values).for_each(|(word, v)| {
-                    word.copy_from_slice(&self.encoding.to_linear(*v).to_le_bytes());
-                }),
-            }
-        }
-        Ok(bytes)
+        let values = match values {
+            Values::Bytes(bytes) => bytes,
+            Values::Floats(values) => values.iter().flat_map(|v| self.encoding.to_linear(*v).to_le_bytes()).collect(),
+        };
+        let mut tile = vec![0; self.tile_bytes()];
+        let rows = tile.chunks_exact_mut(self.tile_bytes() / TILE);
+        rows.zip(values.chunks_exact(values.len() / size[1])).for_each(|(row, v)| row[..v.len()].copy_from_slice(v));
+        Ok(tile)
     }
-}
-
-/// The byte of a multiple of 1/255.
-fn byte(v: f32) -> u8 {
-    (v * 255.0 + 0.5) as u8
 }

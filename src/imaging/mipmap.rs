@@ -7,8 +7,8 @@
 
 use super::file::ImageError;
 use super::file_tiles::FileTexels;
-use super::oiio::FilePyramid;
-use super::texels::{Level, NearestByte, Texels, exact_bytes};
+use super::oiio::{ImageFile, Values};
+use super::texels::{Level, NearestByte, Texels};
 use super::tiles::TileStore;
 use super::{ColorEncoding, Image};
 use lumiris_numbers::math::{DVec2, Rgb, Vec2};
@@ -109,42 +109,35 @@ pub struct MipMap {
 }
 
 impl MipMap {
-    /// The pyramid of an image's colour channels (see [`Image::color_channels`]), as by [`Self::of_channels`]. An image
-    /// without channels is one black pixel.
+    /// The pyramid of an image's colour channels (see [`Image::color_channels`]). If all values are multiples of 1/255
+    /// in 0..1, they are stored as bytes. An image without pixels or channels is one black pixel.
     pub fn new(image: &Image, wrap: Wrap, filter: Filter, encoding: ColorEncoding) -> Self {
-        match image.color_channels() {
-            Some(channels) => Self::of_channels(image, channels.as_slice(), Lookup { wrap, filter, encoding }),
-            None => Self::constant(0.0, wrap, filter),
-        }
+        let Some(channels) = image.color_channels() else { return Self::constant(0.0, wrap, filter) };
+        let channels = channels.as_slice();
+        let pixels = image.data.chunks_exact(image.channels.len());
+        let values = pixels.flat_map(|pixel| channels.iter().map(|&c| pixel[c])).collect();
+        let lookup = Lookup { wrap, filter, encoding };
+        Self::of_values(Values::Floats(values), [image.width, image.height], channels.len(), lookup)
     }
 
-    /// The pyramid of one or three channels with the given positions and encoding. If all values are multiples of 1/255
-    /// in 0..1, as read from 8 bits, they are stored as bytes. An image without pixels is one black pixel.
-    pub fn of_channels(image: &Image, positions: &[usize], lookup: Lookup) -> Self {
+    /// The pyramid of the values of an image of one or three channels. Floats are stored as bytes if all are multiples
+    /// of 1/255 in 0..1, as read from 8 bits. An image without pixels is one black pixel.
+    pub fn of_values(values: Values, size: [usize; 2], channels: usize, lookup: Lookup) -> Self {
         let Lookup { wrap, filter, encoding } = lookup;
-        // An empty image is black
-        let (width, height) = (image.width, image.height);
-        if width == 0 || height == 0 {
+        if size.contains(&0) {
             return Self::constant(0.0, wrap, filter);
         }
-
-        // Bytes where they are exact, else linear floats
-        let stride = image.channels.len();
-        let table = Box::new(encoding.byte_table());
-        let texels = match exact_bytes(image, positions) {
-            Some(bytes) => Texels::Bytes(bytes),
-            None => {
-                let values = image.data.chunks_exact(stride).flat_map(|pixel| positions.iter().map(|&c| pixel[c]));
-                Texels::Floats(values.map(|v| encoding.to_linear(v)).collect())
-            }
+        let texels = match values {
+            Values::Bytes(bytes) => Texels::Bytes(bytes),
+            Values::Floats(values) => Texels::of_floats(values, encoding),
         };
-        Self::with_base(Level::new([width, height], texels), positions.len(), wrap, filter, table)
+        Self::with_base(Level::new(size, texels), channels, wrap, filter, Box::new(encoding.byte_table()))
     }
 
     /// The pyramid in a file, of one or three channels with the given positions and encoding. 8-bit values are stored
     /// as bytes. With a `store`, levels of more than a tile are read on demand.
     pub fn of_file(
-        file: FilePyramid,
+        file: ImageFile,
         channels: Vec<usize>,
         Lookup { wrap, filter, encoding }: Lookup,
         store: Option<&Arc<TileStore>>,
@@ -183,7 +176,17 @@ impl MipMap {
         }
         let (width, height) = ((source.width / 2).max(1), (source.height / 2).max(1));
 
-        // Area means
+        // Area means, in the storage of the finer level
+        let texels = match source.texels {
+            Texels::Floats(_) | Texels::Tiled(_) => Texels::Floats(self.means([width, height], |v| v)),
+            Texels::Bytes(_) => Texels::Bytes(self.means([width, height], |v| nearest.of(v))),
+        };
+        Some(Level::new([width, height], texels))
+    }
+
+    /// Area means of the coarsest level over `width` × `height` pixels, stored by `store`.
+    fn means<T>(&self, [width, height]: [usize; 2], store: impl Fn(f32) -> T) -> Vec<T> {
+        let Some(source) = self.levels.last() else { return Vec::new() };
         let columns: Vec<_> = (0..width).map(|x| overlaps(x, width, source.width)).collect();
         let mut values = Vec::with_capacity(width * height * self.channels);
         for y in 0..height {
@@ -197,17 +200,11 @@ impl MipMap {
                             sum += f64::from(row.fraction * column.fraction * texel);
                         }
                     }
-                    values.push(sum as f32);
+                    values.push(store(sum as f32));
                 }
             }
         }
-
-        // Same storage as the finer level
-        let texels = match source.texels {
-            Texels::Floats(_) | Texels::Tiled(_) => Texels::Floats(values),
-            Texels::Bytes(_) => Texels::Bytes(values.iter().map(|&v| nearest.of(v)).collect()),
-        };
-        Some(Level::new([width, height], texels))
+        values
     }
 
     /// Columns and rows of level 0.

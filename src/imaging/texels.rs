@@ -1,7 +1,7 @@
 //! Storage of one level of an image pyramid: texels as bytes or floats, in memory or in tiles. [`super::mipmap`] makes
 //! the levels and chooses among them.
 
-use super::image::Image;
+use super::ColorEncoding;
 use super::tiles::{TILE, TileStore};
 use lumiris_numbers::math::{Rgb, Vec2};
 use std::sync::Arc;
@@ -15,6 +15,28 @@ pub(super) enum Texels {
     Floats(Vec<f32>),
     /// Bytes or floats, in tiles.
     Tiled(Tiled),
+}
+
+impl Texels {
+    /// Stored floats, converted in place.
+    pub(super) fn linear(mut values: Vec<f32>, encoding: ColorEncoding) -> Self {
+        if encoding != ColorEncoding::Linear {
+            values.iter_mut().for_each(|v| *v = encoding.to_linear(*v));
+        }
+        Texels::Floats(values)
+    }
+
+    /// Stored floats; as bytes if all of them are multiples of 1/255 in 0..1.
+    pub(super) fn of_floats(values: Vec<f32>, encoding: ColorEncoding) -> Self {
+        let byte = |v: &f32| (v * 255.0 + 0.5) as u8;
+        // Also false for NaN
+        let is_exact = |v: &f32| (0.0..=1.0).contains(v) && (f32::from(byte(v)) / 255.0 - v).abs() < 1e-6;
+        if values.iter().all(is_exact) {
+            Texels::Bytes(values.iter().map(byte).collect())
+        } else {
+            Self::linear(values, encoding)
+        }
+    }
 }
 
 /// Tiles of a level, row-major, floats little-endian. Tiles at the right and lower edges have the full size.
@@ -114,24 +136,6 @@ impl Level {
     }
 }
 
-/// Channels `positions` of all pixels as bytes; `None` unless all values are multiples of 1/255 in 0..1.
-pub(super) fn exact_bytes(image: &Image, positions: &[usize]) -> Option<Vec<u8>> {
-    let mut bytes = Vec::with_capacity(image.width * image.height * positions.len());
-    for pixel in image.data.chunks_exact(image.channels.len()) {
-        for &c in positions {
-            let v = pixel[c];
-            let byte = (v * 255.0 + 0.5) as u8;
-            // Also false for NaN
-            let exact = (0.0..=1.0).contains(&v) && (f32::from(byte) / 255.0 - v).abs() < 1e-6;
-            if !exact {
-                return None;
-            }
-            bytes.push(byte);
-        }
-    }
-    Some(bytes)
-}
-
 /// The inverse of a table of linear values of bytes.
 pub(super) struct NearestByte {
     table: [f32; 256],
@@ -165,7 +169,6 @@ impl NearestByte {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::imaging::ColorEncoding;
 
     #[test]
     fn the_inverse_of_a_byte_table_finds_the_nearest_byte() {

@@ -1,7 +1,7 @@
 //! Image files as scenes ask for them, and how they are read.
 
 use crate::imaging::color_layers::ColorLayer;
-use crate::imaging::oiio::{self, FilePyramid, ImageError, ReadColors, ReadImage, ReadLimits};
+use crate::imaging::oiio::{ImageError, ImageFile, Values};
 use crate::imaging::tiles::TileStore;
 use crate::imaging::{ColorChannels, ColorEncoding, Filter, Lookup, MipMap, Wrap};
 use crate::textures::Udim;
@@ -59,8 +59,6 @@ pub struct ImageRequest {
     pub filter: Filter,
 }
 
-/// Metadata by which files of floats tell their colour space: x and y of red, green, blue and white.
-const CHROMATICITIES: &str = "chromaticities";
 /// Most columns and rows of the level of a file by which its opacity is judged.
 const SMALL: usize = 128;
 
@@ -123,25 +121,22 @@ pub fn tiles(path: &Path) -> Vec<Tile> {
 
 /// Reads an image as textures ask for it. A file that holds all levels of a pyramid, as `.tx` files do, gives them.
 pub fn load_map(request: &ImageRequest) -> Result<MipMap, ImageError> {
-    match pyramid(request)? {
-        Some(file) => map_of_levels(file, request, None),
-        None => image_map(request),
-    }
+    let file = ImageFile::open(&request.path)?;
+    if gives_levels(&file, request) { map_of_levels(file, request, None) } else { image_map(&file, request) }
 }
 
-/// A file that holds all levels, in a colour space whose numbers can be taken as they are.
-pub(super) fn pyramid(request: &ImageRequest) -> Result<Option<FilePyramid>, ImageError> {
-    let is_as_it_is =
-        |file: &FilePyramid| rec709_of(file.chromaticities(), request.channels, Colored::Factor).is_none();
-    Ok(FilePyramid::open(&request.path)?.filter(is_as_it_is))
+/// True if a file holds all levels, in a colour space whose numbers can be taken as they are.
+pub(super) fn gives_levels(file: &ImageFile, request: &ImageRequest) -> bool {
+    file.has_levels() && rec709_of(file.chromaticities(), request.channels, Colored::Factor).is_none()
 }
 
 /// The same with levels of more than a tile in `store`: read from the file when they are wanted, if it holds them.
 pub fn load_tiled_map(request: &ImageRequest, store: &Arc<TileStore>) -> Result<MipMap, ImageError> {
-    if let Some(file) = pyramid(request)? {
+    let file = ImageFile::open(&request.path)?;
+    if gives_levels(&file, request) {
         return map_of_levels(file, request, Some(store));
     }
-    into_tiles(image_map(request)?, request, store)
+    into_tiles(image_map(&file, request)?, request, store)
 }
 
 /// Moves a pyramid into the temporary file of `store`.
@@ -152,56 +147,63 @@ pub(super) fn into_tiles(map: MipMap, request: &ImageRequest, store: &Arc<TileSt
     })
 }
 
-/// The pyramid of an image, computed.
-pub(super) fn image_map(request: &ImageRequest) -> Result<MipMap, ImageError> {
-    let ReadColors { mut read, layer } = oiio::read_colors(&request.path, &ReadLimits::default())?;
-    Ok(map_of(&mut read, &layer, request))
-}
-
 /// The pyramids of all that textures may ask for, with default lookups: of the colours, and of the opacity if there is
 /// one. `Err` if the file has them.
 pub fn all_maps(path: &Path, encoding: ImageEncoding) -> Result<Vec<MipMap>, ImageError> {
-    if FilePyramid::open(path)?.is_some() {
+    let file = ImageFile::open(path)?;
+    if file.has_levels() {
         let reason = "has all levels already".to_owned();
         return Err(ImageError::Unreadable { path: path.to_owned(), reason });
     }
-    let ReadColors { mut read, layer } = oiio::read_colors(path, &ReadLimits::default())?;
     let (wrap, filter) = (Wrap::default(), Filter::default());
     let request = |channels| ImageRequest { path: path.to_owned(), channels, encoding, wrap, filter };
-    // Colours last, because they may be converted in place
-    let alpha = layer.alpha.map(|_| map_of(&mut read, &layer, &request(ImageChannels::Alpha)));
-    let color = map_of(&mut read, &layer, &request(ImageChannels::Color));
-    Ok(std::iter::once(color).chain(alpha).collect())
+    let alpha = file.layer().alpha.map(|_| ImageChannels::Alpha);
+    let wanted = [ImageChannels::Color].into_iter().chain(alpha);
+    wanted.map(|channels| image_map(&file, &request(channels))).collect()
 }
 
-/// The pyramid of an image that was read, whose colours may be converted in place.
-fn map_of(read: &mut ReadImage, layer: &ColorLayer, request: &ImageRequest) -> MipMap {
-    let image = &mut read.image;
-    let count = image.channels.len();
-    let is_opaque = |a: usize| image.data.iter().skip(a).step_by(count).all(|&alpha| alpha >= 1.0);
-    let resolved = request.resolved(layer, is_opaque);
-    let chromaticities = read.metadata.get(CHROMATICITIES).filter(|_| read.encoding == ColorEncoding::Linear);
-    let matrix = rec709_of(chromaticities.map(String::as_str), request.channels, Colored::Factor);
-    if let (Some(matrix), ColorChannels::Rgb(rgb)) = (matrix, layer.channels) {
-        for pixel in image.data.chunks_exact_mut(count) {
-            let color = matrix * Vec3::from_array(rgb.map(|c| pixel[c]));
-            rgb.iter().zip(color.to_array()).for_each(|(&c, value)| pixel[c] = value);
+/// The pyramid of an image, computed.
+pub(super) fn image_map(file: &ImageFile, request: &ImageRequest) -> Result<MipMap, ImageError> {
+    // A texture of numbers reads colours and opacity, since either may be used
+    let layer = file.layer();
+    let (colors, alpha) = (layer.channels.as_slice(), layer.alpha.as_slice());
+    let read = match request.channels {
+        ImageChannels::Color => colors.to_vec(),
+        ImageChannels::Alpha => alpha.to_vec(),
+        ImageChannels::Number => [colors, alpha].concat(),
+    };
+    if read.is_empty() {
+        return Ok(without_channels(request));
+    }
+    let mut values = file.level(0, &read)?;
+
+    // Colours of another space
+    let chromaticities = file.chromaticities().filter(|_| file.encoding() == ColorEncoding::Linear);
+    let matrix = rec709_of(chromaticities, request.channels, Colored::Factor);
+    if let (Some(matrix), Values::Floats(values), ColorChannels::Rgb(_)) = (matrix, &mut values, layer.channels) {
+        for pixel in values.as_chunks_mut::<3>().0 {
+            *pixel = (matrix * Vec3::from_array(*pixel)).to_array();
         }
     }
-    let Meaning { channels, encoding } = meaning(&resolved, layer, read.encoding);
+
+    // The channels in use
+    let position = |channel: usize| read.iter().position(|&c| c == channel).unwrap_or(0);
+    let resolved = request.resolved(layer, |a| values.is_one(position(a), read.len()));
+    let Meaning { channels, encoding } = meaning(&resolved, layer, file.encoding());
+    let kept: Vec<usize> = channels.into_iter().flatten().map(position).collect();
     let lookup = Lookup { wrap: request.wrap, filter: request.filter, encoding };
-    channels.map_or_else(|| without_channels(request), |channels| MipMap::of_channels(&read.image, &channels, lookup))
+    Ok(MipMap::of_values(values.of_channels(&kept, read.len()), file.sizes()[0], kept.len(), lookup))
 }
 
 /// The pyramid that a file holds.
 pub(super) fn map_of_levels(
-    file: FilePyramid,
+    file: ImageFile,
     request: &ImageRequest,
     store: Option<&Arc<TileStore>>,
 ) -> Result<MipMap, ImageError> {
     // A level of few texels tells whether all are opaque
     let small = file.sizes().iter().position(|size| size[0].max(size[1]) <= SMALL).unwrap_or(0);
-    let is_opaque = |a| file.level(small, &[a]).is_ok_and(|level| level.iter().all(|&alpha| alpha >= 1.0));
+    let is_opaque = |a| file.level(small, &[a]).is_ok_and(|level| level.is_one(0, 1));
     let request = &request.resolved(file.layer(), is_opaque);
     let Meaning { channels, encoding } = meaning(request, file.layer(), file.encoding());
     let lookup = Lookup { wrap: request.wrap, filter: request.filter, encoding };
@@ -243,23 +245,23 @@ fn without_channels(request: &ImageRequest) -> MipMap {
 
 /// Reads an image as linear RGB, rows from the top, with its size.
 pub fn load_rgb(path: &Path) -> Result<RgbImage, ImageError> {
-    let ReadColors { read, layer } = oiio::read_colors(path, &ReadLimits::default())?;
-    let image = &read.image;
-    let channels = match layer.channels {
-        ColorChannels::Rgb(rgb) => rgb,
-        ColorChannels::Grey(y) => [y; 3],
+    let file = ImageFile::open(path)?;
+    let channels = file.layer().channels;
+    let values = file.floats(channels.as_slice())?;
+    let matrix = rec709_of(file.chromaticities(), ImageChannels::Color, Colored::Light).unwrap_or(Mat3::IDENTITY);
+    let color = |p: [f32; 3]| matrix * Vec3::from_array(p.map(|v| file.encoding().to_linear(v)));
+    let color = |p| Rgb::from_array(color(p).to_array());
+    let texels = match channels {
+        ColorChannels::Rgb(_) => values.as_chunks().0.iter().map(|p| color(*p)).collect(),
+        ColorChannels::Grey(_) => values.iter().map(|&y| color([y; 3])).collect(),
     };
-    let pixels = image.data.chunks_exact(image.channels.len());
-    let chromaticities = read.metadata.get(CHROMATICITIES).map(String::as_str);
-    let matrix = rec709_of(chromaticities, ImageChannels::Color, Colored::Light).unwrap_or(Mat3::IDENTITY);
-    let color = |p: &[f32]| matrix * Vec3::from_array(channels.map(|c| read.encoding.to_linear(p[c])));
-    let texels = pixels.map(|p| Rgb::from_array(color(p).to_array()));
-    Ok(RgbImage { texels: texels.collect(), size: [image.width, image.height] })
+    Ok(RgbImage { texels, size: file.sizes()[0] })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::imaging::oiio::{Part, write_image};
     use std::fmt::Write;
 
     /// An image of two pixels, as 8-bit or 16-bit integers or floats, that no code of this program wrote.
@@ -514,8 +516,8 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("layers.exr");
         let write = |names: &[&str], values: &[f32]| {
-            let part = oiio::Part::linear(1, 1, names.iter().map(|&name| name.to_owned()).collect(), values.to_vec());
-            oiio::write_image(&path, &[part]).unwrap();
+            let part = Part::linear(1, 1, names.iter().map(|&name| name.to_owned()).collect(), values.to_vec());
+            write_image(&path, &[part]).unwrap();
         };
         // Beside a depth, and in the order of files
         let names = ["Depth.Z", "View.Combined.A", "View.Combined.B", "View.Combined.G", "View.Combined.R"];
@@ -538,8 +540,8 @@ mod tests {
         let path = folder.path().join("leaf.exr");
         let texel = |alpha: f32, channels| {
             let names = ["R", "G", "B", "A"].map(str::to_owned).to_vec();
-            let part = oiio::Part::linear(2, 1, names, vec![0.2, 0.4, 0.9, alpha, 0.2, 0.4, 0.9, 1.0]);
-            oiio::write_image(&path, &[part]).unwrap();
+            let part = Part::linear(2, 1, names, vec![0.2, 0.4, 0.9, alpha, 0.2, 0.4, 0.9, 1.0]);
+            write_image(&path, &[part]).unwrap();
             load_map(&request(&path, channels)).unwrap().texel(0, 0, 0).to_array()
         };
         assert_eq!(texel(0.25, ImageChannels::Number), [0.25; 3]);

@@ -7,9 +7,9 @@
 //!
 //! A damaged entry is made anew, also in the middle of a rendering.
 
-use super::images::{ImageRequest, image_map, into_tiles, map_of_levels, pyramid};
+use super::images::{ImageRequest, gives_levels, image_map, into_tiles, map_of_levels};
 use crate::imaging::MipMap;
-use crate::imaging::oiio::ImageError;
+use crate::imaging::oiio::{ImageError, ImageFile};
 use crate::imaging::texture_file::{TextureFile, write_texture};
 use crate::imaging::tiles::TileStore;
 use lumiris_formats::output::{write_text, write_whole};
@@ -72,7 +72,8 @@ impl TextureCache {
         if let Some(map) = known.and_then(|hash| self.find(&Entry::new(self, request, hash), store)) {
             return Ok(map);
         }
-        if let Some(file) = pyramid(request)? {
+        let file = ImageFile::open(&request.path)?;
+        if gives_levels(&file, request) {
             return map_of_levels(file, request, Some(store));
         }
         let hash = known.map_or_else(|| self.hash(&request.path), Ok);
@@ -84,7 +85,7 @@ impl TextureCache {
 
         // Make the entry. Without it, the texture goes into the temporary file
         let _making = making.map(|mutex| mutex.lock().unwrap_or_else(PoisonError::into_inner));
-        let map = image_map(request)?;
+        let map = image_map(&file, request)?;
         match entry.write(&map) {
             Ok(()) => self.find(&entry, store).map_or_else(|| into_tiles(map, request, store), Ok),
             Err(error) => {
@@ -170,7 +171,8 @@ impl Entry {
         if hash != self.hash {
             return Err(format!("{reason}, and {image} has changed meanwhile"));
         }
-        let map = image_map(&self.request).map_err(|error| error.to_string())?;
+        let map = ImageFile::open(&self.request.path).and_then(|file| image_map(&file, &self.request));
+        let map = map.map_err(|error| error.to_string())?;
         self.write(&map).map_err(|error| format!("{}: {error}", self.path.display()))
     }
 }

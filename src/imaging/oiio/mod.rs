@@ -5,11 +5,11 @@
 //! leaves a partial image under the name. Equal images give equal files: a date is written only if the caller gives one
 //! (`DateTime`), since OpenImageIO would insert the current time.
 //!
-//! Reading order: `part` (images to write), `shim` (calls and strings), `radiance`, `read`, `pyramid`, `write`, `ocio`.
+//! Reading order: `part` (images to write), `shim` (calls and strings), `radiance`, `read`, `image_file`, `write`, `ocio`.
 
+mod image_file;
 mod ocio;
 mod part;
-mod pyramid;
 mod radiance;
 mod read;
 mod shim;
@@ -19,12 +19,10 @@ mod write;
 mod image_tests;
 
 pub use super::file::{ImageError, PartHeader, ReadLimits, Window};
+pub use image_file::{ImageFile, Values};
 pub use ocio::{OcioView, ocio_display};
 pub use part::{MetaValue, Part, Storage};
-pub use pyramid::FilePyramid;
 pub(super) use read::{Input, read_failure};
-pub use read::{
-    ReadColors, ReadImage, image_texels, read_colors, read_headers, read_image, read_metadata, read_part, texture_bytes,
-};
+pub use read::{ReadImage, image_texels, read_headers, read_image, read_metadata, read_part, texture_bytes};
 pub use shim::{library_bytes, load};
 pub use write::{ROWS_AT_ONCE, RowSource, write_image, write_rows};

@@ -7,6 +7,7 @@
 
 use std::fs::File;
 use std::io::Read;
+use std::ops::Range;
 use std::path::Path;
 
 /// Maximum bytes of a header.
@@ -62,15 +63,16 @@ impl Storage {
         Some(Storage { is_by_columns, from_right: x == "-X", from_bottom: y == "+Y", factors })
     }
 
-    /// Radiance, row by row from the top. `stored` are RGB pixels in `count` lines of `length` pixels.
-    pub(super) fn arranged(&self, stored: &[f32], [length, count]: [usize; 2]) -> Vec<f32> {
+    /// Radiance, row by row from the top, of a range of channels. `stored` are RGB pixels in `count` lines of `length`
+    /// pixels.
+    pub(super) fn arranged(&self, stored: &[f32], [length, count]: [usize; 2], channels: Range<usize>) -> Vec<f32> {
         let [width, height] = if self.is_by_columns { [count, length] } else { [length, count] };
         let pixel = |i: usize| {
             let (x, y) = (i % width, i / width);
             let x = if self.from_right { width - 1 - x } else { x };
             let y = if self.from_bottom { height - 1 - y } else { y };
             let at = if self.is_by_columns { x * length + y } else { y * length + x };
-            (0..3).map(move |c| stored[3 * at + c] / self.factors[c])
+            channels.clone().map(move |c| stored[3 * at + c] / self.factors[c])
         };
         (0..width * height).flat_map(pixel).collect()
     }

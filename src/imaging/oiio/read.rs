@@ -29,13 +29,18 @@ pub struct ReadImage {
     pub is_half: bool,
 }
 
-/// An image with the choice of its colour channels.
-#[derive(Clone, Debug)]
-pub struct ReadColors {
-    /// The image.
-    pub read: ReadImage,
-    /// The colour channels.
-    pub layer: ColorLayer,
+/// A type that values are read as.
+pub(super) trait Value: Copy + Default {
+    /// Its `OIIO_FORMAT_…`.
+    const FORMAT: i32;
+}
+
+impl Value for u8 {
+    const FORMAT: i32 = sys::OIIO_FORMAT_U8;
+}
+
+impl Value for f32 {
+    const FORMAT: i32 = sys::OIIO_FORMAT_FLOAT;
 }
 
 struct Channel {
@@ -93,37 +98,24 @@ impl Input {
         Some(found)
     }
 
-    /// The pixels of a region of a level, `size` columns and rows from `origin` on, for a range of channels.
-    pub(super) fn region(
+    /// The values of a region of a level, `size` columns and rows from `origin` on, for a range of channels.
+    pub(super) fn region<T: Value>(
         &self,
         level: i32,
         origin: [i32; 2],
         size: [i32; 2],
         channels: [i32; 2],
-    ) -> Result<Vec<f32>, Failure> {
+    ) -> Result<Vec<T>, Failure> {
         let counts = [size[0], size[1], channels[1] - channels[0]].map(|n| usize::try_from(n).unwrap_or(0));
-        let mut pixels = vec![0.0; counts.iter().product()];
+        let mut values = vec![T::default(); counts.iter().product()];
         let ([x, y], [width, height], [begin, end]) = (origin, size, channels);
-        let (out, count) = (pixels.as_mut_ptr(), pixels.len() as u64);
-        // SAFETY: as above; `out` holds `count` floats, and nothing is written unless this is the requested number.
+        let (read, out, count) = (self.api.input_read_region, values.as_mut_ptr().cast(), values.len() as u64);
+        // SAFETY: as above; `out` holds `count` values of this format, and nothing is written unless this is the
+        // requested number.
         call(|e, n| unsafe {
-            (self.api.input_read_region)(
-                self.handle,
-                self.part,
-                level,
-                x,
-                y,
-                width,
-                height,
-                begin,
-                end,
-                out,
-                count,
-                e,
-                n,
-            )
+            read(self.handle, self.part, level, x, y, width, height, begin, end, T::FORMAT, out, count, e, n)
         })?;
-        Ok(pixels)
+        Ok(values)
     }
 
     fn parts(&self) -> Result<usize, Failure> {
@@ -221,17 +213,22 @@ impl Input {
         read(&a)
     }
 
-    fn pixels(&self, max_bytes: u64) -> Result<Vec<f32>, Failure> {
+    /// `Err` unless the header asks for an image of at most `max_bytes` of f32.
+    pub(super) fn check_size(&self, max_bytes: u64) -> Result<(), Failure> {
         let mut count = 0;
         // SAFETY: as above.
-        call(|e, n| unsafe { (self.api.input_float_count)(self.handle, self.part, max_bytes, &mut count, e, n) })?;
-        let mut pixels = vec![0.0; count as usize];
-        // SAFETY: `pixels` holds `count` floats.
-        call(|e, n| unsafe { (self.api.input_read)(self.handle, self.part, pixels.as_mut_ptr(), count, e, n) })?;
-        let Some(stored) = self.stored else { return Ok(pixels) };
-        let spec = self.spec()?;
-        let [width, height] = [spec.width, spec.height].map(|n| usize::try_from(n).unwrap_or(0));
-        Ok(stored.arranged(&pixels, if stored.is_by_columns { [height, width] } else { [width, height] }))
+        call(|e, n| unsafe { (self.api.input_value_count)(self.handle, self.part, max_bytes, &mut count, e, n) })
+    }
+
+    /// The values of a range of channels of all pixels.
+    pub(super) fn pixels(&self, channels: [i32; 2], max_bytes: u64) -> Result<Vec<f32>, Failure> {
+        self.check_size(max_bytes)?;
+        let sys::OiioSpec { width, height, .. } = self.spec()?;
+        let Some(stored) = self.stored else { return self.region(0, [0; 2], [width, height], channels) };
+        let size = if stored.is_by_columns { [height, width] } else { [width, height] };
+        let pixels = self.region(0, [0; 2], size, [0, 3])?;
+        let [begin, end] = channels.map(|c| usize::try_from(c).unwrap_or(0));
+        Ok(stored.arranged(&pixels, size.map(|n| usize::try_from(n).unwrap_or(0)), begin..end))
     }
 }
 
@@ -245,13 +242,6 @@ impl Drop for Input {
 /// Reads the first part of an image.
 pub fn read_image(path: &Path, limits: &ReadLimits) -> Result<ReadImage, ImageError> {
     read_part(path, 0, limits)
-}
-
-/// Reads the part of a file with the image. Used wherever no layer is selected. `Err` if the choice is ambiguous.
-pub fn read_colors(path: &Path, limits: &ReadLimits) -> Result<ReadColors, ImageError> {
-    let mut input = Input::open(path, 0)?;
-    let layer = input.choose_colors(path)?;
-    Ok(ReadColors { read: read(&input, path, layer.part, limits)?, layer })
 }
 
 /// Reads a part of an image; the first is 0.
@@ -268,7 +258,7 @@ fn read(input: &Input, path: &Path, part: usize, limits: &ReadLimits) -> Result<
         return Err(failed(Failure { code: sys::OIIO_INVALID_ARGUMENT, message }));
     }
     let spec = input.spec().map_err(failed)?;
-    let data = input.pixels(limits.bytes_for(path.metadata().map_or(0, |m| m.len()))).map_err(failed)?;
+    let data = input.pixels([0, spec.nchannels], limits.bytes_for(path)).map_err(failed)?;
     let channels = input.channels(spec.nchannels).map_err(failed)?;
     let metadata = input.metadata(spec.attributes);
     let encoding = usual_encoding(&spec);

@@ -2,7 +2,7 @@
 
 use super::checks::positive;
 use crate::cameras::{Aperture, LensElement, LensSystem};
-use crate::imaging::oiio::{ReadColors, ReadLimits, read_colors};
+use crate::imaging::oiio::ImageFile;
 use lumiris_formats::diagnostic::Diagnostics;
 use lumiris_formats::names::file_in;
 use lumiris_formats::number::numbers_of_text;
@@ -104,15 +104,15 @@ fn aperture(p: &ParamSet, folder: &Path, d: &mut Diagnostics) -> Option<Aperture
 
     // Image: mean of the colour channels
     let path = file_in(folder, name);
-    match read_colors(&path, &ReadLimits::default()) {
-        Ok(ReadColors { read, layer }) => {
-            let image = read.image;
-            let channels = image.channels.len();
-            let colors = layer.channels.as_slice();
-            let mean = |texel: &[f32]| colors.iter().map(|&c| texel[c]).sum::<f32>() / colors.len() as f32;
-            let texels = image.data.chunks_exact(channels).map(mean).collect();
-            Some(Aperture::Image(texels, [image.width, image.height]))
-        }
+    let read = ImageFile::open(&path).and_then(|file| {
+        let colors = file.layer().channels;
+        let count = colors.as_slice().len();
+        let texels = file.floats(colors.as_slice())?;
+        let mean = |texel: &[f32]| texel.iter().sum::<f32>() / count as f32;
+        Ok(Aperture::Image(texels.chunks_exact(count).map(mean).collect(), file.sizes()[0]))
+    });
+    match read {
+        Ok(aperture) => Some(aperture),
         Err(error) => {
             crate::import::resources::report(&error, &path, span, d);
             None

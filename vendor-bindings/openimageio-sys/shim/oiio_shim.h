@@ -1,5 +1,5 @@
-/* C interface to the part of OpenImageIO used by Lumiris: read any image as 32-bit floats, write images
-   of one or several parts.
+/* C interface to the part of OpenImageIO used by Lumiris: read any image as bytes or 32-bit floats, write
+   images of one or several parts.
 
    Rules for all functions:
    - No C++ exception leaves them. The result is an OiioResult. If it is not OIIO_OK and `error` is not
@@ -15,7 +15,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#define OIIO_SHIM_ABI 3
+#define OIIO_SHIM_ABI 4
 
 #if defined(_WIN32)
 #define OIIO_SHIM_API __declspec(dllexport)
@@ -135,25 +135,22 @@ OIIO_SHIM_API int32_t oiio_shim_input_channel(OiioInput* input, int32_t subimage
 /* Metadata entry of a subimage, 0 <= index < spec.attributes. */
 OIIO_SHIM_API int32_t oiio_shim_input_attribute(OiioInput* input, int32_t subimage, int32_t index,
                                                 OiioAttribute* attribute, char* error, size_t error_size);
-/* Number of floats needed by oiio_shim_input_read: width * height * nchannels. OIIO_TOO_LARGE if they
-   take more than max_bytes, OIIO_UNSUPPORTED if the subimage is deep, a volume, or empty. */
-OIIO_SHIM_API int32_t oiio_shim_input_float_count(OiioInput* input, int32_t subimage, uint64_t max_bytes,
+/* Number of values of a subimage: width * height * nchannels. OIIO_TOO_LARGE if they take more than max_bytes as
+   floats, OIIO_UNSUPPORTED if the subimage is deep, a volume, or empty. */
+OIIO_SHIM_API int32_t oiio_shim_input_value_count(OiioInput* input, int32_t subimage, uint64_t max_bytes,
                                                   uint64_t* count, char* error, size_t error_size);
-/* Reads all channels of a subimage, interleaved, top row first. `count` must be the number above. After an
-   error the pixels have undefined values, but remain initialised. */
-OIIO_SHIM_API int32_t oiio_shim_input_read(OiioInput* input, int32_t subimage, float* pixels, uint64_t count,
-                                           char* error, size_t error_size);
 /* Level of a subimage; level 0 is the image itself. OIIO_UNSUPPORTED if the file has no such level, or if it is
    deep, a volume, or empty. */
 OIIO_SHIM_API int32_t oiio_shim_input_level(OiioInput* input, int32_t subimage, int32_t level, OiioLevel* out,
                                             char* error, size_t error_size);
 /* Reads `width` x `height` pixels of a level from column x and row y on, counted from the level's top left. The
-   level must contain them. Channels are [channel_begin, channel_end), interleaved, top row first. `count` is
-   width * height * (channel_end - channel_begin). */
+   level must contain them. Channels are [channel_begin, channel_end), interleaved, top row first. `format` is the type
+   of the `values`, OIIO_FORMAT_U8 or OIIO_FORMAT_FLOAT, and `count` is width * height * (channel_end -
+   channel_begin). After an error the values are undefined, but remain initialised. */
 OIIO_SHIM_API int32_t oiio_shim_input_read_region(OiioInput* input, int32_t subimage, int32_t level, int32_t x,
                                                   int32_t y, int32_t width, int32_t height, int32_t channel_begin,
-                                                  int32_t channel_end, float* pixels, uint64_t count, char* error,
-                                                  size_t error_size);
+                                                  int32_t channel_end, int32_t format, void* values, uint64_t count,
+                                                  char* error, size_t error_size);
 /* Closes and frees. Null is allowed. */
 OIIO_SHIM_API void oiio_shim_input_close(OiioInput* input);
 

@@ -93,8 +93,8 @@ struct OiioInput {
     return *(parts[subimage] = std::move(part));
   }
 
-  // Number of floats of a subimage, after checking its header.
-  uint64_t float_count(int32_t subimage, uint64_t max_bytes) {
+  // Number of values of a subimage, after checking its header.
+  uint64_t value_count(int32_t subimage, uint64_t max_bytes) {
     const ImageSpec& spec = part(subimage).spec;
     if (spec.deep) throw Failure{OIIO_UNSUPPORTED, "deep images are not supported"};
     if (spec.depth > 1) throw Failure{OIIO_UNSUPPORTED, "volume images are not supported"};
@@ -140,6 +140,14 @@ struct Span {
     return {begin / tile * tile, int(std::min<int64_t>(size, (int64_t(end) + tile - 1) / tile * tile))};
   }
 };
+
+// Rows of a file without tiles that are read together: whole strips. OpenImageIO takes as much memory again for rows
+// that it converts.
+int64_t rows_of_block(const ImageSpec& spec) {
+  constexpr int64_t kRows = 256;
+  const int64_t strip = std::max(spec.get_int_attribute("tiff:RowsPerStrip", 1), 1);
+  return (kRows + strip - 1) / strip * strip;
+}
 
 }  // namespace
 
@@ -264,23 +272,11 @@ int32_t oiio_shim_input_attribute(OiioInput* input, int32_t subimage, int32_t in
   });
 }
 
-int32_t oiio_shim_input_float_count(OiioInput* input, int32_t subimage, uint64_t max_bytes, uint64_t* count,
+int32_t oiio_shim_input_value_count(OiioInput* input, int32_t subimage, uint64_t max_bytes, uint64_t* count,
                                     char* error, size_t error_size) {
   return guard(error, error_size, [&] {
     require(input != nullptr && count != nullptr, "null argument");
-    *count = input->float_count(subimage, max_bytes);
-  });
-}
-
-int32_t oiio_shim_input_read(OiioInput* input, int32_t subimage, float* pixels, uint64_t count, char* error,
-                             size_t error_size) {
-  return guard(error, error_size, [&] {
-    require(input != nullptr && pixels != nullptr, "null argument");
-    require(count == input->float_count(subimage, UINT64_MAX), "the number of floats is not float_count");
-    const int channels = input->part(subimage).spec.nchannels;
-    input->seek(subimage);
-    if (!input->input->read_image(subimage, 0, 0, channels, TypeDesc(TypeDesc::FLOAT), pixels))
-      throw Failure{OIIO_CANNOT_READ, or_else(input->drain(), "the pixels cannot be read")};
+    *count = input->value_count(subimage, max_bytes);
   });
 }
 
@@ -295,36 +291,45 @@ int32_t oiio_shim_input_level(OiioInput* input, int32_t subimage, int32_t level,
 
 int32_t oiio_shim_input_read_region(OiioInput* input, int32_t subimage, int32_t level, int32_t x, int32_t y,
                                     int32_t width, int32_t height, int32_t channel_begin, int32_t channel_end,
-                                    float* pixels, uint64_t count, char* error, size_t error_size) {
+                                    int32_t format, void* values, uint64_t count, char* error, size_t error_size) {
   return guard(error, error_size, [&] {
-    require(input != nullptr && pixels != nullptr, "null argument");
+    require(input != nullptr && values != nullptr, "null argument");
+    require(format == OIIO_FORMAT_U8 || format == OIIO_FORMAT_FLOAT, "values are read as bytes or floats");
+    const int64_t rows_of_part = rows_of_block(input->part(subimage).spec);
     const ImageSpec spec = input->level(subimage, level);
     require(x >= 0 && y >= 0 && width > 0 && height > 0 && width <= spec.width - x && height <= spec.height - y,
             "pixels outside of the level");
     require(channel_begin >= 0 && channel_begin < channel_end && channel_end <= spec.nchannels, "no such channels");
     const uint64_t channels = uint64_t(channel_end - channel_begin);
-    require(count == uint64_t(width) * uint64_t(height) * channels, "the number of floats is not that of the pixels");
+    require(count == uint64_t(width) * uint64_t(height) * channels, "the number of values is not that of the pixels");
 
-    // Files are read in whole tiles or whole rows.
+    // Files are read in whole tiles or whole rows, in blocks.
+    const TypeDesc type(format == OIIO_FORMAT_U8 ? TypeDesc::UINT8 : TypeDesc::FLOAT);
+    const uint64_t pixel = channels * type.size();
     const bool tiled = spec.tile_width > 0 && spec.tile_height > 0;
     const Span columns = Span{x, x + width}.of_tiles(tiled ? spec.tile_width : 0, spec.width);
-    const Span rows = tiled ? Span{y, y + height}.of_tiles(spec.tile_height, spec.height) : Span{y, y + height};
-    const uint64_t row = uint64_t(columns.end - columns.begin) * channels;
-    const bool exact = columns.end - columns.begin == width && rows.end - rows.begin == height;
-    std::vector<float> whole(exact ? 0 : size_t(row * uint64_t(rows.end - rows.begin)));
-    float* const target = exact ? pixels : whole.data();
-    const TypeDesc floats(TypeDesc::FLOAT);
-    const bool read = tiled ? input->input->read_tiles(subimage, level, spec.x + columns.begin, spec.x + columns.end,
-                                                       spec.y + rows.begin, spec.y + rows.end, spec.z, spec.z + 1,
-                                                       channel_begin, channel_end, floats, target)
-                            : input->input->read_scanlines(subimage, level, spec.y + rows.begin, spec.y + rows.end,
-                                                           spec.z, channel_begin, channel_end, floats, target);
-    if (!read) throw Failure{OIIO_CANNOT_READ, or_else(input->drain(), "the pixels cannot be read")};
-    if (exact) return;
-    const uint64_t wanted = uint64_t(width) * channels;
-    const uint64_t left = uint64_t(x - columns.begin) * channels;
-    for (int i = 0; i < height; ++i)
-      std::copy_n(target + uint64_t(y - rows.begin + i) * row + left, wanted, pixels + uint64_t(i) * wanted);
+    const uint64_t row = uint64_t(columns.end - columns.begin) * pixel;
+    const int64_t together = tiled ? spec.tile_height : rows_of_part;
+    std::vector<char> block;
+    for (int begin = y; begin < y + height;) {
+      const int end = int(std::min<int64_t>(y + height, (begin / together + 1) * together));
+      const Span rows = tiled ? Span{begin, end}.of_tiles(spec.tile_height, spec.height) : Span{begin, end};
+      const bool exact = columns.end - columns.begin == width && rows.end - rows.begin == end - begin;
+      if (!exact) block.resize(size_t(row * uint64_t(rows.end - rows.begin)));
+      char* const wanted = static_cast<char*>(values) + uint64_t(begin - y) * uint64_t(width) * pixel;
+      char* const target = exact ? wanted : block.data();
+      const bool read = tiled ? input->input->read_tiles(subimage, level, spec.x + columns.begin, spec.x + columns.end,
+                                                         spec.y + rows.begin, spec.y + rows.end, spec.z, spec.z + 1,
+                                                         channel_begin, channel_end, type, target)
+                              : input->input->read_scanlines(subimage, level, spec.y + rows.begin, spec.y + rows.end,
+                                                             spec.z, channel_begin, channel_end, type, target);
+      if (!read) throw Failure{OIIO_CANNOT_READ, or_else(input->drain(), "the pixels cannot be read")};
+      const uint64_t left = uint64_t(x - columns.begin) * pixel;
+      for (int i = 0; !exact && i < end - begin; ++i)
+        std::copy_n(target + uint64_t(begin - rows.begin + i) * row + left, uint64_t(width) * pixel,
+                    wanted + uint64_t(i) * uint64_t(width) * pixel);
+      begin = end;
+    }
   });
 }
 

@@ -3,7 +3,7 @@
 use crate::types::{OIIO_SHIM_ABI, OiioAttribute, OiioInput, OiioLevel, OiioOutput, OiioPart, OiioSpec};
 use libloading::Library;
 use std::env;
-use std::ffi::c_char;
+use std::ffi::{c_char, c_void};
 use std::io::{self, Write};
 use std::path::Path;
 use std::sync::OnceLock;
@@ -83,15 +83,10 @@ api! {
         input: *mut OiioInput, subimage: i32, index: i32, attribute: *mut OiioAttribute,
         error: *mut c_char, error_size: usize,
     ) -> i32;
-    /// Number of floats needed by `input_read`. Fails if they take more than `max_bytes`, or if the subimage is deep, a
+    /// Number of values of a subimage. Fails if they take more than `max_bytes` as floats, or if the subimage is deep, a
     /// volume, or empty.
-    fn input_float_count(
+    fn input_value_count(
         input: *mut OiioInput, subimage: i32, max_bytes: u64, count: *mut u64,
-        error: *mut c_char, error_size: usize,
-    ) -> i32;
-    /// Reads all channels, interleaved, top row first. `count` is the result of `input_float_count`.
-    fn input_read(
-        input: *mut OiioInput, subimage: i32, pixels: *mut f32, count: u64,
         error: *mut c_char, error_size: usize,
     ) -> i32;
     /// A level of the pyramid of a subimage; level 0 is the image itself.
@@ -100,10 +95,11 @@ api! {
         error: *mut c_char, error_size: usize,
     ) -> i32;
     /// Reads `width` × `height` pixels of a level from column `x` and row `y` on: the channels
-    /// `channel_begin..channel_end`, interleaved, top row first. `count` is the total number of floats.
+    /// `channel_begin..channel_end`, interleaved, top row first. `count` is the total number of values, whose type is
+    /// `format`: `OIIO_FORMAT_U8` or `OIIO_FORMAT_FLOAT`.
     fn input_read_region(
         input: *mut OiioInput, subimage: i32, level: i32, x: i32, y: i32, width: i32, height: i32,
-        channel_begin: i32, channel_end: i32, pixels: *mut f32, count: u64,
+        channel_begin: i32, channel_end: i32, format: i32, values: *mut c_void, count: u64,
         error: *mut c_char, error_size: usize,
     ) -> i32;
     /// Closes and frees; null is allowed.

@@ -4,7 +4,7 @@ use std::ffi::{c_char, c_void};
 use std::mem::size_of;
 
 /// Version of the interface. The shim reports its own by `Api::abi`.
-pub const OIIO_SHIM_ABI: i32 = 3;
+pub const OIIO_SHIM_ABI: i32 = 4;
 
 /// Success.
 pub const OIIO_OK: i32 = 0;

@@ -5,7 +5,7 @@ use super::progress;
 use anyhow::{Context, bail};
 use lumiris::film::PixelBounds;
 use lumiris::imaging::ColorChannels;
-use lumiris::imaging::oiio::{Part, ReadColors, ReadLimits, read_colors, write_image};
+use lumiris::imaging::oiio::{ImageFile, Part, write_image};
 use lumiris::import::fingerprint::SceneFiles;
 use lumiris::render::RenderSettings;
 use lumiris::render::output::metadata;
@@ -81,23 +81,23 @@ impl<'a> References<'a> {
 
 /// Reads a reference; fails if its size differs from `bounds`.
 fn read(path: &Path, bounds: &PixelBounds) -> anyhow::Result<Colors> {
-    let ReadColors { read, layer } = read_colors(path, &ReadLimits::default())?;
-    let image = read.image;
+    let file = ImageFile::open(path)?;
     let asked = [bounds.width() as usize, bounds.height() as usize];
-    if [image.width, image.height] != asked {
-        let [width, height] = asked;
+    let found = file.sizes()[0];
+    if found != asked {
         bail!(
-            "{} is no reference: it has {} × {} pixels, but the image has {width} × {height}",
+            "{} is no reference: it has {} × {} pixels, but the image has {} × {}",
             path.display(),
-            image.width,
-            image.height
+            found[0],
+            found[1],
+            asked[0],
+            asked[1]
         );
     }
-    let ColorChannels::Rgb(rgb) = layer.channels else {
+    let ColorChannels::Rgb(rgb) = file.layer().channels else {
         bail!("{} is no reference: it has no channels R, G and B", path.display());
     };
-    let pixels = image.data.chunks_exact(image.channels.len());
-    Ok(pixels.map(|pixel| rgb.map(|c| f64::from(pixel[c]))).collect())
+    Ok(file.floats(&rgb)?.as_chunks().0.iter().map(|pixel| pixel.map(f64::from)).collect())
 }
 
 fn write(path: &Path, job: &RenderJob, settings: &Settings, colors: &Colors) -> anyhow::Result<()> {

@@ -110,11 +110,15 @@ impl Input {
     pub fn read(&self, subimage: i32, max_bytes: u64) -> Result<Vec<f32>, (i32, String)> {
         let mut count = 0;
         // SAFETY: as above.
-        check(|e, n| unsafe { (api().input_float_count)(self.0, subimage, max_bytes, &mut count, e, n) })?;
-        let mut pixels = vec![0.0; count as usize];
-        // SAFETY: `pixels` holds `count` floats.
-        check(|e, n| unsafe { (api().input_read)(self.0, subimage, pixels.as_mut_ptr(), count, e, n) })?;
-        Ok(pixels)
+        check(|e, n| unsafe { (api().input_value_count)(self.0, subimage, max_bytes, &mut count, e, n) })?;
+        let OiioSpec { width, height, nchannels, .. } = self.spec(subimage)?;
+        let mut values = vec![0.0_f32; count as usize];
+        let (read, out) = (api().input_read_region, values.as_mut_ptr().cast());
+        // SAFETY: `values` holds `count` floats.
+        check(|e, n| unsafe {
+            read(self.0, subimage, 0, 0, 0, width, height, 0, nchannels, OIIO_FORMAT_FLOAT, out, count, e, n)
+        })?;
+        Ok(values)
     }
 }
 
