@@ -11,13 +11,15 @@
 //! tiles of its files.
 
 use super::face_maps::{FaceMapRequest, load_face_map};
-use super::images::{ImageChannels, ImageEncoding, ImageRequest, RgbImage, load_map, load_rgb, load_tiled_map};
+use super::images::{
+    ImageChannels, ImageEncoding, ImageRequest, RgbImage, load_map, load_rgb, load_tiled_map, map_size,
+};
 use super::measured::{MeasuredError, load_tables};
-use super::memory::{MemoryAccount, MemoryLimit};
+use super::memory::{FileSize, MemoryAccount, MemoryLimit};
 use super::texture_cache::TextureCache;
 use super::volumes::{Volume, VolumeRequest, VolumeUse, load_volume};
 use crate::bsdfs::MeasuredTables;
-use crate::imaging::oiio::{ImageError, texture_bytes};
+use crate::imaging::oiio::ImageError;
 use crate::imaging::tiles::TileStore;
 use crate::imaging::{ColorEncoding, FaceMap, Filter, MipMap, Wrap};
 use lumiris_formats::nanovdb::NanoError;
@@ -27,7 +29,7 @@ use rayon::prelude::*;
 use std::collections::HashMap;
 use std::io;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use std::time::SystemTime;
 
@@ -85,6 +87,11 @@ impl<H: PartialEq, T> Shelf<H, T> {
         entries.push(Entry { stamp, how, content: Arc::clone(content), is_used: true });
     }
 
+    fn has(&self, path: &Path, stamp: Stamp) -> bool {
+        let shelf = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        shelf.get(path).is_some_and(|entries| entries.iter().any(|entry| entry.stamp == stamp))
+    }
+
     /// Drops content that was not used since the last call.
     fn drop_unused(&self) {
         let mut shelf = self.0.lock().unwrap_or_else(PoisonError::into_inner);
@@ -121,8 +128,6 @@ pub struct FileCache {
     texture_memory: OnceLock<u64>,
     /// Limit of the process.
     memory: OnceLock<MemoryLimit>,
-    /// True after the first scene.
-    has_ended: AtomicBool,
     /// Folder of textures for later runs.
     texture_cache: OnceLock<Arc<TextureCache>>,
     /// Held while a texture is read into tiles: one at a time, since the whole texture is in memory meanwhile.
@@ -180,17 +185,34 @@ impl FileCache {
         self.texture_memory.get_or_init(|| bytes);
     }
 
-    /// Refuses the first scene if it exceeds the limit, and stores textures in tiles where it fits only so, unless
-    /// their memory is limited already. Later scenes have the same limit of textures. The first call is effective,
-    /// later ones are ignored.
+    /// Refuses scenes that exceed the limit, and stores textures in tiles where a scene fits only so, unless their memory
+    /// is limited already. Later scenes have the same limit of textures. The first call is effective, later ones are
+    /// ignored.
     pub fn limit_memory(&self, limit: MemoryLimit) {
         self.memory.get_or_init(|| limit);
     }
 
-    /// The limit of the process for the next scene, if there is one.
+    /// The limit of the process, if there is one.
     pub fn memory_limit(&self) -> Option<&MemoryLimit> {
-        // Content of a scene before would count twice
-        self.memory.get().filter(|_| !self.has_ended.load(Ordering::Relaxed))
+        self.memory.get()
+    }
+
+    /// True if content of this file in its current state is in memory.
+    pub fn holds(&self, path: &Path) -> bool {
+        let is_held = |stamp| {
+            self.meshes.has(path, stamp)
+                || self.maps.has(path, stamp)
+                || self.images.has(path, stamp)
+                || self.face_maps.has(path, stamp)
+                || self.volumes.has(path, stamp)
+                || self.measured.has(path, stamp)
+        };
+        self.keeps && Stamp::of(path).is_some_and(is_held)
+    }
+
+    /// The memory that a file will take, which is `size`, unless its content is in memory.
+    pub fn missing(&self, path: &Path, size: impl FnOnce() -> FileSize) -> FileSize {
+        if self.holds(path) { FileSize::default() } else { size() }
     }
 
     /// An error message if the scene exceeds the limit of the process.
@@ -226,9 +248,10 @@ impl FileCache {
             return Ok(TexturePlan::default());
         }
 
-        // Coarser levels add a third. An unreadable image counts as 0; reading it reports the error
-        let size = |request: &&ImageRequest| texture_bytes(&request.path).map_or(0, |b| b.saturating_add(b / 3));
-        let sizes: Vec<u64> = requests.par_iter().map(size).collect();
+        let size = |request: &&ImageRequest| self.missing(&request.path, || map_size(request));
+        let sizes: Vec<FileSize> = requests.par_iter().map(size).collect();
+        sizes.iter().for_each(|size| account.add_file("", FileSize { kept: 0, ..*size }));
+        let sizes: Vec<u64> = sizes.iter().map(|size| size.kept).collect();
         let room = || texture_room(&sizes, account.left(memory?));
         let limit = given.or_else(|| room().map(|room| *self.texture_memory.get_or_init(|| room))).unwrap_or(u64::MAX);
         let is_tiled = in_tiles(&sizes, limit);
@@ -306,7 +329,6 @@ impl FileCache {
 
     /// Ends a scene: drops content that it did not use, and returns the numbers of files that it read and shared.
     pub fn end_scene(&self) -> FileCounts {
-        self.has_ended.store(true, Ordering::Relaxed);
         self.meshes.drop_unused();
         self.maps.drop_unused();
         self.images.drop_unused();

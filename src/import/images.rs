@@ -4,6 +4,7 @@ use crate::imaging::color_layers::ColorLayer;
 use crate::imaging::oiio::{ImageError, ImageFile, Values};
 use crate::imaging::tiles::TileStore;
 use crate::imaging::{ColorChannels, ColorEncoding, Filter, Lookup, MipMap, Wrap};
+use crate::import::memory::FileSize;
 use crate::textures::Udim;
 use lumiris_formats::color_space::{Chromaticities, Colored, is_rec709, rec709_from};
 use lumiris_formats::names::nfc;
@@ -145,6 +146,34 @@ pub(super) fn into_tiles(map: MipMap, request: &ImageRequest, store: &Arc<TileSt
         let reason = format!("does not fit into the temporary file for tiles of textures: {error}");
         ImageError::Unreadable { path: request.path.clone(), reason }
     })
+}
+
+/// Bytes of the pyramid of an image; none if it is unreadable, which reading it reports.
+pub fn map_size(request: &ImageRequest) -> FileSize {
+    let Ok(file) = ImageFile::open(&request.path) else { return FileSize::default() };
+    let (colors, alpha) = (file.layer().channels.as_slice().len(), file.layer().alpha.as_slice().len());
+    let bytes = |channels: usize| file.pixels().saturating_mul(channels as u64 * if file.is_bytes() { 1 } else { 4 });
+    // Coarser levels add a third. A texture of numbers has colours and opacity while it is read
+    let [kept, read] = match request.channels {
+        ImageChannels::Color => [colors, 0],
+        ImageChannels::Alpha => [alpha, 0],
+        ImageChannels::Number => [colors, alpha * (colors + alpha)],
+    };
+    let kept = bytes(kept);
+    FileSize { kept: kept.saturating_add(kept / 3), loading: bytes(read).saturating_add(file.decoding_bytes()) }
+}
+
+/// Bytes of an image that lights the scene: its radiance and its distribution; and its values as read.
+pub fn light_image_size(path: &Path) -> FileSize {
+    const TEXEL: u64 = 16;
+    const READ: u64 = 12;
+    ImageFile::open(path).map_or_else(
+        |_| FileSize::default(),
+        |file| FileSize {
+            kept: file.pixels().saturating_mul(TEXEL),
+            loading: file.pixels().saturating_mul(READ).saturating_add(file.decoding_bytes()),
+        },
+    )
 }
 
 /// The pyramids of all that textures may ask for, with default lookups: of the colours, and of the opacity if there is

@@ -1,5 +1,6 @@
 //! Files of measured materials.
 
+use super::memory::FileSize;
 use crate::bsdfs::MeasuredTables;
 use lumiris_formats::bsdf_file::{BsdfFileError, read_bsdf};
 use std::path::Path;
@@ -19,4 +20,10 @@ pub enum MeasuredError {
 pub fn load_tables(path: &Path) -> Result<MeasuredTables, MeasuredError> {
     MeasuredTables::new(read_bsdf(path)?)
         .map_err(|reason| MeasuredError::Tables(format!("{}: {reason}", path.display())))
+}
+
+/// Bytes of a file: tables with distributions; and the file with its numbers. Estimated from its size.
+pub fn tables_size(path: &Path) -> FileSize {
+    let bytes = path.metadata().map_or(0, |metadata| metadata.len()).saturating_mul(2);
+    FileSize { kept: bytes, loading: bytes }
 }

@@ -1,10 +1,9 @@
 //! The memory that a scene takes, predicted from sizes in headers before its files are read. Bytes per item were
 //! measured ([docs/measurements/scale](../../../docs/measurements/scale/README.md)).
 
-use crate::imaging::oiio::{image_texels, library_bytes};
+use crate::imaging::oiio::library_bytes;
 use std::fmt::Write as _;
 use std::fs;
-use std::path::Path;
 
 /// Bytes of a primitive in Embree, and in addition while its acceleration structure is built.
 const EMBREE: u64 = 57;
@@ -13,9 +12,16 @@ const BUILD: u64 = 62;
 const LIGHT: u64 = 430;
 /// Bytes of an instance.
 const INSTANCE: u64 = 400;
-/// Bytes of a pixel of the image, and of a thread that renders it.
-const PIXEL: u64 = 64;
-const THREAD: u64 = 8 << 20;
+/// Bytes per pixel with one sample: radiance, squared radiance, counts.
+pub const IMAGE: f64 = 38.0;
+/// Bytes per pixel of albedo, normal, depth and indices.
+pub const FEATURES: f64 = 17.0;
+/// Bytes per pixel of replicas: exact sums and counts, averaged over all pixels.
+pub const REPLICAS: f64 = 4.0;
+/// Bytes per pixel of a tile besides its sums.
+pub const TILE: f64 = 2.0;
+/// Bytes of a thread with its batches.
+pub const THREAD: u64 = 8 << 20;
 /// Number of parts that a refusal lists.
 const LISTED: usize = 10;
 
@@ -28,10 +34,23 @@ pub struct MemoryLimit {
     pub origin: String,
 }
 
+/// Bytes of the content of a file.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct FileSize {
+    /// In memory.
+    pub kept: u64,
+    /// In addition while the file is read.
+    pub loading: u64,
+}
+
 /// The memory that a process takes and that parts of a scene will take.
 #[derive(Clone, Debug, Default)]
 pub struct MemoryAccount {
     parts: Vec<Part>,
+    /// Bytes of each file in addition while it is read.
+    loading: Vec<u64>,
+    /// Bytes of building the largest acceleration structure.
+    build: u64,
     /// Bytes that were taken at the beginning, and bytes of libraries that were not loaded yet.
     taken: [u64; 2],
     /// Bytes that the image will take, up to settings that are not known yet.
@@ -71,6 +90,12 @@ impl MemoryAccount {
         }
     }
 
+    /// Adds the content of a file.
+    pub fn add_file(&mut self, name: impl Into<String>, FileSize { kept, loading }: FileSize) {
+        self.add(name, kept);
+        self.loading.push(loading);
+    }
+
     /// Adds shapes and instances, with their acceleration structures and lights.
     pub fn add_geometry(&mut self, shapes: impl Iterator<Item = ShapeSize>, groups: usize, instances: usize) {
         let mut per_group = vec![0_u64; groups + 1];
@@ -87,25 +112,42 @@ impl MemoryAccount {
         }
         let largest = per_group.into_iter().max().unwrap_or(0);
         self.add("shapes in scene files", unnamed);
-        self.add("building the largest acceleration structure", largest.saturating_mul(BUILD));
+        self.build = largest.saturating_mul(BUILD);
         self.add(format!("{emitting} emitting primitives and the light tree"), emitting.saturating_mul(LIGHT));
         self.add(format!("{instances} instances"), instances as u64 * INSTANCE);
     }
 
     /// Leaves room for an image.
     pub fn reserve_image(&mut self, pixels: usize) {
-        let threads = std::thread::available_parallelism().map_or(1, usize::from);
-        self.image = pixels as u64 * PIXEL + threads as u64 * THREAD;
+        let bytes = pixels as f64 * (IMAGE + FEATURES + REPLICAS + TILE);
+        self.image = bytes as u64 + rayon::current_num_threads() as u64 * THREAD;
     }
 
-    /// Total without the image.
-    pub fn bytes(&self) -> u64 {
+    /// The largest need that ends before the image is rendered: files being read, one per thread, or Embree's build.
+    fn temporary(&self) -> Part {
+        let mut loading = self.loading.clone();
+        loading.sort_unstable_by_key(|&bytes| std::cmp::Reverse(bytes));
+        let at_once = loading.iter().take(rayon::current_num_threads()).fold(0, |sum: u64, &n| sum.saturating_add(n));
+        if at_once > self.build {
+            Part { name: "files while they are read".to_owned(), bytes: at_once }
+        } else {
+            Part { name: "building the largest acceleration structure".to_owned(), bytes: self.build }
+        }
+    }
+
+    /// Bytes that remain in memory, without the image.
+    fn kept(&self) -> u64 {
         self.parts.iter().fold(self.taken.iter().sum(), |sum, part| sum.saturating_add(part.bytes))
+    }
+
+    /// Maximum bytes while the scene is loaded.
+    pub fn bytes(&self) -> u64 {
+        self.kept().saturating_add(self.temporary().bytes)
     }
 
     /// Bytes that are left of a limit, beside the image.
     pub fn left(&self, limit: &MemoryLimit) -> u64 {
-        limit.bytes.saturating_sub(self.image).saturating_sub(self.bytes())
+        limit.bytes.saturating_sub(self.kept()).saturating_sub(self.image.max(self.temporary().bytes))
     }
 
     /// An error message with the largest parts if the scene exceeds the limit.
@@ -119,6 +161,7 @@ impl MemoryAccount {
         let mut parts = self.parts.clone();
         let taken = ["in memory already", "image libraries"].into_iter().zip(self.taken);
         parts.extend(taken.map(|(name, bytes)| Part { name: name.to_owned(), bytes }));
+        parts.push(self.temporary());
         parts.sort_by_key(|part| std::cmp::Reverse(part.bytes));
 
         // The message
@@ -133,13 +176,6 @@ impl MemoryAccount {
         }
         Some(text)
     }
-}
-
-/// Bytes of an image that lights the scene: its radiance, read and as stored, and its distribution. An unreadable image
-/// counts as 0; reading it reports the error.
-pub fn light_image_bytes(path: &Path) -> u64 {
-    const TEXEL: u64 = 28;
-    image_texels(path).map_or(0, |texels| texels.saturating_mul(TEXEL))
 }
 
 /// Formats bytes as MiB or GiB.
@@ -187,5 +223,15 @@ mod tests {
         assert!(lines[1..].iter().zip(expected).all(|(line, part)| line.contains(part)), "{text}");
         assert_eq!(account.refusal(&limit(u64::MAX)), None);
         assert_eq!(account.left(&limit(1 << 40)), 0);
+    }
+
+    #[test]
+    fn files_that_are_read_at_once_count_in_the_limit() {
+        let mut account = MemoryAccount::default();
+        (0..1000).for_each(|_| account.add_file("image", FileSize { kept: 1 << 20, loading: 1 << 30 }));
+        let threads = rayon::current_num_threads() as u64;
+        assert_eq!(account.bytes(), (1000 << 20) + threads * (1 << 30));
+        let limit = MemoryLimit { bytes: 1 << 20, origin: String::new() };
+        assert!(account.refusal(&limit).is_some_and(|text| text.contains("files while they are read")));
     }
 }

@@ -1,7 +1,8 @@
 //! Grids of NanoVDB files as sparse trees.
 
+use super::memory::FileSize;
 use crate::media::{Cube, SparseGrid};
-use lumiris_formats::nanovdb::{GridClass, NanoError, read_nanovdb};
+use lumiris_formats::nanovdb::{GridClass, NanoError, NanoSize, nanovdb_size, read_nanovdb};
 use lumiris_numbers::math::{DAffine3, DVec3};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -39,6 +40,16 @@ pub struct Volume {
     pub bounds: Option<[[f64; 3]; 2]>,
     /// Number of invalid values that were replaced by 0.
     pub replaced: usize,
+}
+
+/// Bytes of a grid: as a tree, and as stored; none if it is unreadable, which reading it reports.
+pub fn volume_size(request: &VolumeRequest) -> FileSize {
+    let Ok(NanoSize { bytes, leaves, nodes }) = nanovdb_size(&request.path, &request.grid) else {
+        return FileSize::default();
+    };
+    // Values and maximum of a leaf; entries of nodes; first voxels of leaves while it is read
+    let kept = leaves * (512 * 4 + 4) + nodes[0] * (16 << 10) + nodes[1] * (128 << 10);
+    FileSize { kept, loading: bytes + leaves * 12 }
 }
 
 /// Reads a grid.

@@ -11,23 +11,19 @@ use super::tiles::replica_choice;
 use crate::direct::Estimator;
 use crate::film::BAND;
 use crate::imaging::oiio::{ROWS_AT_ONCE, library_bytes};
+use crate::import::memory::{FEATURES, IMAGE, REPLICAS, THREAD, TILE};
 use crate::planning::preparation::thread_pool;
 use crate::scene::RenderJob;
 use lumiris_numbers::estimators::ocv::pixels::MARGIN;
 
-/// Bytes per pixel with one sample: radiance, squared radiance, counts.
-const IMAGE: f64 = 38.0;
-/// Bytes per pixel of albedo, normal, depth and indices.
-const FEATURES: f64 = 17.0;
 /// Binary digits per pixel that doubling the samples adds to the image and to the features.
 const DIGITS: [f64; 2] = [9.0, 9.0];
-/// Bytes of a pixel of a light-group layer with light in one sample, and binary digits that doubling the samples adds.
+/// Bytes of a pixel of a light-group layer with light in one sample, and bytes that doubling these samples adds; bytes
+/// of a pixel without light; and the number of path vertices that are assumed to find light at most.
 const LIGHT: f64 = 15.0;
-const LIGHT_DIGITS: f64 = 3.0;
-/// Bytes per pixel of replicas: exact sums and counts, averaged over all pixels.
-const REPLICAS: f64 = 4.0;
-/// Bytes per pixel of a tile besides its sums.
-const TILE: f64 = 2.0;
+const LIGHT_DOUBLED: f64 = 5.0;
+const DARK: f64 = 0.125;
+const VERTICES: u32 = 5;
 /// Bytes per pixel of a Cryptomatte, for two ids per pixel.
 const IDS: f64 = 18.0;
 /// Bytes per pixel of denoising: colour, albedo, normal, output, and the buffers of the library.
@@ -44,8 +40,8 @@ const FITTED: [usize; 2] = [240, 13];
 const READ: usize = 144 + 24;
 const CHANNELS: usize = 16 * 4;
 const CHANNELS_OF_LAYER: usize = 3 * 4;
-/// Bytes of a thread with its batches.
-const THREAD: u64 = 8 << 20;
+/// Rows of each thread that compresses an EXR file: two blocks of 16, before and after.
+const COMPRESSED_ROWS: usize = 64;
 
 /// The outputs of a job that affect its memory.
 #[derive(Clone, Copy, Debug)]
@@ -89,7 +85,7 @@ pub fn predict(job: &RenderJob, wanted: &Wanted<'_>) -> Prediction {
     let whole = if wanted.is_denoised { DENOISED } else { 0.0 } + wanted.cryptomattes.len() as f64 * IDS;
     let width = bounds.width() as usize;
     let channels = CHANNELS + render.light_layers(job).len() * CHANNELS_OF_LAYER;
-    let band = (BAND as usize + 2) * READ * threads + 2 * ROWS_AT_ONCE * channels;
+    let band = (BAND as usize + 2) * READ * threads + (2 * ROWS_AT_ONCE + COMPRESSED_ROWS * threads) * channels;
     Prediction {
         film: (pixels * (share * of_sums(job, render) + whole)) as u64,
         output: (width * (band + of_corrected_rows(job))) as u64,
@@ -106,6 +102,18 @@ fn of_corrected_rows(job: &RenderJob) -> usize {
     (ROWS as usize + 2 * MARGIN) * (FITTED[0] + FITTED[1] * job.controls())
 }
 
+/// Bytes per pixel of the layers of light groups: a sample finds as many groups as its path takes light samples.
+fn of_light_layers(job: &RenderJob, render: &RenderSettings) -> f64 {
+    let layers = render.light_layers(job).len() as f64;
+    let integrator = &job.settings().integrator;
+    let found = integrator.sample_counts_at(0).samples * integrator.max_depth.clamp(1, VERTICES);
+    let chance = (f64::from(found) / layers.max(1.0)).min(1.0);
+    let spp = f64::from(render.spp.max(1));
+    let lit = 1.0 - (1.0 - chance).powf(spp);
+    let doublings = (chance * spp / lit).log2();
+    layers * (DARK + lit * (LIGHT + LIGHT_DOUBLED * doublings))
+}
+
 /// Bytes per pixel of the sums.
 fn of_sums(job: &RenderJob, render: &RenderSettings) -> f64 {
     let doublings = f64::from(render.spp.max(1)).log2();
@@ -120,8 +128,7 @@ fn of_sums(job: &RenderJob, render: &RenderSettings) -> f64 {
         bytes += REPLICAS;
     }
 
-    // Layers of light groups, as if each group lit all pixels
-    bytes += render.light_layers(job).len() as f64 * grown(LIGHT, LIGHT_DIGITS);
+    bytes += of_light_layers(job, render);
 
     // Control variates
     let estimator = Estimator::at_vertex(&job.settings().integrator, 0);

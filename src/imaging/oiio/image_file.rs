@@ -12,6 +12,11 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 /// Maximum pixels of a tile: headers of damaged files can claim more, and OpenImageIO would allocate them.
 const MAX_TILE: u64 = 1 << 22;
 
+/// Formats whose files are decoded row by row; others are decoded as a whole.
+const BY_ROWS: [&str; 7] = ["bmp", "hdr", "jpeg", "openexr", "png", "pnm", "tiff"];
+/// Rows that are decoded together.
+const ROWS: usize = 256;
+
 /// Values of channels, interleaved, top row first.
 #[derive(Clone, Debug)]
 pub enum Values {
@@ -68,6 +73,7 @@ pub struct ImageFile {
     encoding: ColorEncoding,
     is_bytes: bool,
     chromaticities: Option<String>,
+    decoding: u64,
 }
 
 impl std::fmt::Debug for ImageFile {
@@ -82,14 +88,17 @@ impl ImageFile {
         let mut input = Input::open(path, 0)?;
         let layer = input.choose_colors(path)?;
         let spec = input.spec().map_err(|failure| read_failure(path, failure))?;
-        let size = [spec.width, spec.height].map(|n| usize::try_from(n).unwrap_or(0));
+        let [width, height, channels] =
+            [spec.width, spec.height, spec.nchannels].map(|n| usize::try_from(n).unwrap_or(0));
+        let rows = if BY_ROWS.contains(&input.format_name().as_str()) { height.min(ROWS) } else { height };
         Ok(ImageFile {
             path: path.to_owned(),
-            sizes: all_levels(&input).unwrap_or_else(|| vec![size]),
+            sizes: all_levels(&input).unwrap_or_else(|| vec![[width, height]]),
             layer,
             encoding: usual_encoding(&spec),
             is_bytes: spec.format == sys::OIIO_FORMAT_U8,
             chromaticities: input.metadata(spec.attributes).remove("chromaticities"),
+            decoding: [width, rows, channels, bytes_of(spec.format)].iter().fold(1, |n, &m| n.saturating_mul(m as u64)),
             input: Mutex::new(input),
         })
     }
@@ -127,6 +136,16 @@ impl ImageFile {
     /// True if values are read as bytes.
     pub fn is_bytes(&self) -> bool {
         self.is_bytes
+    }
+
+    /// Number of pixels of the image.
+    pub fn pixels(&self) -> u64 {
+        self.sizes[0].iter().fold(1, |n, &m| n.saturating_mul(m as u64))
+    }
+
+    /// Bytes that decoding takes beside the values.
+    pub fn decoding_bytes(&self) -> u64 {
+        self.decoding
     }
 
     fn input(&self) -> MutexGuard<'_, Input> {
@@ -172,6 +191,15 @@ impl ImageFile {
         let ([origin, size], read) = (region.map(|pair| pair.map(int)), around(channels));
         let values = self.input().region(int(level), origin, size, [read.start, read.end].map(int));
         Ok(of_channels(values.map_err(|failure| read_failure(&self.path, failure))?, channels, read))
+    }
+}
+
+/// Bytes of a value in a file, at most 4.
+fn bytes_of(format: i32) -> usize {
+    match format {
+        sys::OIIO_FORMAT_U8 | sys::OIIO_FORMAT_I8 => 1,
+        sys::OIIO_FORMAT_U16 | sys::OIIO_FORMAT_I16 | sys::OIIO_FORMAT_HALF => 2,
+        _ => 4,
     }
 }
 

@@ -23,6 +23,6 @@ pub use image_file::{ImageFile, Values};
 pub use ocio::{OcioView, ocio_display};
 pub use part::{MetaValue, Part, Storage};
 pub(super) use read::{Input, read_failure};
-pub use read::{ReadImage, image_texels, read_headers, read_image, read_metadata, read_part, texture_bytes};
+pub use read::{ReadImage, read_headers, read_image, read_metadata, read_part};
 pub use shim::{library_bytes, load};
 pub use write::{ROWS_AT_ONCE, RowSource, write_image, write_rows};

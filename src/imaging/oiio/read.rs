@@ -136,6 +136,12 @@ impl Input {
         Ok(spec)
     }
 
+    /// The name of the file format: `openexr`, `png`, …
+    pub(super) fn format_name(&self) -> String {
+        // SAFETY: the handle is live, and the name is copied.
+        text(unsafe { (self.api.input_format_name)(self.handle) })
+    }
+
     fn channel(&self, index: i32) -> Result<Channel, Failure> {
         let (mut name, mut format) = (ptr::null(), 0);
         // SAFETY: as above; the name is copied while the handle is live.
@@ -289,28 +295,6 @@ pub fn read_metadata(path: &Path) -> Result<BTreeMap<String, String>, ImageError
 /// Reads the headers of all parts of an image, without pixels.
 pub fn read_headers(path: &Path) -> Result<Vec<PartHeader>, ImageError> {
     Input::open(path, 0)?.headers().map_err(|failure| read_failure(path, failure))
-}
-
-/// Memory of the colours of an image as a texture (bytes), without coarser levels: one byte per 8-bit value, four for
-/// others. Reads no pixels.
-pub fn texture_bytes(path: &Path) -> Result<u64, ImageError> {
-    let (texels, bytes) = texels_and_bytes(path)?;
-    Ok(texels.saturating_mul(bytes))
-}
-
-/// Number of texels of an image. Reads no pixels.
-pub fn image_texels(path: &Path) -> Result<u64, ImageError> {
-    Ok(texels_and_bytes(path)?.0)
-}
-
-/// Number of texels of an image, and bytes of each as a texture.
-fn texels_and_bytes(path: &Path) -> Result<(u64, u64), ImageError> {
-    let mut input = Input::open(path, 0)?;
-    let layer = input.choose_colors(path)?;
-    let spec = input.spec().map_err(|failure| read_failure(path, failure))?;
-    let [width, height] = [spec.width, spec.height].map(|n| u64::try_from(n).unwrap_or(0));
-    let bytes = if spec.format == sys::OIIO_FORMAT_U8 { 1 } else { 4 };
-    Ok((width.saturating_mul(height), layer.channels.as_slice().len() as u64 * bytes))
 }
 
 /// The error of a failed read.

@@ -7,7 +7,7 @@ use crate::imaging::oiio::ImageError;
 use crate::import::cache::FileCache;
 use crate::import::face_maps::FaceMapRequest;
 use crate::import::images::RgbImage;
-use crate::import::memory::{MemoryAccount, light_image_bytes};
+use crate::import::memory::MemoryAccount;
 use crate::import::resources::{Request, Resources};
 use crate::lights::EmissionImage;
 use lumiris_formats::diagnostic::Diagnostics;
@@ -62,11 +62,7 @@ impl<'a> ImageFiles<'a> {
     }
 
     /// Reads them; `None` if the scene does not fit into memory together with what `account` has.
-    pub(super) fn read(&self, files: &FileCache, mut account: MemoryAccount, d: &mut Diagnostics) -> Option<Images> {
-        if files.memory_limit().is_some() {
-            let images = self.environments.iter().chain(&self.emission);
-            images.for_each(|path| account.add(path.display().to_string(), light_image_bytes(path)));
-        }
+    pub(super) fn read(&self, files: &FileCache, account: MemoryAccount, d: &mut Diagnostics) -> Option<Images> {
         let textures = self.textures.load(files, account, d)?;
         let emission = self.emission.par_iter().map(|path| EmissionFile::read(path, files)).collect();
         let face_maps = ptex::load(self.face_maps, files);

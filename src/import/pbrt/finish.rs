@@ -108,7 +108,7 @@ impl Builder<'_> {
         files: &'a FileCache,
         d: &mut Diagnostics,
     ) -> Option<Contents<'a>> {
-        let mut account = self.geometry_account(shapes, files);
+        let mut account = self.account(shapes, files);
         account.reserve_image(pixels);
         if let Some(refusal) = files.refusal(&account) {
             d.error_without_place(refusal).help(MEMORY_HELP);

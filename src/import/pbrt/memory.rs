@@ -1,31 +1,57 @@
-//! The memory that the geometry of a scene takes, before its PLY files are read.
+//! The memory that a scene takes beside textures, before its files are read.
 
 use super::descriptions::{ShapeDesc, ShapeSource};
 use super::state::Builder;
 use crate::import::cache::FileCache;
-use crate::import::memory::{MemoryAccount, ShapeSize};
+use crate::import::face_maps::face_map_size;
+use crate::import::images::light_image_size;
+use crate::import::measured::tables_size;
+use crate::import::memory::{FileSize, MemoryAccount, ShapeSize};
+use crate::import::volumes::volume_size;
 use lumiris_formats::ply::ply_size;
 use rayon::prelude::*;
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
 
 impl Builder<'_> {
-    /// Shapes, instances and lights; empty without a limit of memory.
-    pub(super) fn geometry_account(&self, shapes: &[ShapeDesc], files: &FileCache) -> MemoryAccount {
+    /// Everything but textures; empty without a limit of memory.
+    pub(super) fn account(&self, shapes: &[ShapeDesc], files: &FileCache) -> MemoryAccount {
         let mut account = MemoryAccount::now();
-        if files.memory_limit().is_some() {
-            let sizes: Vec<ShapeSize> = shapes.par_iter().map(size_of).collect();
-            let nested: usize = self.objects.iter().map(|object| object.instances.len()).sum();
-            account.add_geometry(sizes.into_iter(), self.objects.len(), self.instances.len() + nested);
+        if files.memory_limit().is_none() {
+            return account;
         }
+
+        // Shapes, instances and lights
+        let sizes: Vec<ShapeSize> = shapes.par_iter().map(|shape| size_of(shape, files)).collect();
+        let nested: usize = self.objects.iter().map(|object| object.instances.len()).sum();
+        account.add_geometry(sizes.into_iter(), self.objects.len(), self.instances.len() + nested);
+
+        // Other files
+        let mut add = |path: &Path, size: &dyn Fn() -> FileSize| {
+            account.add_file(path.display().to_string(), files.missing(path, size));
+        };
+        let lights: BTreeSet<&PathBuf> =
+            self.environments.iter().map(|e| &e.path).chain(&self.emission_images).collect();
+        lights.into_iter().for_each(|path| add(path, &|| light_image_size(path)));
+        for request in self.face_maps.list() {
+            add(&request.file.path, &|| face_map_size(&request.file.path));
+        }
+        for request in self.measured_files.list() {
+            add(&request.file, &|| tables_size(&request.file));
+        }
+        self.volume_requests().iter().for_each(|request| add(&request.path, &|| volume_size(request)));
         account
     }
 }
 
 /// The size of a shape. An unreadable file counts as 0; reading it reports the error.
-fn size_of(shape: &ShapeDesc) -> ShapeSize {
+fn size_of(shape: &ShapeDesc, files: &FileCache) -> ShapeSize {
     let (name, bytes, primitives) = match &shape.source {
         ShapeSource::Ply(path) => {
             let size = ply_size(path).unwrap_or_default();
-            (Some(path.display().to_string()), size.bytes, size.triangles)
+            // Cached content is copied
+            let copies = 1 + u64::from(files.keeps() && !files.holds(path));
+            (Some(path.display().to_string()), size.bytes.saturating_mul(copies), size.triangles)
         }
         // Their arrays are in memory
         ShapeSource::Mesh(mesh) => (None, 0, mesh.indices.len() as u64),

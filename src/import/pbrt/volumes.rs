@@ -68,16 +68,22 @@ impl Builder<'_> {
         })
     }
 
-    /// Reads the files of all media.
-    pub(super) fn load_volumes(&mut self, files: &FileCache, d: &mut Diagnostics) {
+    /// The grids of all media.
+    pub(super) fn volume_requests(&self) -> HashSet<VolumeRequest> {
         let mut requests = HashSet::new();
         for desc in self.media.iter().filter_map(|m| m.volume.as_ref()) {
             requests.insert(request(&desc.path, &desc.density, VolumeUse::Density));
             let temperature = desc.temperature.as_ref();
             requests.extend(temperature.map(|grid| request(&desc.path, grid, VolumeUse::Temperature)));
         }
+        requests
+    }
+
+    /// Reads the files of all media.
+    pub(super) fn load_volumes(&mut self, files: &FileCache, d: &mut Diagnostics) {
         let read = |request: VolumeRequest| (files.volume(&request), request);
-        let volumes: Volumes = requests.into_par_iter().map(read).map(|(volume, request)| (request, volume)).collect();
+        let volumes: Volumes =
+            self.volume_requests().into_par_iter().map(read).map(|(volume, request)| (request, volume)).collect();
         for medium in &mut self.media {
             if let Some(desc) = &medium.volume {
                 medium.medium = medium_of(desc, &volumes, d);

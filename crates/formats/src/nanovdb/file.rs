@@ -6,7 +6,7 @@
 use super::blosc;
 use super::bytes::Bytes;
 use super::error::NanoError;
-use super::grid::{TYPES, ValueType};
+use super::grid::{NanoSize, TYPES, ValueType};
 use flate2::read::ZlibDecoder;
 use std::io::{Read, Seek, SeekFrom};
 
@@ -24,6 +24,8 @@ const MAJOR: u32 = 32;
 const SEGMENT: usize = 16;
 const ENTRY: usize = 176;
 pub(super) const GRID: usize = 672;
+/// Size of the header of a tree, which follows.
+const TREE: usize = 64;
 
 /// Maximum length of a name.
 const MAX_NAME: u32 = 1 << 16;
@@ -50,6 +52,8 @@ struct Entry {
     size: u64,
     ty: u32,
     codec: Codec,
+    /// Numbers of leaves, of nodes of 16³ and of 32³.
+    nodes: [u32; 3],
 }
 
 /// Part of a file.
@@ -61,6 +65,22 @@ struct Segment {
 
 /// Bytes of the first grid with a name. Of the rest of the file, only headers are read.
 pub(super) fn grid_bytes(reader: &mut (impl Read + Seek), size: u64, name: &str) -> Result<Vec<u8>, NanoError> {
+    let entry = find(reader, size, name)?;
+    read_entry(reader, &entry, size)
+}
+
+/// Size of the first grid with a name, as in its header.
+pub(super) fn grid_size(reader: &mut (impl Read + Seek), size: u64, name: &str) -> Result<NanoSize, NanoError> {
+    let entry = find(reader, size, name)?;
+    entry.check(size)?;
+    let [leaves, small, large] = entry.nodes.map(u64::from);
+    // Damaged numbers are limited by the smallest nodes
+    let most = |count: u64, bytes: u64| count.min(entry.size / bytes);
+    Ok(NanoSize { bytes: entry.size, leaves: most(leaves, 160), nodes: [most(small, 1 << 15), most(large, 1 << 18)] })
+}
+
+/// The first grid with a name.
+fn find(reader: &mut (impl Read + Seek), size: u64, name: &str) -> Result<Entry, NanoError> {
     let mut found = Vec::new();
     let mut at = 0;
     while at < size {
@@ -74,7 +94,7 @@ pub(super) fn grid_bytes(reader: &mut (impl Read + Seek), size: u64, name: &str)
         };
         for entry in entries {
             if entry.name == name {
-                return read_entry(reader, &entry, size);
+                return Ok(entry);
             }
             found.push(entry.name);
         }
@@ -106,13 +126,14 @@ fn check_version(version: u32) -> Result<(), NanoError> {
 /// A grid without a list, after its magic number.
 fn raw_grid(reader: &mut impl Read, at: u64) -> Result<Segment, NanoError> {
     // Its magic number has been read
-    let mut head = [0; GRID];
+    let mut head = [0; GRID + TREE];
     reader.read_exact(&mut head[8..])?;
     let head = Bytes(&head);
     check_version(head.u32(16)?)?;
     let size = head.u64(32)?;
     let (name, ty) = (head.text(40, 256)?, head.u32(636)?);
-    let entry = Entry { name, start: at, stored: size, size, ty, codec: Codec::None };
+    let nodes = counts(head, GRID as u64 + 32)?;
+    let entry = Entry { name, start: at, stored: size, size, ty, codec: Codec::None, nodes };
     Ok(Segment { entries: vec![entry], end: at.checked_add(size) })
 }
 
@@ -142,7 +163,8 @@ fn segment(reader: &mut impl Read, at: u64) -> Result<Segment, NanoError> {
         reader.read_exact(&mut name)?;
         let name = Bytes(&name).text(0, length as usize)?;
         start += ENTRY as u64 + u64::from(length);
-        entries.push(Entry { name, start: 0, stored: bytes.u64(8)?, size: bytes.u64(0)?, ty: bytes.u32(32)?, codec });
+        let (stored, size, ty, nodes) = (bytes.u64(8)?, bytes.u64(0)?, bytes.u32(32)?, counts(bytes, 140)?);
+        entries.push(Entry { name, start: 0, stored, size, ty, codec, nodes });
     }
     let mut end = Some(start);
     for entry in &mut entries {
@@ -152,22 +174,35 @@ fn segment(reader: &mut impl Read, at: u64) -> Result<Segment, NanoError> {
     Ok(Segment { entries, end })
 }
 
+/// Three numbers from an offset on.
+fn counts(bytes: Bytes<'_>, at: u64) -> Result<[u32; 3], NanoError> {
+    Ok([bytes.u32(at)?, bytes.u32(at + 4)?, bytes.u32(at + 8)?])
+}
+
+impl Entry {
+    /// `Err` unless the type is supported and the sizes are possible in a file of `file` bytes.
+    fn check(&self, file: u64) -> Result<(), NanoError> {
+        if ValueType::from_code(self.ty).is_none() {
+            let ty = TYPES.get(self.ty as usize).map_or_else(|| format!("{}", self.ty), |name| (*name).to_owned());
+            return Err(NanoError::Values { name: self.name.clone(), ty });
+        }
+        let available = file.saturating_sub(self.start).min(self.stored);
+        let most = match self.codec {
+            Codec::None => available,
+            Codec::Zip => available.saturating_mul(MAX_DEFLATE),
+            Codec::Blosc => available.saturating_mul(MAX_LZ4),
+        };
+        if self.size > most || self.size < GRID as u64 || available < self.stored {
+            let message = format!("its grid `{}` of {} bytes does not fit into the file", self.name, self.size);
+            return Err(NanoError::damaged(message));
+        }
+        Ok(())
+    }
+}
+
 /// The bytes of a grid, decompressed.
 fn read_entry(reader: &mut (impl Read + Seek), entry: &Entry, file: u64) -> Result<Vec<u8>, NanoError> {
-    if ValueType::from_code(entry.ty).is_none() {
-        let ty = TYPES.get(entry.ty as usize).map_or_else(|| format!("{}", entry.ty), |name| (*name).to_owned());
-        return Err(NanoError::Values { name: entry.name.clone(), ty });
-    }
-    let available = file.saturating_sub(entry.start).min(entry.stored);
-    let most = match entry.codec {
-        Codec::None => available,
-        Codec::Zip => available.saturating_mul(MAX_DEFLATE),
-        Codec::Blosc => available.saturating_mul(MAX_LZ4),
-    };
-    if entry.size > most || entry.size < GRID as u64 || available < entry.stored {
-        let message = format!("its grid `{}` of {} bytes does not fit into the file", entry.name, entry.size);
-        return Err(NanoError::damaged(message));
-    }
+    entry.check(file)?;
     reader.seek(SeekFrom::Start(entry.start))?;
     let mut stored = reader.take(entry.stored);
     match entry.codec {

@@ -76,6 +76,17 @@ fn joined<T: Copy + PartialOrd>([a, b]: [[T; 3]; 2], [c, d]: [[T; 3]; 2]) -> [[T
     [[0, 1, 2].map(|i| least(a[i], c[i])), [0, 1, 2].map(|i| greatest(b[i], d[i]))]
 }
 
+/// The size of a grid, as in its header.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct NanoSize {
+    /// Bytes as stored, decompressed.
+    pub bytes: u64,
+    /// Number of leaves.
+    pub leaves: u64,
+    /// Numbers of nodes of 16³ and of 32³ entries.
+    pub nodes: [u64; 2],
+}
+
 /// A cube of voxels of one value.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Tile {

@@ -22,5 +22,5 @@ mod tree;
 mod tests;
 
 pub use error::NanoError;
-pub use grid::{GridClass, LEAF, LEAF_VOXELS, NanoGrid, Tile, ValueType};
-pub use read::{parse_nanovdb, read_nanovdb};
+pub use grid::{GridClass, LEAF, LEAF_VOXELS, NanoGrid, NanoSize, Tile, ValueType};
+pub use read::{nanovdb_size, parse_nanovdb, read_nanovdb};

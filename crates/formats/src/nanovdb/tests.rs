@@ -39,6 +39,20 @@ fn known(p: [i32; 3]) -> f32 {
 }
 
 #[test]
+fn headers_tell_the_size_of_a_grid() {
+    for name in ["zip", "blosc", "fpn"] {
+        let path = format!("{}/../../tests/nanovdb/{name}.nvdb", env!("CARGO_MANIFEST_DIR"));
+        let grid = read_nanovdb(Path::new(&path), "density").unwrap();
+        let size = nanovdb_size(Path::new(&path), "density").unwrap();
+        assert_eq!(size.leaves, grid.leaves.len() as u64, "{name}");
+        assert!(
+            size.bytes > 160 * size.leaves && size.nodes.iter().all(|&n| (1..=size.leaves).contains(&n)),
+            "{size:?}"
+        );
+    }
+}
+
+#[test]
 fn files_of_nanovdb_convert_have_the_values_that_went_in() {
     let files: [(&str, &[u8], f32); 3] = [
         ("zip", include_bytes!("../../../../tests/nanovdb/zip.nvdb"), 0.0),

@@ -11,6 +11,17 @@ pub struct PtexFile {
     pub texels: PtexTexels,
 }
 
+/// Bytes of a file and of its content.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct PtexSize {
+    /// The file.
+    pub file: u64,
+    /// Texels of all faces.
+    pub texels: u64,
+    /// Descriptions of all faces.
+    pub faces: u64,
+}
+
 /// Texel values, channels interleaved.
 #[derive(Clone, Debug, PartialEq)]
 pub enum PtexTexels {

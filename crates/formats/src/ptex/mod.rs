@@ -16,5 +16,5 @@ mod read;
 mod tests;
 
 pub use error::PtexError;
-pub use file::{Neighbor, PtexFace, PtexFile, PtexTexels};
-pub use read::{parse_ptex, read_ptex};
+pub use file::{Neighbor, PtexFace, PtexFile, PtexSize, PtexTexels};
+pub use read::{parse_ptex, ptex_size, read_ptex};

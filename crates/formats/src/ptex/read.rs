@@ -2,7 +2,9 @@
 
 use super::blocks::{self, BlockHeader, Blocks, Encoding, NumberType, inflate};
 use super::error::PtexError;
-use super::file::{Neighbor, PtexFace, PtexFile, PtexTexels};
+use super::file::{Neighbor, PtexFace, PtexFile, PtexSize, PtexTexels};
+use std::fs::File;
+use std::io::Read;
 use std::path::Path;
 
 /// Maximum log₂ of the number of texels along an edge of a face.
@@ -21,6 +23,39 @@ pub fn read_ptex(path: &Path) -> Result<PtexFile, PtexError> {
         PtexError::Unreadable { .. } => error,
     })
 }
+
+/// The size of the content of a file, from the sizes of its faces. Faces that only their texels tell to be constant
+/// count in full.
+pub fn ptex_size(path: &Path) -> Result<PtexSize, PtexError> {
+    let unreadable = |reason| PtexError::Unreadable { path: path.to_owned(), reason };
+    let mut file = File::open(path).map_err(unreadable)?;
+    let file_bytes = file.metadata().map_err(unreadable)?.len();
+    let mut start = |bytes: u64| {
+        let mut head = Vec::new();
+        let read = Read::by_ref(&mut file).take(bytes).read_to_end(&mut head);
+        read.map(|_| head).map_err(unreadable)
+    };
+
+    // The header, and the list of faces
+    let header = Header::read(&mut Blocks::new(&start(HEADER)?, 0))?;
+    start(header.extension_size as u64)?;
+    let infos = inflate(&start(header.faces_size as u64)?, header.faces.checked_mul(FACE_BYTES), 0)?;
+
+    // Their texels
+    let (mut all, mut room) = (0_u64, usize::MAX);
+    for info in infos.chunks_exact(FACE_BYTES) {
+        let is_constant = info[3] & FLAG_CONSTANT != 0;
+        let log2 = header.size(info, is_constant, &mut room).map_err(|what| PtexError::wrong(0, what))?;
+        all += if is_constant { 1 } else { 1 << (log2[0] + log2[1]) };
+    }
+    let number = if header.ty == NumberType::U8 { 1 } else { size_of::<f32>() as u64 };
+    let texels = all.saturating_mul(header.kept_channels() as u64 * number);
+    Ok(PtexSize { file: file_bytes, texels, faces: (header.faces * size_of::<PtexFace>()) as u64 })
+}
+
+/// Bytes of the header, and of a face in the list.
+const HEADER: u64 = 64;
+const FACE_BYTES: usize = 20;
 
 /// The content of the header.
 struct Header {
@@ -71,6 +106,11 @@ impl Header {
         Ok(Header { ty, channels, faces, extension_size, faces_size, means_size, levels_size })
     }
 
+    /// Channels that are kept.
+    fn kept_channels(&self) -> usize {
+        if self.channels >= 3 { 3 } else { 1 }
+    }
+
     /// Size of a texel (bytes).
     fn texel_bytes(&self) -> usize {
         self.channels * self.ty.size()
@@ -109,7 +149,6 @@ pub fn parse_ptex(bytes: &[u8]) -> Result<PtexFile, PtexError> {
         return Err(PtexError::wrong(64 + 24, message));
     }
 
-    const FACE_BYTES: usize = 20;
     let at = blocks.at();
     let infos = inflate(blocks.take(header.faces_size, "the faces")?, header.faces.checked_mul(FACE_BYTES), at)?;
     let at = blocks.at();
@@ -183,8 +222,7 @@ impl Interleaved {
     fn new(header: &Header) -> Self {
         let values =
             if header.ty == NumberType::U8 { PtexTexels::Bytes(Vec::new()) } else { PtexTexels::Floats(Vec::new()) };
-        let channels = if header.channels >= 3 { 3 } else { 1 };
-        Interleaved { ty: header.ty, of: header.channels, channels, values }
+        Interleaved { ty: header.ty, of: header.channels, channels: header.kept_channels(), values }
     }
 
     /// Number of texels.

@@ -13,6 +13,18 @@ const ENCODINGS: [PtexEncoding; 6] = [
     PtexEncoding::Tiled([3, 0]),
 ];
 
+#[test]
+fn the_list_of_faces_tells_the_number_of_texels() {
+    let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes/demo/patchwork.ptx");
+    let (file, size) = (read_ptex(&path).unwrap(), ptex_size(&path).unwrap());
+    let texels = match &file.texels {
+        PtexTexels::Bytes(v) => v.len(),
+        PtexTexels::Floats(v) => size_of_val(&v[..]),
+    };
+    assert_eq!(size.texels, texels as u64);
+    assert_eq!(size.faces, size_of_val(&file.faces[..]) as u64);
+}
+
 /// A face for each encoding, of 8 × 4 texels of multiples of 1/16.
 fn sample(ty: u32, channels: u16) -> PtexSpec {
     let face = |(i, &encoding): (usize, &PtexEncoding)| {
