@@ -4,6 +4,7 @@ use super::progress;
 use anyhow::ensure;
 use clap::{Args, Subcommand};
 use lumiris_lab::procedural::files::{write_sky, write_statue};
+use lumiris_lab::procedural::island::{self, IslandOptions};
 use lumiris_lab::procedural::sky::SkyOptions;
 use lumiris_lab::procedural::statue::{DEFAULT_DETAIL, StatueOptions};
 use lumiris_lab::procedural::talbot::TalbotOptions;
@@ -30,6 +31,8 @@ enum What {
     Fan(FanArgs),
     /// The scenes of scenes/keller-wald, and a variant of the rooms with 10,000 lights
     KellerWald(KellerWaldArgs),
+    /// A tropical island of up to 10⁸ plants and pebbles, with water and sky
+    Island(IslandArgs),
 }
 
 #[derive(Args, Clone, Debug)]
@@ -126,6 +129,25 @@ struct KellerWaldArgs {
     output: PathBuf,
 }
 
+#[derive(Args, Clone, Debug)]
+struct IslandArgs {
+    /// Folder to write into
+    #[arg(short, long, value_name = "DIR", default_value = "island")]
+    output: PathBuf,
+    /// Number of plants and pebbles (1000 to 100000000); the area of the island grows with it
+    #[arg(long, value_name = "N", default_value_t = IslandOptions::default().instances)]
+    instances: usize,
+    /// Squares of the terrain along each side, two triangles each (16 to 8192)
+    #[arg(long, value_name = "N", default_value_t = IslandOptions::default().detail)]
+    detail: u32,
+    /// Width and height of the sky in texels
+    #[arg(long, value_name = "N", default_value_t = IslandOptions::default().resolution)]
+    resolution: usize,
+    /// Random seed
+    #[arg(long, value_name = "N", default_value_t = IslandOptions::default().seed)]
+    seed: u32,
+}
+
 pub(super) fn run(args: &GenerateArgs) -> anyhow::Result<ExitCode> {
     // Write the files, and report each file or folder with its size
     match &args.what {
@@ -155,8 +177,24 @@ pub(super) fn run(args: &GenerateArgs) -> anyhow::Result<ExitCode> {
             keller_wald::write_scenes(&args.output)?;
             progress::say(&format!("{}: {} scenes", args.output.display(), keller_wald::COUNT));
         }
+        What::Island(args) => write_island(args)?,
     }
     Ok(ExitCode::SUCCESS)
+}
+
+fn write_island(args: &IslandArgs) -> anyhow::Result<()> {
+    let IslandArgs { ref output, instances, detail, resolution, seed } = *args;
+    let written = island::write_scenes(output, &IslandOptions { instances, detail, resolution, seed })?;
+    progress::say(&format!(
+        "{}: two scenes, {} plants and {} pebbles on {:.0} × {:.0} m, {} triangles of ground",
+        output.display(),
+        written.plants,
+        written.pebbles,
+        written.side,
+        written.side,
+        written.triangles
+    ));
+    Ok(())
 }
 
 fn has_extension(path: &std::path::Path, extension: &str) -> bool {

@@ -10,6 +10,7 @@ mod farm;
 mod frames;
 mod gltf;
 mod interrupt;
+mod island;
 mod light_groups;
 mod looks;
 mod lost_output;

@@ -1,13 +1,14 @@
-//! Generated content: a statue, a sky, and the scenes that use them.
+//! Generated content: a statue, a sky, an island, and the scenes that use them.
 //!
 //! Reading order: [`gradient_noise`], [`nets`], [`solids`], [`relief`], [`dragon`] (with `head`), [`statue`], [`ply`],
-//! [`sky`], [`files`], [`talbot`], [`fan`], [`keller_wald`].
+//! [`sky`], [`files`], [`talbot`], [`fan`], [`keller_wald`], [`island`].
 
 pub mod dragon;
 pub mod fan;
 pub mod files;
 pub mod gradient_noise;
 mod head;
+pub mod island;
 pub mod keller_wald;
 mod limbs;
 pub mod nets;
