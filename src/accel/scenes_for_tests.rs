@@ -3,8 +3,8 @@
 use super::RayBatch;
 use crate::geometry::reference_for_tests::random_point;
 use crate::geometry::{
-    AlphaSource, BilinearMesh, Geometry, GeometrySet, Group, Instance, Quadric, QuadricKind, Shape, TriangleMesh,
-    Visibility,
+    AlphaSource, BilinearMesh, Curve, CurveKind, CurveSet, Geometry, GeometrySet, Group, Instance, Quadric,
+    QuadricKind, Shape, TriangleMesh, Visibility,
 };
 use lumiris_numbers::math::{Affine3A, Quat, Ray, Vec2, Vec3};
 use lumiris_test_support::random::{Pcg32, RngExt, pcg32};
@@ -113,6 +113,73 @@ pub(super) fn mixed_scene(seed: u32, samples: usize) -> Arc<GeometrySet> {
         })
         .collect();
     Arc::new(GeometrySet { geometries, groups, root: Group { geometries: (0..8).collect() }, instances })
+}
+
+/// A curve that is fine or wide, nearly straight or strongly bent, possibly of no width at one or both ends.
+fn random_curve(s: &mut Pcg32, k: u32) -> Curve {
+    let (start, step) = (random_point(s), random_point(s) * 0.3);
+    let bend = [0.01, 0.1, 1.0][k as usize % 3];
+    let points = std::array::from_fn(|i| start + step * i as f32 + random_point(s) * bend);
+    let width = [0.3, 0.03, 0.003][(k / 3) as usize % 3];
+    Curve { points, width: [[1.0, 0.5], [1.0, 0.0], [0.0, 1.0], [0.0, 0.0]][(k / 9) as usize % 4].map(|w| w * width) }
+}
+
+fn random_curves(s: &mut Pcg32, kind: CurveKind, count: u32) -> CurveSet {
+    let curves = (0..count).map(|k| random_curve(s, k)).collect();
+    let normals = (0..count).map(|_| [0; 2].map(|_| random_point(s).normalize_or(Vec3::X))).collect();
+    CurveSet::new(kind, curves, normals).unwrap()
+}
+
+/// Curves of all kinds, and triangles between them, in the root and in instances with up to `samples` time samples.
+/// Some have alpha or are hidden from some rays.
+pub(super) fn curve_scene(seed: u32, samples: usize) -> Arc<GeometrySet> {
+    // Geometries
+    let mut s = pcg32([seed, 78, 0]);
+    let mut geometries = Vec::new();
+    for k in 0..8 {
+        let shape = match k % 4 {
+            0 => Shape::Curves(random_curves(&mut s, CurveKind::Flat, 36)),
+            1 => Shape::Curves(random_curves(&mut s, CurveKind::Cylinder, 1 + 7 * k)),
+            2 => Shape::Curves(random_curves(&mut s, CurveKind::Ribbon, 36)),
+            _ => Shape::Mesh(soup(&mut s, 30, 0.2)),
+        };
+        let visibility = Visibility([3, 3, 1, 3, 2, 3, 3, 3][k as usize]);
+        geometries.push(Geometry { shape, alpha: [None, None, Some(1), Some(2)][k as usize / 2], visibility });
+    }
+
+    // Instances
+    let groups = vec![Group { geometries: vec![4, 5, 6] }, Group { geometries: vec![0, 3] }];
+    let instances = (0..4_u32).map(|k| {
+        let first = random_placement(&mut s);
+        let moved = |i: usize| Affine3A::from_translation(Vec3::X * i as f32 * 0.4) * first;
+        Instance { group: k % 2, world_from_group: (0..1 + k as usize % samples).map(moved).collect() }
+    });
+    let instances = instances.collect();
+    Arc::new(GeometrySet { geometries, groups, root: Group { geometries: vec![0, 1, 2, 3, 7] }, instances })
+}
+
+/// Rays at random, at points within the width of a curve in the root, along its tangent, and from its surface.
+pub(super) fn curve_rays(set: &GeometrySet, count: usize, seed: u32) -> RayBatch {
+    let mut s = pcg32([seed, 8, 8]);
+    let mut rays = random_rays(count / 4, seed);
+    let sets = set.geometries[..3].iter().filter_map(|g| if let Shape::Curves(c) = &g.shape { Some(c) } else { None });
+    let curves: Vec<Curve> = sets.flat_map(|set| set.curves()).copied().collect();
+    for k in rays.len()..count {
+        let curve = curves[(s.random::<f32>() * curves.len() as f32) as usize % curves.len()];
+        let (u, [p0, p1, p2, p3]) = (s.random::<f32>(), curve.points);
+        let (a, b) = (p0.lerp(p1, u).lerp(p1.lerp(p2, u), u), p1.lerp(p2, u).lerp(p2.lerp(p3, u), u));
+        let p = a.lerp(b, u);
+        let beside = p + random_point(&mut s) * curve.width_at(u);
+        let far = 10.0_f32.powf(s.random::<f32>() * 4.0 - 1.0);
+        let (o, d) = match k % 4 {
+            0 | 1 => (beside + random_point(&mut s) * far, beside),
+            2 => (beside - (b - a) * far, beside + random_point(&mut s) * curve.width_at(u) * 0.1),
+            _ => (beside, beside + random_point(&mut s)),
+        };
+        let t_max = if k % 5 == 0 { 2.0 * s.random::<f32>() } else { f32::INFINITY };
+        rays.push(&Ray { o, d: d - o, t_max, time: s.random::<f32>() });
+    }
+    rays
 }
 
 pub(super) fn random_rays(count: usize, seed: u32) -> RayBatch {

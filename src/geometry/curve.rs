@@ -9,15 +9,21 @@
 //! hit is at the depth c·d/d² of the centre. The ends of a curve are therefore cut perpendicularly, and adjacent curves
 //! with a common tangent leave no gap.
 //!
-//! Curves are split into pieces of u so short that c₂·c' has at most one root in each, and that their boxes are tight.
-//! A piece is one primitive of a ray tracer. The root is computed in f64 by Newton's method in a bracket.
+//! Curves are split into pieces of u so short that c₂·c' has at most one root in each. A piece is a primitive; the root
+//! is computed in f64 by Newton's method in a bracket. Ray tracers enclose spans of adjacent pieces in capsules.
 
 use super::hit::{LocalHit, SurfaceHit, VertexValues, round};
 use glam::DVec3;
 use lumiris_numbers::math::{Bounds3, Frame, Ray, Vec2, Vec3, gamma};
+use rayon::prelude::*;
+use std::ops::Range;
 
-/// Maximum number of pieces of one curve.
+/// Maximum number of pieces of one curve. A primitive is the number of its curve times this, plus its index in it.
 const MAX_PIECES: u32 = 128;
+/// Number of pieces in a span.
+const SPAN: u32 = 3;
+/// Largest factor by which a ribbon seems wider than it is: rounding errors of its normal.
+const RIBBON_ROUNDING: f64 = 1.0 + 1e-6;
 
 /// The shape of a curve's surface.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -42,9 +48,26 @@ pub struct Curve {
 /// The part of a curve that is a primitive: u from index/count to (index + 1)/count.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Piece {
-    curve: u32,
-    index: u16,
-    count: u16,
+    curve: usize,
+    index: u32,
+    count: u32,
+}
+
+/// All points within a distance from a line segment.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Capsule {
+    /// Ends of the segment.
+    pub ends: [Vec3; 2],
+    /// The distance.
+    pub radius: f32,
+}
+
+impl Capsule {
+    /// Bounds of the capsule.
+    pub fn bounds(&self) -> Bounds3 {
+        let b = Bounds3::from_points(self.ends);
+        Bounds3 { min: b.min - self.radius, max: b.max + self.radius }
+    }
 }
 
 /// Curves of one kind.
@@ -54,7 +77,8 @@ pub struct CurveSet {
     curves: Vec<Curve>,
     /// Unit normals of ribbons at both ends of each curve.
     normals: Vec<[Vec3; 2]>,
-    pieces: Vec<Piece>,
+    /// Number of pieces of each curve.
+    piece_counts: Vec<u8>,
 }
 
 /// A point of a curve.
@@ -65,18 +89,91 @@ struct Point {
     d2: DVec3,
 }
 
-impl Curve {
-    /// c, c' and c'' at `u`, relative to `o`.
-    #[inline]
-    fn at(&self, u: f64, o: DVec3) -> Point {
-        let [p0, p1, p2, p3] = self.points.map(|p| p.as_dvec3() - o);
+/// Control points relative to an origin, and their differences.
+struct RelativeCurve {
+    points: [DVec3; 4],
+    differences: [DVec3; 3],
+}
+
+impl RelativeCurve {
+    /// c, c' and c'' at `u`.
+    #[inline(always)]
+    fn at(&self, u: f64) -> Point {
+        let ([p0, p1, p2, p3], [a, b, c]) = (self.points, self.differences);
         let w = 1.0 - u;
-        let (a, b, c) = (p1 - p0, p2 - p1, p3 - p2);
         Point {
             c: p0 * (w * w * w) + p1 * (3.0 * w * w * u) + p2 * (3.0 * w * u * u) + p3 * (u * u * u),
             d1: (a * (w * w) + b * (2.0 * w * u) + c * (u * u)) * 3.0,
             d2: ((b - a) * w + (c - b) * u) * 6.0,
         }
+    }
+}
+
+/// A curve as a ray sees it.
+struct SeenCurve<'a> {
+    set: &'a CurveSet,
+    id: usize,
+    relative: RelativeCurve,
+    d: DVec3,
+    inv_d2: f64,
+}
+
+impl SeenCurve<'_> {
+    /// The part of a vector that is perpendicular to the ray.
+    #[inline(always)]
+    fn project(&self, x: DVec3) -> DVec3 {
+        x - self.d * (x.dot(self.d) * self.inv_d2)
+    }
+
+    /// Half the derivative of the squared distance of the ray and c(u), and its own derivative.
+    #[inline(always)]
+    fn slope(&self, u: f64) -> [f64; 2] {
+        let at = self.relative.at(u);
+        let c2 = self.project(at.c);
+        [c2.dot(at.d1), self.project(at.d1).length_squared() + c2.dot(at.d2)]
+    }
+
+    /// The hit in (0, t_max) with u in a range with the slopes `ends`.
+    #[inline]
+    fn hit(&self, range: [f64; 2], ends: [f64; 2], t_max: f32) -> Option<LocalHit> {
+        if !(ends[0] <= 0.0 && ends[1] > 0.0) {
+            return None;
+        }
+        let u = root(|u| self.slope(u), range, ends);
+
+        let (set, d, inv_d2) = (self.set, self.d, self.inv_d2);
+        let curve = &set.curves[self.id];
+        let at = self.relative.at(u);
+        let c2 = self.project(at.c);
+        let (u32, distance) = (u as f32, c2.length());
+        let mut width = f64::from(curve.width_at(u32));
+        if set.kind == CurveKind::Ribbon {
+            width *= (set.ribbon_normal(self.id, u).dot(d).abs() * inv_d2.sqrt()).min(RIBBON_ROUNDING);
+        }
+        let t = (at.c.dot(d) * inv_d2) as f32;
+        if !(2.0 * distance <= width && width > 0.0 && t > 0.0 && t < t_max) {
+            return None;
+        }
+        let x = set.across(self.id, u, curve.tangent(&at), d).dot(-c2).signum() * distance;
+        Some(LocalHit { t, uv: [u32, (0.5 + x / width).clamp(0.0, 1.0) as f32] })
+    }
+}
+
+impl Curve {
+    fn relative_to(&self, o: DVec3) -> RelativeCurve {
+        let points = self.points.map(|p| p.as_dvec3() - o);
+        let [p0, p1, p2, p3] = points;
+        RelativeCurve { points, differences: [p1 - p0, p2 - p1, p3 - p2] }
+    }
+
+    /// c, c' and c'' at `u`.
+    fn at(&self, u: f64) -> Point {
+        self.relative_to(DVec3::ZERO).at(u)
+    }
+
+    /// Largest coordinate of a control point.
+    fn extent(&self) -> f32 {
+        self.points.iter().fold(Vec3::ZERO, |m, p| m.max(p.abs())).max_element()
     }
 
     /// Width at `u`.
@@ -95,13 +192,17 @@ impl Curve {
         [blossom(from, from, from), blossom(from, from, to), blossom(from, to, to), blossom(to, to, to)]
     }
 
+    /// The larger second difference L of the control points. A curve is within 3L/(4 n²) of n chords.
+    fn bend(&self) -> f32 {
+        let [p0, p1, p2, p3] = self.points;
+        (p0 - p1 * 2.0 + p2).length().max((p1 - p2 * 2.0 + p3).length())
+    }
+
     /// Number of pieces: each deviates from a straight line by at most a twentieth of the width, and boxes are tight.
     fn pieces(&self) -> u32 {
         let [p0, p1, p2, p3] = self.points;
         let width = self.width[0].max(self.width[1]).max(f32::MIN_POSITIVE);
-        // A curve of second differences L is within 3L/(4 n²) of n chords
-        let bend = (p0 - p1 * 2.0 + p2).length().max((p1 - p2 * 2.0 + p3).length());
-        let straight = (0.75 * bend / (0.05 * width)).sqrt().ceil();
+        let straight = (0.75 * self.bend() / (0.05 * width)).sqrt().ceil();
         let length = (p1 - p0).length() + (p2 - p1).length() + (p3 - p2).length();
         let tight = (length / (8.0 * width)).ceil().min(8.0);
         straight.max(tight).clamp(1.0, MAX_PIECES as f32) as u32
@@ -126,15 +227,13 @@ impl CurveSet {
         if !curves.iter().all(is_sound) {
             return Err("points and widths of curves must be finite, and widths not negative".into());
         }
-        let mut pieces = Vec::new();
-        for (i, curve) in curves.iter().enumerate() {
-            let curve_id = u32::try_from(i).map_err(|_| "more than 4294967295 curves in one shape".to_string())?;
-            let count = curve.pieces();
-            pieces.extend((0..count).map(|k| Piece { curve: curve_id, index: k as u16, count: count as u16 }));
+        let most = u32::MAX / MAX_PIECES;
+        if curves.len() > most as usize {
+            return Err(format!("{} curves in one shape; the maximum is {most}", curves.len()));
         }
-        pieces.shrink_to_fit();
+        let piece_counts = curves.par_iter().map(|curve| curve.pieces() as u8).collect();
         let normals = if kind == CurveKind::Ribbon { normals } else { Vec::new() };
-        Ok(CurveSet { kind, curves, normals, pieces })
+        Ok(CurveSet { kind, curves, normals, piece_counts })
     }
 
     /// The curves.
@@ -142,29 +241,66 @@ impl CurveSet {
         &self.curves
     }
 
-    /// Number of primitives for a ray tracer.
+    /// Number of pieces of all curves.
     pub fn piece_count(&self) -> usize {
-        self.pieces.len()
+        self.piece_counts.iter().map(|&count| usize::from(count)).sum()
     }
 
     /// Memory (bytes).
     pub fn bytes(&self) -> usize {
-        size_of_val(&self.curves[..]) + size_of_val(&self.normals[..]) + size_of_val(&self.pieces[..])
+        size_of_val(&self.curves[..]) + size_of_val(&self.normals[..]) + size_of_val(&self.piece_counts[..])
+    }
+
+    /// The primitives of a curve.
+    pub fn pieces_of(&self, curve: usize) -> Range<u32> {
+        let first = curve as u32 * MAX_PIECES;
+        first..first + u32::from(self.piece_counts[curve])
+    }
+
+    /// The first primitives of the spans of a curve.
+    pub fn spans_of(&self, curve: usize) -> impl Iterator<Item = u32> + use<> {
+        self.pieces_of(curve).step_by(SPAN as usize)
+    }
+
+    /// The primitives of the span that starts with `first`.
+    pub fn span(&self, first: u32) -> Range<u32> {
+        first..self.pieces_of((first / MAX_PIECES) as usize).end.min(first + SPAN)
+    }
+
+    /// A capsule that contains the hits of a span.
+    pub fn capsule(&self, first: u32) -> Capsule {
+        let Piece { curve, index, count } = self.piece(first as usize);
+        let curve = &self.curves[curve];
+        let [from, to] = [index, index + self.span(first).len() as u32].map(|k| f64::from(k) / f64::from(count));
+        // The chord deviates by Δ²/2·s(1 − s)·c″: moved by half of that, by Δ²/16·c″. Where c″ changes, it deviates by
+        // 0.049·Δ³/6·c‴ more, and c‴ is at most twelve times the bend
+        let step = to - from;
+        let moved = curve.at(0.5 * (from + to)).d2 * (step * step / 16.0);
+        let ends = [from, to].map(|u| round(curve.at(u).c - moved));
+        let deviation = moved.length() as f32 + 0.1 * curve.bend() * (step * step * step) as f32;
+        let half_width = 0.5 * curve.width_at(from as f32).max(curve.width_at(to as f32));
+        Capsule { ends, radius: (half_width + deviation) * (1.0 + gamma(64)) + curve.extent() * gamma(8) }
+    }
+
+    fn piece(&self, primitive: usize) -> Piece {
+        let (curve, index) = (primitive / MAX_PIECES as usize, primitive as u32 % MAX_PIECES);
+        Piece { curve, index, count: u32::from(self.piece_counts[curve]) }
     }
 
     /// Bounds of all curves.
     pub fn bounds(&self) -> Bounds3 {
-        (0..self.pieces.len()).fold(Bounds3::EMPTY, |b, i| Bounds3::union(b, self.piece_bounds(i)))
+        let pieces = (0..self.curves.len()).into_par_iter().flat_map_iter(|curve| self.pieces_of(curve));
+        pieces.map(|piece| self.piece_bounds(piece)).reduce(|| Bounds3::EMPTY, Bounds3::union)
     }
 
     /// Bounds of a piece.
-    pub fn piece_bounds(&self, i: usize) -> Bounds3 {
-        let Piece { curve, index, count } = self.pieces[i];
-        let curve = &self.curves[curve as usize];
-        let [from, to] = [index, index + 1].map(|k| f32::from(k) / f32::from(count));
+    fn piece_bounds(&self, primitive: u32) -> Bounds3 {
+        let Piece { curve, index, count } = self.piece(primitive as usize);
+        let curve = &self.curves[curve];
+        let [from, to] = [index, index + 1].map(|k| k as f32 / count as f32);
         let b = Bounds3::from_points(curve.part(from, to));
-        let extent = curve.points.iter().fold(Vec3::ZERO, |m, p| m.max(p.abs())).max_element();
-        let r = Vec3::splat(0.5 * curve.width_at(from).max(curve.width_at(to)) * (1.0 + gamma(4)) + extent * gamma(8));
+        let half_width = 0.5 * curve.width_at(from).max(curve.width_at(to));
+        let r = Vec3::splat(half_width * (1.0 + gamma(4)) + curve.extent() * gamma(8));
         Bounds3 { min: b.min - r, max: b.max + r }
     }
 
@@ -179,39 +315,34 @@ impl CurveSet {
         (a * ((1.0 - u) * angle).sin() + b * (u * angle).sin()) / sin
     }
 
+    fn seen_by(&self, curve: usize, ray: &Ray) -> SeenCurve<'_> {
+        let d = ray.d.as_dvec3();
+        let relative = self.curves[curve].relative_to(ray.o.as_dvec3());
+        SeenCurve { set: self, id: curve, relative, d, inv_d2: 1.0 / d.length_squared() }
+    }
+
     /// The hit of a piece in (0, t_max); uv are (u, v) of the curve.
     pub fn intersect(&self, primitive: usize, ray: &Ray) -> Option<LocalHit> {
-        let Piece { curve: id, index, count } = self.pieces[primitive];
-        let curve = &self.curves[id as usize];
-        let (o, d) = (ray.o.as_dvec3(), ray.d.as_dvec3());
-        let inv_d2 = 1.0 / d.length_squared();
-        let project = |x: DVec3| x - d * (x.dot(d) * inv_d2);
-        // Half the derivative of the squared distance of the ray and c(u), and its own derivative
-        let slope = |u: f64| {
-            let at = curve.at(u, o);
-            let c2 = project(at.c);
-            [c2.dot(at.d1), project(at.d1).length_squared() + c2.dot(at.d2)]
-        };
-        let [from, to] = [index, index + 1].map(|k| f64::from(k) / f64::from(count));
-        let (a, b) = (slope(from)[0], slope(to)[0]);
-        if !(a <= 0.0 && b > 0.0) {
-            return None;
-        }
-        let u = root(slope, [from, to], [a, b]);
+        let Piece { curve, index, count } = self.piece(primitive);
+        let seen = self.seen_by(curve, ray);
+        let range = [index, index + 1].map(|k| f64::from(k) / f64::from(count));
+        seen.hit(range, range.map(|u| seen.slope(u)[0]), ray.t_max)
+    }
 
-        let at = curve.at(u, o);
-        let c2 = project(at.c);
-        let (u32, distance) = (u as f32, c2.length());
-        let mut width = f64::from(curve.width_at(u32));
-        if self.kind == CurveKind::Ribbon {
-            width *= self.ribbon_normal(id as usize, u).dot(d).abs() * inv_d2.sqrt();
+    /// The hits of the pieces of a span in (0, t_max), as by [`Self::intersect`].
+    #[inline]
+    pub fn intersect_span(&self, first: u32, ray: &Ray) -> [Option<LocalHit>; SPAN as usize] {
+        let Piece { curve, index, count } = self.piece(first as usize);
+        let seen = self.seen_by(curve, ray);
+        let (mut hits, mut from) = ([None; SPAN as usize], f64::from(index) / f64::from(count));
+        let mut slope_from = seen.slope(from)[0];
+        for (k, hit) in (index..count).zip(&mut hits) {
+            let to = f64::from(k + 1) / f64::from(count);
+            let slope_to = seen.slope(to)[0];
+            *hit = seen.hit([from, to], [slope_from, slope_to], ray.t_max);
+            (from, slope_from) = (to, slope_to);
         }
-        let t = (at.c.dot(d) * inv_d2) as f32;
-        if !(2.0 * distance <= width && width > 0.0 && t > 0.0 && t < ray.t_max) {
-            return None;
-        }
-        let x = self.across(id as usize, u, curve.tangent(&at), d).dot(-c2).signum() * distance;
-        Some(LocalHit { t, uv: [u32, (0.5 + x / width).clamp(0.0, 1.0) as f32] })
+        hits
     }
 
     /// Unit vector of increasing v.
@@ -229,9 +360,9 @@ impl CurveSet {
     /// The error bound is twice the width, as in pbrt-v4. The ribbon rotates with the ray, so an outgoing ray must
     /// start beyond half the width to avoid hitting the same ribbon in its new orientation.
     pub fn surface_hit(&self, primitive: usize, [u, v]: [f32; 2], d: Vec3) -> SurfaceHit {
-        let id = self.pieces[primitive].curve as usize;
+        let id = self.piece(primitive).curve;
         let curve = &self.curves[id];
-        let at = curve.at(f64::from(u), DVec3::ZERO);
+        let at = curve.at(f64::from(u));
         let tangent = curve.tangent(&at);
         let width = curve.width_at(u);
 
@@ -291,7 +422,8 @@ mod tests {
     }
 
     fn first(set: &CurveSet, ray: &Ray) -> Option<(usize, LocalHit)> {
-        let hits = (0..set.piece_count()).filter_map(|i| Some((i, set.intersect(i, ray)?)));
+        let pieces = (0..set.curves.len()).flat_map(|curve| set.pieces_of(curve)).map(|i| i as usize);
+        let hits = pieces.filter_map(|i| Some((i, set.intersect(i, ray)?)));
         hits.min_by(|a, b| a.1.t.total_cmp(&b.1.t))
     }
 
@@ -353,7 +485,7 @@ mod tests {
     fn reference(curve: &Curve, ray: &Ray) -> Option<f64> {
         let (o, d) = (ray.o.as_dvec3(), ray.d.as_dvec3());
         let at = |k: i32| {
-            let c = curve.at(f64::from(k) / 20_000.0, o).c;
+            let c = curve.relative_to(o).at(f64::from(k) / 20_000.0).c;
             let t = c.dot(d) / d.length_squared();
             ((c - d * t).length(), t)
         };
@@ -369,7 +501,7 @@ mod tests {
         for _ in 0..300 {
             let curve = random_curve(&mut s);
             let set = CurveSet::new(CurveKind::Flat, vec![curve], Vec::new()).unwrap();
-            let target = round(curve.at(s.random::<f64>(), DVec3::ZERO).c) + random_point(&mut s) * 0.05;
+            let target = round(curve.at(s.random::<f64>()).c) + random_point(&mut s) * 0.05;
             let o = random_point(&mut s) * 4.0;
             let ray = ray(o, target - o);
             match (first(&set, &ray), reference(&curve, &ray)) {
@@ -406,16 +538,55 @@ mod tests {
             for k in 0..set.piece_count() {
                 // At the joints, where the ray crosses the curve
                 let u = f64::from(k as u32) / set.piece_count() as f64;
-                let at = curve.at(u.max(1e-3), DVec3::ZERO);
+                let at = curve.at(u.max(1e-3));
                 let p = round(at.c);
                 let side = round(at.d1).any_orthonormal_vector();
                 let ray = ray(p - side * 3.0, side);
                 let (i, hit) = first(&set, &ray).expect("the curve is met");
-                let b = set.piece_bounds(i);
+                let b = set.piece_bounds(i as u32);
                 let q = ray.at(hit.t);
                 assert!(q.cmpge(b.min - 1e-5).all() && q.cmple(b.max + 1e-5).all());
             }
         }
+    }
+
+    #[test]
+    fn capsules_of_spans_hold_their_hits() {
+        let mut s = pcg32([8, 8, 2]);
+        let mut hits = 0;
+        for k in 0..600 {
+            // Fine and wide, straight and bent, of all kinds
+            let (bend, width) = ([0.01, 0.2, 2.0][k % 3], [1.0, 0.1, 0.01][k / 3 % 3]);
+            let step = random_point(&mut s) * 0.5;
+            let points = std::array::from_fn(|i| step * i as f32 + random_point(&mut s) * bend);
+            let curve = Curve { points, width: [[width, 0.0], [0.3 * width, width]][k / 9 % 2] };
+            let normals = [0; 2].map(|_| random_point(&mut s).normalize_or(Vec3::Z));
+            let kind = [CurveKind::Flat, CurveKind::Cylinder, CurveKind::Ribbon][k % 7 % 3];
+            let set = CurveSet::new(kind, vec![curve], vec![normals]).unwrap();
+            let spans: Vec<Range<u32>> = set.spans_of(0).map(|first| set.span(first)).collect();
+            assert!(spans.iter().cloned().flatten().eq(set.pieces_of(0)));
+
+            // Rays near the rim
+            for first in spans.iter().cloned().flat_map(|span| [span.start; 20]) {
+                let Capsule { ends: [a, b], radius } = set.capsule(first);
+                let target = a.lerp(b, s.random::<f32>()) + random_point(&mut s) * radius;
+                let o = target + random_point(&mut s) * 10.0_f32.powf(2.0 * s.random::<f32>());
+                let ray = ray(o, target - o);
+                for hit in set.span(first).filter_map(|i| set.intersect(i as usize, &ray)) {
+                    let p = ray.o.as_dvec3() + ray.d.as_dvec3() * f64::from(hit.t);
+                    let (a, along) = (a.as_dvec3(), (b - a).as_dvec3());
+                    let nearest = ((p - a).dot(along) / along.length_squared()).clamp(0.0, 1.0);
+                    let distance = (a + along * nearest - p).length();
+                    // The hit's parameter has rounding errors
+                    assert!(
+                        distance <= f64::from(radius) + 1e-7 * f64::from((ray.d * hit.t).length()),
+                        "{k} {distance} {radius}"
+                    );
+                    hits += 1;
+                }
+            }
+        }
+        assert!(hits > 5000, "{hits}");
     }
 
     #[test]

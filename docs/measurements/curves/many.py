@@ -1,8 +1,10 @@
-"""Prints a scene of 100,000 curves on a ball, of one segment each."""
+"""Prints a scene of 100,000 curves on a ball, or of the number given, of one segment each."""
 
 import math
 import random
+import sys
 
+count = int(sys.argv[1]) if len(sys.argv) > 1 else 100_000
 random.seed(1)
 print('''LookAt 0 0 -4  0 0 0  0 1 0
 Camera "perspective" "float fov" 40
@@ -10,7 +12,7 @@ Film "rgb" "integer xresolution" 256 "integer yresolution" 256
 WorldBegin
 LightSource "infinite" "rgb L" [ 1 1 1 ]
 Material "hair"''')
-for _ in range(100_000):
+for _ in range(count):
     z, a = random.uniform(-1, 1), random.uniform(0, 2 * math.pi)
     r = math.sqrt(1 - z * z)
     n = (r * math.cos(a), r * math.sin(a), z)

@@ -8,6 +8,8 @@ use rayon::prelude::*;
 
 /// Maximum number of triangles in a leaf: the width of a block.
 pub(super) const LEAF_TRIANGLES: usize = 4;
+/// Maximum number of spans of curves in a leaf: the width of a block.
+pub(super) const LEAF_SPANS: usize = 8;
 const MAX_BINS: usize = 32;
 /// From this depth on, ranges are halved, which bounds the depth of the tree.
 const MAX_SAH_DEPTH: u32 = 64;
@@ -16,6 +18,34 @@ const PARALLEL_RANGE: usize = 4096;
 /// Ranges longer than this are binned in parallel.
 const PARALLEL_BINNING: usize = 1 << 16;
 
+/// The primitives of a leaf.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum LeafKind {
+    /// Up to [`LEAF_TRIANGLES`] triangles.
+    Triangles,
+    /// Up to [`LEAF_SPANS`] spans of curves.
+    Curves,
+    /// Another primitive or an instance.
+    Single,
+}
+
+impl LeafKind {
+    /// The kind of leaf for a primitive; `kinds` are those of the geometries.
+    #[inline]
+    pub(super) fn of(prim: &PrimRef, kinds: &[LeafKind]) -> LeafKind {
+        kinds.get(prim.geometry as usize).copied().unwrap_or(LeafKind::Single)
+    }
+
+    /// Maximum number of primitives.
+    fn capacity(self) -> usize {
+        match self {
+            LeafKind::Triangles => LEAF_TRIANGLES,
+            LeafKind::Curves => LEAF_SPANS,
+            LeafKind::Single => 1,
+        }
+    }
+}
+
 /// A primitive and its bounds.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct PrimRef {
@@ -23,7 +53,7 @@ pub(super) struct PrimRef {
     /// Geometry, or [`PrimRef::INSTANCE`].
     pub geometry: u32,
     hi: Vec3,
-    /// Triangle or patch, or index of an instance.
+    /// Triangle, patch or first piece of a span of a curve, or index of an instance.
     pub primitive: u32,
 }
 
@@ -111,15 +141,17 @@ impl Binary {
     }
 }
 
-/// Builds the tree and reorders the primitives; `None` if there are none. A leaf has one primitive, or up to
-/// [`LEAF_TRIANGLES`] triangles.
-pub(super) fn build_binary(prims: &mut [PrimRef], is_triangle: &[bool]) -> Option<Binary> {
-    (!prims.is_empty()).then(|| Builder { is_triangle }.node(prims, 0, 0))
+/// Builds the tree and reorders the primitives; `None` if there are none. `leaf_kinds` are those of the geometries.
+pub(super) fn build_binary(prims: &mut [PrimRef], leaf_kinds: &[LeafKind]) -> Option<Binary> {
+    let has_triangles = prims.iter().any(|prim| LeafKind::of(prim, leaf_kinds) == LeafKind::Triangles);
+    let block = if has_triangles { LEAF_TRIANGLES } else { LEAF_SPANS } as u32;
+    (!prims.is_empty()).then(|| Builder { leaf_kinds, block }.node(prims, 0, 0))
 }
 
 struct Builder<'a> {
-    /// True for geometries that are meshes.
-    is_triangle: &'a [bool],
+    leaf_kinds: &'a [LeafKind],
+    /// Number of primitives of a block, for the cost of a split.
+    block: u32,
 }
 
 impl Builder<'_> {
@@ -128,7 +160,7 @@ impl Builder<'_> {
         if self.fits_a_leaf(prims) {
             return Binary { bounds: extent.bounds, kind: BinaryKind::Leaf { start, count: prims.len() } };
         }
-        let middle = if depth < MAX_SAH_DEPTH { split(prims, &extent) } else { prims.len() / 2 };
+        let middle = if depth < MAX_SAH_DEPTH { split(prims, &extent, self.block) } else { prims.len() / 2 };
         let parallel = prims.len() > PARALLEL_RANGE;
         let (left, right) = prims.split_at_mut(middle);
         let mut build_left = || self.node(left, start, depth + 1);
@@ -138,8 +170,8 @@ impl Builder<'_> {
     }
 
     fn fits_a_leaf(&self, prims: &[PrimRef]) -> bool {
-        let triangle = |p: &PrimRef| self.is_triangle.get(p.geometry as usize).copied().unwrap_or(false);
-        prims.len() == 1 || (prims.len() <= LEAF_TRIANGLES && prims.iter().all(triangle))
+        let kind = LeafKind::of(&prims[0], self.leaf_kinds);
+        prims.len() <= kind.capacity() && prims.iter().all(|prim| LeafKind::of(prim, self.leaf_kinds) == kind)
     }
 }
 
@@ -222,8 +254,8 @@ impl Bins {
         self
     }
 
-    /// The cheapest split between bins. The cost is area times number of triangle blocks, summed over both sides.
-    fn best_split(&self, bin_count: usize) -> Option<Split> {
+    /// The cheapest split between bins. The cost is area times number of blocks, summed over both sides.
+    fn best_split(&self, bin_count: usize, block: u32) -> Option<Split> {
         let mut best: Option<Split> = None;
         for axis in 0..3 {
             let (bounds, counts) = (&self.bounds[axis], &self.counts[axis]);
@@ -233,7 +265,7 @@ impl Bins {
             for i in (1..bin_count).rev() {
                 range = range.union(bounds[i]);
                 n += counts[i];
-                right_cost[i - 1] = side_cost(&range, n);
+                right_cost[i - 1] = side_cost(&range, n.div_ceil(block));
             }
 
             // The cheapest sum of left and right side
@@ -242,7 +274,7 @@ impl Bins {
             for i in 0..bin_count - 1 {
                 range = range.union(bounds[i]);
                 n += counts[i];
-                let cost = side_cost(&range, n) + right_cost[i];
+                let cost = side_cost(&range, n.div_ceil(block)) + right_cost[i];
                 if n > 0 && n < total && best.is_none_or(|best| cost < best.cost) {
                     best = Some(Split { axis, last_bin: i, cost });
                 }
@@ -262,12 +294,12 @@ struct Split {
 }
 
 #[inline]
-fn side_cost(range: &Range3, count: u32) -> f32 {
-    if count == 0 { 0.0 } else { range.half_area() * count.div_ceil(LEAF_TRIANGLES as u32) as f32 }
+fn side_cost(range: &Range3, blocks: u32) -> f32 {
+    if blocks == 0 { 0.0 } else { range.half_area() * blocks as f32 }
 }
 
 /// Partitions the primitives into a left and a right side, neither empty. Returns the length of the left side.
-fn split(prims: &mut [PrimRef], extent: &Extent) -> usize {
+fn split(prims: &mut [PrimRef], extent: &Extent, block: u32) -> usize {
     // Choose the split
     let binning = Binning::new(extent, prims.len());
     let bins = if prims.len() <= PARALLEL_BINNING {
@@ -276,7 +308,7 @@ fn split(prims: &mut [PrimRef], extent: &Extent) -> usize {
         let parts: Vec<Bins> = prims.par_chunks(PARALLEL_BINNING / 4).map(|chunk| Bins::of(chunk, &binning)).collect();
         parts.into_iter().reduce(Bins::union).expect("the range is not empty")
     };
-    let Some(Split { axis, last_bin, .. }) = bins.best_split(binning.count) else {
+    let Some(Split { axis, last_bin, .. }) = bins.best_split(binning.count, block) else {
         return prims.len() / 2;
     };
 

@@ -1,6 +1,6 @@
 //! The two-level hierarchy and its construction.
 
-use super::build::{PrimRef, build_binary};
+use super::build::{LeafKind, PrimRef, build_binary};
 use super::tree::Tree;
 use crate::accel::{AccelStats, AlphaTest};
 use crate::geometry::{AlphaSource, Geometry, GeometrySet, Group, Instance, Shape, Visibility};
@@ -29,17 +29,26 @@ impl Bvh {
     /// Builds the trees in parallel. The result does not depend on the number of threads. Without `alpha`, alpha masks
     /// are opaque.
     pub fn new(geometry: Arc<GeometrySet>, alpha: Option<Arc<dyn AlphaSource>>) -> Bvh {
+        Self::of_shapes(geometry, alpha, |_| true)
+    }
+
+    /// Like [`Self::new`], for the shapes for which `is_wanted` is true.
+    pub(in crate::accel) fn of_shapes(
+        geometry: Arc<GeometrySet>,
+        alpha: Option<Arc<dyn AlphaSource>>,
+        is_wanted: impl Fn(&Shape) -> bool + Sync,
+    ) -> Bvh {
         // Trees of the groups
         let start = Instant::now();
         let flags = geometry.geometries.iter().map(|g| flags_of(g, alpha.is_some())).collect();
-        let is_triangle: Vec<bool> = geometry.geometries.iter().map(|g| matches!(g.shape, Shape::Mesh(_))).collect();
-        let build = |prims| build_tree(&geometry, &is_triangle, prims);
-        let built: Vec<BuiltTree> =
-            geometry.groups.par_iter().map(|group| build(group_prims(&geometry, group))).collect();
+        let leaf_kinds: Vec<LeafKind> = geometry.geometries.iter().map(|g| leaf_kind(&g.shape)).collect();
+        let build = |prims| build_tree(&geometry, &leaf_kinds, prims);
+        let prims_of = |group| group_prims(&geometry, group, &is_wanted);
+        let built: Vec<BuiltTree> = geometry.groups.par_iter().map(|group| build(prims_of(group))).collect();
         let group_bounds: Vec<Bounds3> = built.iter().map(|b| b.tree.bounds).collect();
 
         // Tree of the root
-        let mut prims = group_prims(&geometry, &geometry.root);
+        let mut prims = prims_of(&geometry.root);
         prims.extend(instance_prims(&geometry, &group_bounds));
         let root = build(prims);
 
@@ -62,6 +71,14 @@ impl Bvh {
     }
 }
 
+fn leaf_kind(shape: &Shape) -> LeafKind {
+    match shape {
+        Shape::Mesh(_) => LeafKind::Triangles,
+        Shape::Curves(_) => LeafKind::Curves,
+        Shape::Bilinear(_) | Shape::Quadric(_) => LeafKind::Single,
+    }
+}
+
 fn flags_of(geometry: &Geometry, has_alpha_source: bool) -> u32 {
     let tested = if geometry.alpha.is_some() && has_alpha_source { TESTED } else { 0 };
     geometry.visibility.0 & Visibility::ALL.0 | tested
@@ -73,26 +90,26 @@ struct BuiltTree {
     peak_bytes: u64,
 }
 
-/// Builds a tree. `is_triangle` tells of each geometry whether it is a mesh.
-fn build_tree(geometry: &GeometrySet, is_triangle: &[bool], mut prims: Vec<PrimRef>) -> BuiltTree {
-    let binary = build_binary(&mut prims, is_triangle);
-    let tree = Tree::new(geometry, &prims, binary.as_ref(), is_triangle);
+/// Builds a tree. `leaf_kinds` are those of the geometries.
+fn build_tree(geometry: &GeometrySet, leaf_kinds: &[LeafKind], mut prims: Vec<PrimRef>) -> BuiltTree {
+    let binary = build_binary(&mut prims, leaf_kinds);
+    let tree = Tree::new(geometry, &prims, binary.as_ref(), leaf_kinds);
     let binary_bytes = binary.map_or(0, |root| root.bytes());
     let peak_bytes = tree.bytes() + size_of_val(&prims[..]) as u64 + binary_bytes;
     BuiltTree { tree, peak_bytes }
 }
 
-/// The finite primitives of a group that are visible to some ray.
-fn group_prims(set: &GeometrySet, group: &Group) -> Vec<PrimRef> {
+/// The finite primitives of a group that are wanted and visible to some ray.
+fn group_prims(set: &GeometrySet, group: &Group, is_wanted: impl Fn(&Shape) -> bool) -> Vec<PrimRef> {
     // Hidden geometries have none
     let mut prims = Vec::new();
     for &id in &group.geometries {
         let geometry = &set.geometries[id as usize];
-        if geometry.visibility.0 & Visibility::ALL.0 == 0 {
+        if geometry.visibility.0 & Visibility::ALL.0 == 0 || !is_wanted(&geometry.shape) {
             continue;
         }
 
-        // One primitive per triangle, patch, quadric or curve piece
+        // One primitive per triangle, patch, quadric or span of a curve
         match &geometry.shape {
             Shape::Mesh(mesh) => prims.par_extend(
                 (0..mesh.triangle_count()).into_par_iter().filter_map(|i| PrimRef::of_points(id, i, &mesh.triangle(i))),
@@ -101,11 +118,11 @@ fn group_prims(set: &GeometrySet, group: &Group) -> Vec<PrimRef> {
                 prims.extend((0..mesh.patch_count()).filter_map(|i| PrimRef::of_points(id, i, &mesh.patch(i))));
             }
             Shape::Quadric(quadric) => prims.extend(PrimRef::of_bounds(id, 0, quadric.bounds())),
-            Shape::Curves(curves) => prims.par_extend(
-                (0..curves.piece_count())
-                    .into_par_iter()
-                    .filter_map(|i| PrimRef::of_bounds(id, i, curves.piece_bounds(i))),
-            ),
+            Shape::Curves(curves) => {
+                let spans = (0..curves.curves().len()).into_par_iter().flat_map_iter(|curve| curves.spans_of(curve));
+                let prim = |first: u32| PrimRef::of_bounds(id, first as usize, curves.capsule(first).bounds());
+                prims.par_extend(spans.filter_map(prim));
+            }
         }
     }
     prims

@@ -2,7 +2,8 @@
 
 use super::*;
 use crate::accel::scenes_for_tests::{
-    Stripes, mixed_scene, random_patches, random_quadric, random_rays, separate_triangles, soup,
+    Stripes, curve_rays, curve_scene, mixed_scene, random_patches, random_quadric, random_rays, separate_triangles,
+    soup,
 };
 use crate::accel::{Accel, Coherence, Hit, RayBatch};
 use crate::geometry::reference_for_tests::random_point;
@@ -20,15 +21,14 @@ fn all_hits(set: &GeometrySet, id: GeometryId, ray: &Ray, instance: u32, hits: &
         hits.borrow_mut().push((Hit { t, uv, geometry: id, primitive: primitive as u32, instance }, crossing));
     };
     let shape = &set.geometries[id as usize].shape;
-    let push_all = |count: usize| {
-        for i in 0..count {
-            let none = shape.intersect(i as u32, ray, |hit, crossing| {
-                push(hit.t, hit.uv, i, crossing);
-                false
-            });
-            assert_eq!(none, None);
-        }
+    let push_all_of = |primitive: u32| {
+        let none = shape.intersect(primitive, ray, |hit, crossing| {
+            push(hit.t, hit.uv, primitive as usize, crossing);
+            false
+        });
+        assert_eq!(none, None);
     };
+    let push_all = |count: usize| (0..count as u32).for_each(push_all_of);
 
     // Triangles are tested one by one
     match shape {
@@ -42,7 +42,7 @@ fn all_hits(set: &GeometrySet, id: GeometryId, ray: &Ray, instance: u32, hits: &
         }
         Shape::Quadric(_) => push_all(1),
         Shape::Bilinear(mesh) => push_all(mesh.patch_count()),
-        Shape::Curves(curves) => push_all(curves.piece_count()),
+        Shape::Curves(set) => (0..set.curves().len()).flat_map(|i| set.pieces_of(i)).for_each(push_all_of),
     }
 }
 
@@ -109,6 +109,18 @@ fn answers_equal_brute_force_on_mixed_scenes() {
         let (hits, occluded) = assert_exact(&set, Some(Arc::new(Stripes)), &rays);
         assert!(opaque_hits > 300 && hits > 100 && opaque_hits > hits, "{opaque_hits} {hits}");
         assert!(opaque_occluded > 300 && occluded > 100 && opaque_occluded > occluded, "{opaque_occluded} {occluded}");
+    }
+}
+
+#[test]
+fn answers_equal_brute_force_on_curves() {
+    for seed in 0..3 {
+        let set = curve_scene(seed, 3);
+        let rays = curve_rays(&set, 2000, seed);
+        let (hits, occluded) = assert_exact(&set, None, &rays);
+        let (masked_hits, masked_occluded) = assert_exact(&set, Some(Arc::new(Stripes)), &rays);
+        assert!(hits > 700 && occluded > 700, "{hits} {occluded}");
+        assert!(masked_hits < hits && masked_occluded < occluded, "{masked_hits} {masked_occluded}");
     }
 }
 

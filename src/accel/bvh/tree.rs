@@ -1,10 +1,13 @@
-//! The tree for traversal: nodes of eight boxes and blocks of four triangles, as structures of arrays.
+//! The tree for traversal: nodes of eight boxes, blocks of four triangles and blocks of eight spans of curves, as
+//! structures of arrays.
 
-use super::build::{Binary, BinaryKind, LEAF_TRIANGLES, PrimRef};
+use super::build::{Binary, BinaryKind, LEAF_TRIANGLES, LeafKind, PrimRef};
+use super::curve_block::CurveBlock;
 use crate::geometry::triangle::RayPrecomputed;
 use crate::geometry::{GeometrySet, Shape};
 use lumiris_numbers::math::{Bounds3, Vec3, Vec4};
 use rayon::prelude::*;
+use std::ops::Range;
 
 /// Growth of every box, relative to its largest coordinate. Together with the same growth of the ray's origin it covers
 /// the rounding error of the triangle test, which moves corners by up to 5·2⁻²⁴ of their distance from the origin.
@@ -19,6 +22,7 @@ pub(super) enum Child {
     Node(usize),
     Block(usize),
     Other(usize),
+    Curves(usize),
 }
 
 impl ChildRef {
@@ -37,7 +41,8 @@ impl ChildRef {
         match self.0 >> Self::KIND_SHIFT {
             0 => Child::Node(index),
             1 => Child::Block(index),
-            _ => Child::Other(index),
+            2 => Child::Other(index),
+            _ => Child::Curves(index),
         }
     }
 }
@@ -107,10 +112,10 @@ impl Block {
     }
 }
 
-/// A primitive that is not a triangle, or an instance.
+/// A quadric, a bilinear patch or an instance.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Other {
-    /// Quadric, bilinear patch, or curve piece.
+    /// Quadric or bilinear patch.
     Exact {
         geometry: u32,
         primitive: u32,
@@ -126,6 +131,7 @@ pub(super) struct Tree {
     pub root: Option<ChildRef>,
     pub nodes: Vec<Node>,
     pub blocks: Vec<Block>,
+    pub curves: Vec<CurveBlock>,
     pub others: Vec<Other>,
 }
 
@@ -135,54 +141,70 @@ impl Tree {
         geometry: &GeometrySet,
         prims: &[PrimRef],
         binary: Option<&Binary>,
-        is_triangle: &[bool],
+        leaf_kinds: &[LeafKind],
     ) -> Self {
         // Nodes, and ranges of primitives
-        let mut collapse = Collapse { prims, is_triangle, nodes: Vec::new(), leaves: Vec::new(), others: Vec::new() };
+        let mut collapse = Collapse {
+            prims,
+            leaf_kinds,
+            nodes: Vec::new(),
+            triangles: Vec::new(),
+            curves: Vec::new(),
+            others: Vec::new(),
+        };
         let root = binary.map(|binary| {
             let root = collapse.place(binary);
             collapse.fill(root, binary);
             root
         });
-        let Collapse { mut nodes, leaves, mut others, .. } = collapse;
+        let Collapse { mut nodes, triangles, curves, mut others, .. } = collapse;
         nodes.shrink_to_fit();
         others.shrink_to_fit();
 
-        // Blocks of triangles, in parallel
-        let blocks =
-            leaves.par_iter().map(|&(start, count)| Block::new(geometry, &prims[start..start + count])).collect();
+        // Blocks, in parallel
+        let blocks = triangles.into_par_iter().map(|leaf| Block::new(geometry, &prims[leaf])).collect();
+        let curves = curves.into_par_iter().map(|leaf| CurveBlock::new(geometry, &prims[leaf])).collect();
         let bounds = binary.map_or(Bounds3::EMPTY, |b| Bounds3 { min: b.bounds.lo.into(), max: b.bounds.hi.into() });
-        Tree { bounds, root, nodes, blocks, others }
+        Tree { bounds, root, nodes, blocks, curves, others }
     }
 
     /// Memory (bytes).
     pub(super) fn bytes(&self) -> u64 {
-        (size_of_val(&self.nodes[..]) + size_of_val(&self.blocks[..]) + size_of_val(&self.others[..])) as u64
+        let leaves = size_of_val(&self.blocks[..]) + size_of_val(&self.curves[..]) + size_of_val(&self.others[..]);
+        (size_of_val(&self.nodes[..]) + leaves) as u64
     }
 }
 
 struct Collapse<'a> {
     prims: &'a [PrimRef],
-    is_triangle: &'a [bool],
+    leaf_kinds: &'a [LeafKind],
     nodes: Vec<Node>,
-    /// Range of primitives of each block.
-    leaves: Vec<(usize, usize)>,
+    /// Range of primitives of each block of triangles.
+    triangles: Vec<Range<usize>>,
+    /// Range of primitives of each block of curves.
+    curves: Vec<Range<usize>>,
     others: Vec<Other>,
 }
 
 impl Collapse<'_> {
     fn leaf(&mut self, start: usize, count: usize) -> ChildRef {
         let PrimRef { geometry, primitive, .. } = self.prims[start];
-        if self.is_triangle.get(geometry as usize).copied().unwrap_or(false) {
-            self.leaves.push((start, count));
-            return ChildRef::new(1, self.leaves.len() - 1);
+        match LeafKind::of(&self.prims[start], self.leaf_kinds) {
+            LeafKind::Triangles => {
+                self.triangles.push(start..start + count);
+                ChildRef::new(1, self.triangles.len() - 1)
+            }
+            LeafKind::Curves => {
+                self.curves.push(start..start + count);
+                ChildRef::new(3, self.curves.len() - 1)
+            }
+            LeafKind::Single => {
+                let is_instance = geometry == PrimRef::INSTANCE;
+                let exact = Other::Exact { geometry, primitive };
+                self.others.push(if is_instance { Other::Instance(primitive) } else { exact });
+                ChildRef::new(2, self.others.len() - 1)
+            }
         }
-        self.others.push(if geometry == PrimRef::INSTANCE {
-            Other::Instance(primitive)
-        } else {
-            Other::Exact { geometry, primitive }
-        });
-        ChildRef::new(2, self.others.len() - 1)
     }
 
     /// The reference to a binary subtree: a leaf, or a new node that is filled later.

@@ -1,10 +1,11 @@
 //! Traversal of both levels by a single ray.
 
+use super::curve_block::{CurveBlock, CurveRay};
 use super::hierarchy::{Bvh, TESTED};
 use super::tree::{BOX_GROWTH, Block, Child, ChildRef, Node, Other, Tree};
 use crate::accel::{Accel, AccelStats, Coherence, Hit, RayBatch};
 use crate::geometry::triangle::{RayPrecomputed, intersect_triangle};
-use crate::geometry::{LocalHit, Visibility};
+use crate::geometry::{LocalHit, Shape, Visibility};
 use lumiris_numbers::math::{Ray, Vec4, gamma};
 
 /// A query along a ray.
@@ -29,8 +30,9 @@ pub(super) struct Closest {
 }
 
 impl Closest {
-    pub(super) fn new(t_max: f32) -> Self {
-        Closest { limit: t_max, best: None }
+    /// `best` is a hit that is known already.
+    fn new(t_max: f32, best: Option<Hit>) -> Self {
+        Closest { limit: best.map_or(t_max, |hit| hit.t), best }
     }
 }
 
@@ -189,6 +191,7 @@ impl<'a, Q: Query> Walk<'a, Q> {
     fn tree(&mut self, tree: &'a Tree, ray: &RayPrecomputed, instance: u32) -> bool {
         let Some(root) = tree.root else { return false };
         let slabs = Slabs::new(&ray.ray);
+        let mut curve_ray = None;
         let base = self.stack.len();
         self.stack.push(Pending { child: root, entry: 0.0 });
         while self.stack.len() > base {
@@ -208,6 +211,10 @@ impl<'a, Q: Query> Walk<'a, Q> {
                     }
                     Child::Block(index) => break self.block(&tree.blocks[index], ray, instance),
                     Child::Other(index) => break self.other(tree.others[index], ray, instance),
+                    Child::Curves(index) => {
+                        let curve_ray = curve_ray.get_or_insert_with(|| CurveRay::new(&ray.ray, tree.bounds));
+                        break self.curves(&tree.curves[index], ray, curve_ray, instance);
+                    }
                 }
             };
             if done {
@@ -287,6 +294,27 @@ impl<'a, Q: Query> Walk<'a, Q> {
         }
     }
 
+    fn curves(&mut self, block: &CurveBlock, ray: &RayPrecomputed, curve_ray: &CurveRay, instance: u32) -> bool {
+        let bvh = self.bvh;
+        let mut lanes = block.candidates(curve_ray, self.query.limit());
+        while lanes != 0 {
+            let lane = lanes.trailing_zeros() as usize & 7;
+            lanes &= lanes - 1;
+            let (geometry, first) = (block.geometry[lane], block.first[lane]);
+            let shape = &bvh.geometry.geometries[geometry as usize].shape;
+            let Shape::Curves(curves) = shape else { continue };
+            let ray = Ray { t_max: self.query.limit().next_up(), ..ray.ray };
+            for (primitive, local) in (first..).zip(curves.intersect_span(first, &ray)) {
+                let Some(local) = local else { continue };
+                let hit = Hit { t: local.t, uv: local.uv, geometry, primitive, instance };
+                if self.query.limit() >= hit.t && self.accepts(&hit, 0) && self.query.take(hit) {
+                    return true;
+                }
+            }
+        }
+        false
+    }
+
     /// Traverses an instance. Ray parameters stay the same in world space, because the direction is transformed without
     /// normalisation.
     fn instance(&mut self, index: u32) -> bool {
@@ -312,23 +340,37 @@ impl<'a, Q: Query> Walk<'a, Q> {
     }
 }
 
+impl Bvh {
+    /// Replaces hits by preceding ones.
+    pub(in crate::accel) fn intersect_before(&self, rays: &RayBatch, hits: &mut [Option<Hit>]) {
+        let mut stack = Vec::with_capacity(128);
+        for (i, hit) in hits.iter_mut().enumerate() {
+            let ray = rays.get(i);
+            *hit = Walk::new(self, &ray, Closest::new(ray.t_max, *hit), &mut stack).run().best;
+        }
+    }
+
+    /// Tests the rays that are not occluded yet.
+    pub(in crate::accel) fn occlude_others(&self, rays: &RayBatch, occluded: &mut [bool]) {
+        let mut stack = Vec::with_capacity(128);
+        for (i, occluded) in occluded.iter_mut().enumerate().filter(|(_, occluded)| !**occluded) {
+            let ray = rays.get(i);
+            *occluded = Walk::new(self, &ray, Any::new(ray.t_max), &mut stack).run().found;
+        }
+    }
+}
+
 impl Accel for Bvh {
     fn intersect(&self, rays: &RayBatch, _coherence: Coherence, hits: &mut Vec<Option<Hit>>) {
         hits.clear();
-        let mut stack = Vec::with_capacity(128);
-        hits.extend((0..rays.len()).map(|i| {
-            let ray = rays.get(i);
-            Walk::new(self, &ray, Closest::new(ray.t_max), &mut stack).run().best
-        }));
+        hits.resize(rays.len(), None);
+        self.intersect_before(rays, hits);
     }
 
     fn occluded(&self, rays: &RayBatch, _coherence: Coherence, occluded: &mut Vec<bool>) {
         occluded.clear();
-        let mut stack = Vec::with_capacity(128);
-        occluded.extend((0..rays.len()).map(|i| {
-            let ray = rays.get(i);
-            Walk::new(self, &ray, Any::new(ray.t_max), &mut stack).run().found
-        }));
+        occluded.resize(rays.len(), false);
+        self.occlude_others(rays, occluded);
     }
 
     fn stats(&self) -> AccelStats {

@@ -2,7 +2,7 @@
 //! speed of a query, and thereby the cost of conversion and of exact hits. Only `crates/bench` uses them.
 //!
 //! The scene is built as in the renderer, but without the flag that allows a filter function per query. Quadrics,
-//! patches and alpha masks use callbacks as in the renderer.
+//! patches and alpha masks use callbacks as in the renderer. Curves are left out.
 #![allow(unsafe_code)]
 
 use super::calls::{self, Mode, QueryKind, RayHitPacket, RayPacket, Valid};
@@ -57,7 +57,7 @@ impl Bare {
         let start = Instant::now();
         let device = Arc::new(Device::new(c"", None)?);
         let has_only_triangles = has_only_triangles(&set);
-        let calls_back = set.geometries.iter().any(|g| !matches!(g.shape, Shape::Mesh(_)));
+        let calls_back = set.geometries.iter().any(|g| matches!(g.shape, Shape::Quadric(_) | Shape::Bilinear(_)));
         let world = Arc::new(SceneIds::new(set));
         let root = Builder { device: &device, world: &world, alpha, query_filter: false }.root()?;
         Ok(Bare { root, world, calls_back, has_only_triangles, build_time: start.elapsed() })

@@ -1,4 +1,4 @@
-//! Callbacks from Embree: nearest hits, alpha masks, quadrics, bilinear patches and curves.
+//! Callbacks from Embree: nearest hits, alpha masks, quadrics and bilinear patches.
 //!
 //! Embree passes N rays at once as a structure of arrays with N elements per field. Lanes whose `valid` is not −1 are
 //! ignored. Fields are addressed by their index in the order of the header, which is the same for any N, including 1.
@@ -207,8 +207,7 @@ pub(super) unsafe extern "C" fn bounds(arguments: *const sys::RTCBoundsFunctionA
         let box_of = || match &geometry.world.set.geometries[geometry.id as usize].shape {
             Shape::Bilinear(mesh) => Bounds3::from_points(mesh.patch(arguments.primID as usize)),
             Shape::Quadric(quadric) => quadric.bounds(),
-            Shape::Curves(curves) => curves.piece_bounds(arguments.primID as usize),
-            Shape::Mesh(_) => Bounds3::EMPTY,
+            Shape::Mesh(_) | Shape::Curves(_) => Bounds3::EMPTY,
         };
         // An empty box excludes the primitive
         let found = catch_unwind(AssertUnwindSafe(box_of)).unwrap_or(Bounds3::EMPTY);

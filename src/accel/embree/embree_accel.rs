@@ -33,6 +33,11 @@
 //! random and grazing rays none. With AVX-512, AVX and SSE 4.2 none differ there either. The tests repeat this with
 //! fewer rays. Rays that leave a surface by [`lumiris_numbers::math::ray::offset_origin`] do not hit it again.
 //!
+//! # Curves
+//!
+//! Curves are not in Embree's scene. The rays of a batch pass the pure-Rust hierarchy after Embree, with the hits so
+//! far. As primitives with callbacks, curves took several times the time and memory (docs/measurements/curves).
+//!
 //! # Cost
 //!
 //! Speed relative to a bare loop over Embree with prefilled packets (`benches/embree.rs`: 10⁶ pixel-sized triangles,
@@ -45,7 +50,7 @@ use super::device::Device;
 use super::error::EmbreeError;
 use super::scene::EmbreeScene;
 use super::scene_ids::SceneIds;
-use crate::accel::{Accel, AccelStats, AlphaTest, Coherence, Hit, RayBatch};
+use crate::accel::{Accel, AccelStats, AlphaTest, Bvh, Coherence, Hit, RayBatch};
 use crate::geometry::{AlphaSource, GeometryId, GeometrySet, Shape};
 use embree4_sys::RTCDeviceProperty as Property;
 use std::ffi::CString;
@@ -80,16 +85,18 @@ impl Widths {
     }
 }
 
-/// True if the scene has only triangles and no instances. In other scenes Embree 3.13.5 may not return from coherent
+/// True if Embree gets only triangles and no instances. In other scenes Embree 3.13.5 may not return from coherent
 /// queries for packets of 16 (observed for occlusion).
 pub(super) fn has_only_triangles(set: &GeometrySet) -> bool {
-    set.instances.is_empty() && set.geometries.iter().all(|g| matches!(g.shape, Shape::Mesh(_)))
+    set.instances.is_empty() && set.geometries.iter().all(|g| matches!(g.shape, Shape::Mesh(_) | Shape::Curves(_)))
 }
 
 /// Embree's data structures for a scene.
 pub struct EmbreeAccel {
     pub(super) root: Arc<EmbreeScene>,
     pub(super) world: Arc<SceneIds>,
+    /// The hierarchy of the curves, if there are any.
+    pub(super) curves: Option<Arc<Bvh>>,
     widths: Widths,
     pub(super) has_only_triangles: bool,
     has_motion: bool,
@@ -117,13 +124,22 @@ impl EmbreeAccel {
         let widths = packet_widths(&device, options.packet_width, has_only_triangles(&geometry))?;
         let set = Arc::clone(&geometry);
         let world = Arc::new(SceneIds::new(geometry));
-        let builder = Builder { device: &device, world: &world, alpha, query_filter: true };
+        let builder = Builder { device: &device, world: &world, alpha: alpha.clone(), query_filter: true };
         let root = Arc::new(builder.root()?);
 
+        // The hierarchy of the curves
+        let is_curves = |shape: &Shape| matches!(shape, Shape::Curves(_));
+        let has_curves = set.geometries.iter().any(|g| is_curves(&g.shape));
+        let curves = has_curves.then(|| Arc::new(Bvh::of_shapes(Arc::clone(&set), alpha, is_curves)));
+        let of_curves = curves.as_ref().map_or(AccelStats::default(), |bvh| bvh.stats());
+
         let (has_motion, has_only_triangles) = (set.has_motion(), has_only_triangles(&set));
-        let build_seconds = start.elapsed().as_secs_f64();
-        let stats = AccelStats { bytes: device.bytes(), peak_bytes: device.peak_bytes(), build_seconds };
-        Ok(EmbreeAccel { root, world, widths, has_only_triangles, has_motion, stats })
+        let stats = AccelStats {
+            bytes: device.bytes() + of_curves.bytes,
+            peak_bytes: device.peak_bytes().max(device.bytes() + of_curves.peak_bytes),
+            build_seconds: start.elapsed().as_secs_f64(),
+        };
+        Ok(EmbreeAccel { root, world, curves, widths, has_only_triangles, has_motion, stats })
     }
 
     /// Rays per packet. With moving instances each ray has its own time and is traced singly.
@@ -140,17 +156,34 @@ impl EmbreeAccel {
     pub fn with_packet_width(&self, width: u32) -> Result<EmbreeAccel, EmbreeError> {
         let width = checked_width(width)?;
         let widths = Widths::all(width);
-        Ok(EmbreeAccel { root: Arc::clone(&self.root), world: Arc::clone(&self.world), widths, ..*self })
+        let (root, world, curves) = (Arc::clone(&self.root), Arc::clone(&self.world), self.curves.clone());
+        Ok(EmbreeAccel { root, world, curves, widths, ..*self })
     }
 }
 
 impl Accel for EmbreeAccel {
     fn intersect(&self, rays: &RayBatch, coherence: Coherence, hits: &mut Vec<Option<Hit>>) {
-        self.intersect_batch(rays, coherence, hits);
+        if self.world.is_empty() {
+            hits.clear();
+            hits.resize(rays.len(), None);
+        } else {
+            self.intersect_batch(rays, coherence, hits);
+        }
+        if let Some(curves) = &self.curves {
+            curves.intersect_before(rays, hits);
+        }
     }
 
     fn occluded(&self, rays: &RayBatch, coherence: Coherence, occluded: &mut Vec<bool>) {
-        self.occluded_batch(rays, coherence, occluded);
+        if self.world.is_empty() {
+            occluded.clear();
+            occluded.resize(rays.len(), false);
+        } else {
+            self.occluded_batch(rays, coherence, occluded);
+        }
+        if let Some(curves) = &self.curves {
+            curves.occlude_others(rays, occluded);
+        }
     }
 
     fn stats(&self) -> AccelStats {

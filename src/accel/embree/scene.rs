@@ -54,7 +54,8 @@ impl EmbreeGeometry {
             }
             Shape::Quadric(_) => Self::user(device, 1)?,
             Shape::Bilinear(mesh) => Self::user(device, mesh.patch_count())?,
-            Shape::Curves(curves) => Self::user(device, curves.piece_count())?,
+            // No scene has them
+            Shape::Curves(_) => Self::user(device, 0)?,
         };
         let user: *mut c_void = Arc::as_ptr(&context).cast_mut().cast();
         // SAFETY: the geometry, then the scene keeps the context, so it outlives the callbacks, which only read it.

@@ -60,7 +60,7 @@ impl Refined {
 }
 
 impl SceneIds {
-    /// Assigns ids to everything that rays can hit.
+    /// Assigns ids to everything that rays can hit except curves.
     pub(super) fn new(set: Arc<GeometrySet>) -> SceneIds {
         let members = |group: &Group| group.geometries.iter().copied().filter(|&id| can_be_met(&set, id)).collect();
         let groups: Vec<Vec<GeometryId>> = set.groups.iter().map(members).collect();
@@ -70,6 +70,11 @@ impl SceneIds {
             (0..set.instances.len() as u32).filter(|&i| filled(i) && set.instances[i as usize].is_usable()).collect();
         let group_from_world = set.instances.iter().map(Instance::group_from_world).collect();
         SceneIds { root, groups, instances, group_from_world, set }
+    }
+
+    /// True if Embree has nothing to trace.
+    pub(super) fn is_empty(&self) -> bool {
+        self.root.is_empty() && self.instances.is_empty()
     }
 
     /// The instance of an `instID`.
@@ -158,14 +163,15 @@ fn beside(ray: &Ray, triangle: [Vec3; 3]) -> Option<(f32, [f32; 2])> {
     (found.0.is_finite() && sum.is_finite()).then_some(found)
 }
 
-/// True if the geometry has primitives and is visible to some ray.
+/// True if the geometry has primitives for Embree and is visible to some ray.
 fn can_be_met(set: &GeometrySet, id: GeometryId) -> bool {
     let geometry = &set.geometries[id as usize];
     let count = match &geometry.shape {
         Shape::Mesh(mesh) => mesh.triangle_count(),
         Shape::Quadric(_) => 1,
         Shape::Bilinear(mesh) => mesh.patch_count(),
-        Shape::Curves(curves) => curves.piece_count(),
+        // Traced by the pure-Rust hierarchy
+        Shape::Curves(_) => 0,
     };
     count > 0 && geometry.visibility.0 & crate::geometry::Visibility::ALL.0 != 0
 }

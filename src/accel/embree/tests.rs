@@ -4,7 +4,8 @@ use super::*;
 use crate::accel::Bvh;
 use crate::accel::embree::ErrorCode;
 use crate::accel::scenes_for_tests::{
-    Stripes, mixed_scene, random_placement, random_rays, rippled_sphere, separate_triangles, soup,
+    Stripes, curve_rays, curve_scene, mixed_scene, random_placement, random_rays, rippled_sphere, separate_triangles,
+    soup,
 };
 use crate::geometry::reference_for_tests::{random_point, triangle_hit};
 use crate::geometry::{Geometry, Group, Instance, Shape, TriangleMesh, Visibility};
@@ -250,6 +251,33 @@ fn answers_agree_with_the_rust_tracer() {
         assert!(expected.iter().filter(|&&o| o).count() > 5_000);
         let differ = expected.iter().zip(&found).filter(|(a, b)| a != b).count();
         assert!(differ <= 3, "{differ}");
+    }
+}
+
+#[test]
+fn curves_among_triangles_are_hit_as_by_the_rust_tracer() {
+    for (seed, samples) in [(0, 1), (1, 3), (2, 1)] {
+        let set = curve_scene(seed, samples);
+        let rays = curve_rays(&set, 8000, seed);
+        let bvh = Bvh::new(Arc::clone(&set), Some(Arc::new(Stripes)));
+        let expected = intersect(&bvh, &rays, Coherence::Incoherent);
+        let expected_occluded = occluded(&bvh, &rays, Coherence::Incoherent);
+        let is_curve = |hit: &Hit| matches!(set.geometries[hit.geometry as usize].shape, Shape::Curves(_));
+        let curves = expected.iter().flatten().filter(|hit| is_curve(hit)).count();
+        let others = expected.iter().flatten().count() - curves;
+        assert!(curves > 1500 && others > 300, "{curves} {others}");
+
+        for (width, coherence) in WIDTHS.into_iter().flat_map(|w| COHERENCES.map(|c| (w, c))) {
+            let accel = embree(&set, width);
+            let found = intersect(&accel, &rays, coherence);
+            let found_occluded = occluded(&accel, &rays, coherence);
+            for i in 0..rays.len() {
+                let pair = [&found[i], &expected[i]];
+                let is_edge = is_at_edge(pair.map(|hit| if hit.is_some_and(|h| is_curve(&h)) { &None } else { hit }));
+                assert!(bits(pair[0]) == bits(pair[1]) || is_edge, "{width} {coherence:?} {i}: {pair:?}");
+                assert!(found_occluded[i] == expected_occluded[i] || is_edge, "{width} {coherence:?} {i}: occlusion");
+            }
+        }
     }
 }
 
