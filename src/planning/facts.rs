@@ -7,13 +7,12 @@ use super::constants::{FACT_RAYS, LIGHT_SAMPLES};
 use crate::accel::{Coherence, RayBatch};
 use crate::bsdfs::Bsdf;
 use crate::integrators::camera_sampler::CameraSampler;
-use crate::lights::{LightCtx, LightId, SampleOfLight};
+use crate::lights::{LightCtx, SampleOfLight};
 use crate::scene::{RenderJob, SurfaceInteraction};
 use lumiris_numbers::math::hash::{pcg4d, unit_f32};
 use lumiris_numbers::math::ray::SEGMENT_END;
 use lumiris_numbers::math::warp::sample_cosine_hemisphere;
 use lumiris_numbers::math::{Frame, Ray, Vec3};
-use std::collections::BTreeSet;
 
 /// Seed of the rays.
 const SEED: u32 = 0x66_61_63_74;
@@ -21,10 +20,12 @@ const SEED: u32 = 0x66_61_63_74;
 /// Facts of a scene.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Facts {
-    /// Number of lights with power. All triangles of a mesh count as one.
+    /// Number of lights with power, each triangle of an emitting mesh being one.
     pub lights: usize,
     /// Fraction of lights at infinity in the direct light at the surfaces visible to the camera.
     pub sky: f64,
+    /// Fraction of the light of all other lights that is occluded on the way to these surfaces.
+    pub hidden: f64,
     /// Fraction of these surfaces that are diffuse and next to another diffuse surface: a cosine-distributed ray hits
     /// one.
     pub diffuse_pairs: f64,
@@ -35,18 +36,12 @@ pub struct Facts {
 impl Facts {
     /// Measures the facts of the scene of a job.
     pub fn of(job: &RenderJob) -> Self {
-        // Lights, one per mesh
-        let set = &job.world.scene.lights;
-        let sources = set.sources();
-        let of_mesh = |light: &LightId| sources[*light as usize];
-        let meshes: BTreeSet<u32> = set.lit.iter().filter_map(of_mesh).collect();
-        let lights = meshes.len() + set.lit.iter().filter(|light| of_mesh(light).is_none()).count();
-        let mut facts = Facts { lights, ..Facts::default() };
-
         // Visible surfaces and their light
         let rays: Vec<Ray> = camera_rays(job).collect();
         let visible: Vec<SurfaceInteraction> = hits(job, &rays).into_iter().flatten().collect();
-        facts.sky = sky(job, &visible);
+        let light = DirectLight::at(job, &visible);
+        let lights = job.world.scene.lights.lit.len();
+        let mut facts = Facts { lights, sky: light.sky(), hidden: light.hidden(), ..Facts::default() };
 
         // Diffuse surfaces, and the surfaces around them
         let diffuse: Vec<&SurfaceInteraction> = visible.iter().filter(|at| is_diffuse(job, at)).collect();
@@ -90,37 +85,60 @@ fn cosine_ray(at: &SurfaceInteraction, i: u32) -> Ray {
     Ray { o: at.origin(d), d, t_max: f32::INFINITY, time: 0.0 }
 }
 
-/// Fraction of lights at infinity in the irradiance of surfaces, estimated by traced light samples; 0 if there is no
-/// light.
-fn sky(job: &RenderJob, visible: &[SurfaceInteraction]) -> f64 {
-    // Sample lights at each surface
-    let (mut segments, mut found) = (RayBatch::default(), Vec::new());
-    for (i, at) in (0..).zip(visible) {
-        let n = normal(at);
-        for k in 0..LIGHT_SAMPLES {
-            let [choice, u, v, _] = pcg4d([i, SEED, 1, k]).map(unit_f32);
-            let drawn = job.lights.sample(&LightCtx::on(at.surface.p, n), choice, [u, v]);
-            let Some(SampleOfLight { light, sample: s }) = drawn else { continue };
-            segments.push(&Ray { o: at.origin(s.wi), d: s.wi, t_max: s.t * SEGMENT_END, time: 0.0 });
-            let value = f64::from(s.li.luminance()) * f64::from(s.wi.dot(n).max(0.0)) / f64::from(s.pdf);
-            found.push((job.world.scene.lights.lights[light as usize].is_infinite(), value));
+/// The irradiance of surfaces, estimated by traced light samples.
+#[derive(Clone, Copy, Debug, Default)]
+struct DirectLight {
+    /// Light from infinity that arrives.
+    sky: f64,
+    /// Light of all other lights that arrives.
+    lamps: f64,
+    /// Light of all other lights that is occluded.
+    hidden: f64,
+}
+
+impl DirectLight {
+    fn at(job: &RenderJob, surfaces: &[SurfaceInteraction]) -> Self {
+        // Sample lights at each surface
+        let (mut segments, mut found) = (RayBatch::default(), Vec::new());
+        for (i, at) in (0..).zip(surfaces) {
+            let n = normal(at);
+            for k in 0..LIGHT_SAMPLES {
+                let [choice, u, v, _] = pcg4d([i, SEED, 1, k]).map(unit_f32);
+                let drawn = job.lights.sample(&LightCtx::on(at.surface.p, n), choice, [u, v]);
+                let Some(SampleOfLight { light, sample: s }) = drawn else { continue };
+                let value = f64::from(s.li.luminance()) * f64::from(s.wi.dot(n).max(0.0)) / f64::from(s.pdf);
+                if value.is_finite() {
+                    segments.push(&Ray { o: at.origin(s.wi), d: s.wi, t_max: s.t * SEGMENT_END, time: 0.0 });
+                    found.push((job.world.scene.lights.lights[light as usize].is_infinite(), value));
+                }
+            }
         }
+
+        // Trace shadow rays
+        let (mut occluded, mut light) = (Vec::new(), DirectLight::default());
+        job.world.accel.occluded(&segments, Coherence::Incoherent, &mut occluded);
+        for (&(is_sky, value), &is_hidden) in found.iter().zip(&occluded) {
+            match (is_sky, is_hidden) {
+                (true, false) => light.sky += value,
+                (true, true) => {}
+                (false, false) => light.lamps += value,
+                (false, true) => light.hidden += value,
+            }
+        }
+        light
     }
 
-    // Trace shadow rays
-    let mut occluded = Vec::new();
-    job.world.accel.occluded(&segments, Coherence::Incoherent, &mut occluded);
+    /// Fraction of the light from infinity; 0 if there is no light.
+    fn sky(&self) -> f64 {
+        let all = self.sky + self.lamps;
+        if all > 0.0 { self.sky / all } else { 0.0 }
+    }
 
-    // Sum the unoccluded light
-    let sum = |is_counted: fn(bool) -> bool| -> f64 {
-        let visible = found
-            .iter()
-            .zip(&occluded)
-            .filter(|((is_sky, v), hidden)| is_counted(*is_sky) && !**hidden && v.is_finite());
-        visible.map(|((_, value), _)| value).sum()
-    };
-    let (of_sky, all) = (sum(|is_sky| is_sky), sum(|_| true));
-    if all > 0.0 { of_sky / all } else { 0.0 }
+    /// Fraction of the light of lamps that is occluded; 0 without lamps.
+    fn hidden(&self) -> f64 {
+        let all = self.lamps + self.hidden;
+        if all > 0.0 { self.hidden / all } else { 0.0 }
+    }
 }
 
 /// The first hits of rays.

@@ -9,7 +9,7 @@
 //! | longer paths among diffuse surfaces | 3 samples, 2 later, shared by 4 × 4 pixels |
 //! | other paths, mostly of surfaces that are not diffuse | 8 samples, 3 of them from the BSDF, 2 later |
 //! | sky and lamps | fraction of the light samples for the sky: its fraction of the light |
-//! | 16 lights or more, most of them hidden according to photons | `contributing` instead of `mis` |
+//! | 16 lights or more, most of their light occluded | `contributing` instead of `mis` |
 //! | metal or glass, and lamps | one light path per four camera samples |
 //!
 //! Evidence: [docs/measurements/efficiency](../../../docs/measurements/efficiency/README.md). Given settings stay.
@@ -19,12 +19,10 @@ use super::constants::{
     OTHERS, OUTDOORS, SKY_FRACTIONS, UNSHARED,
 };
 use super::facts::Facts;
-use super::visibility_cache::{build_visibility_cache, visible_points};
+use super::visibility_cache::build_visibility_cache;
 use crate::integrators::exclusions::{self, Feature};
-use crate::lights::{LightCtx, PhotonCount, SurfacePoint};
 use crate::scene::RenderJob;
 use crate::settings::{Allocation, ContributingSettings, EstimatorKind, IntegratorKind, IntegratorSettings, Settings};
-use std::collections::BTreeSet;
 
 /// Chooses the open settings of `job` if its estimator is `auto`, and returns the facts. Runs on the threads of the
 /// current pool.
@@ -47,8 +45,8 @@ pub(super) fn apply(job: &mut RenderJob) -> Option<Facts> {
     let facts = Facts::of(job);
     let shares = sampling.allocation == Allocation::Auto && exclusions::allows(job, Feature::Sharing);
     job.change(|s| s.integrator = with_samples(&s.integrator, &facts, shares));
-    if facts.lights >= MANY_LIGHTS && !job.lights.samples_volumes() {
-        choose_contributing(job, &facts);
+    if facts.lights >= MANY_LIGHTS && facts.hidden >= MOST_HIDDEN && !job.lights.samples_volumes() {
+        choose_contributing(job);
     }
     if base.light_paths.is_none()
         && job.world.scene.materials.make_caustics()
@@ -95,35 +93,16 @@ fn with_samples(settings: &IntegratorSettings, facts: &Facts, shares: bool) -> I
     s
 }
 
-/// Chooses `contributing` if photons show that most lights are hidden from the visible points.
-fn choose_contributing(job: &mut RenderJob, facts: &Facts) {
+/// Chooses `contributing`, if it is possible and photons arrive.
+fn choose_contributing(job: &mut RenderJob) {
     let before = job.settings().integrator;
     let depth = before.depth();
     let s = IntegratorSettings { estimator: EstimatorKind::Contributing, ..before };
     if s.leaves_lights_out() || exclusions::refusal(job, &s).is_some() {
         return;
     }
-
-    // Photons that come straight from lights
     let Some(cache) = build_visibility_cache(job) else { return };
     job.lights.set_visibility_cache(Some(cache));
-    let points = visible_points(job);
-
-    // Some triangles of a lamp face away from any point, so lamps are counted instead of triangles
-    let sources = job.world.scene.lights.sources();
-    let lamp = |&PhotonCount { light, .. }: &_| sources[light as usize].map_or((1, light), |source| (0, source));
-    let count = |&SurfacePoint { p, n }: &_| {
-        let contributing = job.lights.contributing_lights(&LightCtx::on(p, n));
-        contributing.lights.iter().map(lamp).collect::<BTreeSet<_>>().len()
-    };
-    let visible = points.iter().map(count).sum::<usize>() as f64;
-    let all = (points.len() * facts.lights) as f64;
-
-    // Keep the cache if most lights are hidden
-    if points.is_empty() || 1.0 - visible / all < MOST_HIDDEN {
-        job.lights.set_visibility_cache(None);
-        return;
-    }
     let others = s.contributing.noncontributing_samples.or(Some(OTHERS[usize::from(depth > 1)]));
     let contributing = ContributingSettings { noncontributing_samples: others, ..s.contributing };
     job.change(|all| all.integrator = IntegratorSettings { contributing, ..s });

@@ -158,7 +158,20 @@ fn contributing_is_taken_where_most_of_many_lights_are_hidden() {
         })
         .collect();
     assert_eq!(estimator(&meshes), (EstimatorKind::Mis, false), "all lamps are seen, of their triangles few");
-    assert_eq!(estimator(&(lamps(3.0) + LAMP)), (EstimatorKind::Contributing, true), "one is seen");
+    assert_eq!(estimator(&(lamps(1.5) + LAMP)), (EstimatorKind::Contributing, true), "one is seen");
+    // One mesh of 32 lamps above the ceiling
+    let quad = |i: u32| {
+        let (x, z) = (0.2 * f64::from(i % 8) - 0.8, 0.2 * f64::from(i / 8) - 0.4);
+        format!("{x} 1.2 {z}  {} 1.2 {z}  {} 1.2 {}  {x} 1.2 {} ", x + 0.1, x + 0.1, z + 0.1, z + 0.1)
+    };
+    let corners: String = (0..32).map(quad).collect();
+    let triangles: String =
+        (0..32).map(|i| 4 * i).map(|i| format!("{i} {} {}  {i} {} {} ", i + 1, i + 2, i + 2, i + 3)).collect();
+    let mesh = format!(
+        "AttributeBegin AreaLightSource \"diffuse\" \"rgb L\" [ 99 99 99 ] Shape \"trianglemesh\" \"point3 P\" [ {corners} ] \
+         \"integer indices\" [ {triangles} ] AttributeEnd\n"
+    );
+    assert_eq!(estimator(&(mesh + LAMP)), (EstimatorKind::Contributing, true), "one mesh of hidden lamps");
 }
 
 /// Trials must find an improvement in cells that were not part of the choice, and a valid plan.

@@ -61,7 +61,7 @@ impl Leaf {
             }
             Leaf::Twig => {
                 let is_in_leaf = |i: u32| {
-                    let hand = if i % 2 == 0 { 1.0 } else { -1.0 };
+                    let hand = if i.is_multiple_of(2) { 1.0 } else { -1.0 };
                     let (cx, ct) = (hand * 0.45, 0.14 + 0.08 * i as f32);
                     // The axis of the leaf rises outwards
                     let (dx, dt) = ((x - cx) * hand, (t - ct) * 2.0);
