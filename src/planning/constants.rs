@@ -20,6 +20,8 @@ pub(super) const LIGHT_SAMPLES: u32 = 4;
 
 /// Samples per estimate if only direct light is rendered.
 pub(super) const DIRECT_SAMPLES: u32 = 8;
+/// The same of `contributing`.
+pub(super) const CONTRIBUTING_SAMPLES: u32 = 4;
 /// Sample counts of shared paths with few bounces, indoors and outdoors.
 pub(super) const INDOORS: PathSamples = PathSamples { first: 4, later: 3, edge: 6 };
 pub(super) const OUTDOORS: PathSamples = PathSamples { first: 6, later: 3, edge: 4 };
@@ -36,9 +38,9 @@ pub(super) const SKY_FRACTIONS: [f32; 5] = [0.125, 0.25, 0.5, 0.75, 0.875];
 pub(super) const MIN_PAIRS: f64 = 0.1;
 /// Minimum fraction of rays from diffuse surfaces that leave the scene, for a scene to be outdoors.
 pub(super) const OPEN: f64 = 0.5;
-/// Minimum number of lights, and minimum fraction of their light that is occluded, for `contributing`.
+/// Minimum number of lights, and minimum fraction of their samples that are occluded, for `contributing`.
 pub(super) const MANY_LIGHTS: usize = 16;
-pub(super) const MOST_HIDDEN: f64 = 0.6;
+pub(super) const MOST_HIDDEN: f64 = 0.75;
 /// Samples of noncontributing lights, in direct light and in paths.
 pub(super) const OTHERS: [u32; 2] = [2, 1];
 /// Light paths per camera sample.

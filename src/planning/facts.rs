@@ -24,7 +24,8 @@ pub struct Facts {
     pub lights: usize,
     /// Fraction of lights at infinity in the direct light at the surfaces visible to the camera.
     pub sky: f64,
-    /// Fraction of the light of all other lights that is occluded on the way to these surfaces.
+    /// Fraction of the light samples of all other lights that are occluded. The light sampler chooses them nearly in
+    /// proportion to their unoccluded light, and a count is less noisy than a sum.
     pub hidden: f64,
     /// Fraction of these surfaces that are diffuse and next to another diffuse surface: a cosine-distributed ray hits
     /// one.
@@ -92,8 +93,9 @@ struct DirectLight {
     sky: f64,
     /// Light of all other lights that arrives.
     lamps: f64,
-    /// Light of all other lights that is occluded.
-    hidden: f64,
+    /// Number of samples of all other lights, and of those that are occluded.
+    samples: u32,
+    occluded: u32,
 }
 
 impl DirectLight {
@@ -107,7 +109,7 @@ impl DirectLight {
                 let drawn = job.lights.sample(&LightCtx::on(at.surface.p, n), choice, [u, v]);
                 let Some(SampleOfLight { light, sample: s }) = drawn else { continue };
                 let value = f64::from(s.li.luminance()) * f64::from(s.wi.dot(n).max(0.0)) / f64::from(s.pdf);
-                if value.is_finite() {
+                if value > 0.0 && value.is_finite() {
                     segments.push(&Ray { o: at.origin(s.wi), d: s.wi, t_max: s.t * SEGMENT_END, time: 0.0 });
                     found.push((job.world.scene.lights.lights[light as usize].is_infinite(), value));
                 }
@@ -117,12 +119,12 @@ impl DirectLight {
         // Trace shadow rays
         let (mut occluded, mut light) = (Vec::new(), DirectLight::default());
         job.world.accel.occluded(&segments, Coherence::Incoherent, &mut occluded);
-        for (&(is_sky, value), &is_hidden) in found.iter().zip(&occluded) {
-            match (is_sky, is_hidden) {
-                (true, false) => light.sky += value,
-                (true, true) => {}
-                (false, false) => light.lamps += value,
-                (false, true) => light.hidden += value,
+        for (&(is_sky, value), &is_occluded) in found.iter().zip(&occluded) {
+            let sum = if is_sky { &mut light.sky } else { &mut light.lamps };
+            *sum += if is_occluded { 0.0 } else { value };
+            if !is_sky {
+                light.samples += 1;
+                light.occluded += u32::from(is_occluded);
             }
         }
         light
@@ -134,10 +136,9 @@ impl DirectLight {
         if all > 0.0 { self.sky / all } else { 0.0 }
     }
 
-    /// Fraction of the light of lamps that is occluded; 0 without lamps.
+    /// Fraction of the samples of lamps that are occluded; 0 without samples.
     fn hidden(&self) -> f64 {
-        let all = self.lamps + self.hidden;
-        if all > 0.0 { self.hidden / all } else { 0.0 }
+        f64::from(self.occluded) / f64::from(self.samples.max(1))
     }
 }
 

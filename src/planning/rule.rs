@@ -9,14 +9,14 @@
 //! | longer paths among diffuse surfaces | 3 samples, 2 later, shared by 4 × 4 pixels |
 //! | other paths, mostly of surfaces that are not diffuse | 8 samples, 3 of them from the BSDF, 2 later |
 //! | sky and lamps | fraction of the light samples for the sky: its fraction of the light |
-//! | 16 lights or more, most of their light occluded | `contributing` instead of `mis` |
+//! | 16 lights or more, three in four of their samples occluded | `contributing`, with 4 samples of direct light |
 //! | metal or glass, and lamps | one light path per four camera samples |
 //!
 //! Evidence: [docs/measurements/efficiency](../../../docs/measurements/efficiency/README.md). Given settings stay.
 
 use super::constants::{
-    DIRECT_SAMPLES, FEW_BOUNCES, GLOSSY_BSDF, INDOORS, LIGHT_PATHS, LONG, MANY_LIGHTS, MIN_PAIRS, MOST_HIDDEN, OPEN,
-    OTHERS, OUTDOORS, SKY_FRACTIONS, UNSHARED,
+    CONTRIBUTING_SAMPLES, DIRECT_SAMPLES, FEW_BOUNCES, GLOSSY_BSDF, INDOORS, LIGHT_PATHS, LONG, MANY_LIGHTS, MIN_PAIRS,
+    MOST_HIDDEN, OPEN, OTHERS, OUTDOORS, SKY_FRACTIONS, UNSHARED,
 };
 use super::facts::Facts;
 use super::visibility_cache::build_visibility_cache;
@@ -46,7 +46,7 @@ pub(super) fn apply(job: &mut RenderJob) -> Option<Facts> {
     let shares = sampling.allocation == Allocation::Auto && exclusions::allows(job, Feature::Sharing);
     job.change(|s| s.integrator = with_samples(&s.integrator, &facts, shares));
     if facts.lights >= MANY_LIGHTS && facts.hidden >= MOST_HIDDEN && !job.lights.samples_volumes() {
-        choose_contributing(job);
+        choose_contributing(job, &base);
     }
     if base.light_paths.is_none()
         && job.world.scene.materials.make_caustics()
@@ -93,8 +93,8 @@ fn with_samples(settings: &IntegratorSettings, facts: &Facts, shares: bool) -> I
     s
 }
 
-/// Chooses `contributing`, if it is possible and photons arrive.
-fn choose_contributing(job: &mut RenderJob) {
+/// Chooses `contributing`, if it is possible and photons arrive. `base` are the given settings.
+fn choose_contributing(job: &mut RenderJob, base: &IntegratorSettings) {
     let before = job.settings().integrator;
     let depth = before.depth();
     let s = IntegratorSettings { estimator: EstimatorKind::Contributing, ..before };
@@ -105,5 +105,6 @@ fn choose_contributing(job: &mut RenderJob) {
     job.lights.set_visibility_cache(Some(cache));
     let others = s.contributing.noncontributing_samples.or(Some(OTHERS[usize::from(depth > 1)]));
     let contributing = ContributingSettings { noncontributing_samples: others, ..s.contributing };
-    job.change(|all| all.integrator = IntegratorSettings { contributing, ..s });
+    let samples = if depth > 1 { s.samples } else { base.samples.or(Some(CONTRIBUTING_SAMPLES)) };
+    job.change(|all| all.integrator = IntegratorSettings { contributing, samples, ..s });
 }
