@@ -198,7 +198,8 @@ impl Curve {
         (p0 - p1 * 2.0 + p2).length().max((p1 - p2 * 2.0 + p3).length())
     }
 
-    /// Number of pieces: each deviates from a straight line by at most a twentieth of the width, and boxes are tight.
+    /// Number of pieces: each deviates from a straight line by at most a twentieth of the width, and none is much longer
+    /// than wide.
     fn pieces(&self) -> u32 {
         let [p0, p1, p2, p3] = self.points;
         let width = self.width[0].max(self.width[1]).max(f32::MIN_POSITIVE);

@@ -163,24 +163,14 @@ impl EmbreeAccel {
 
 impl Accel for EmbreeAccel {
     fn intersect(&self, rays: &RayBatch, coherence: Coherence, hits: &mut Vec<Option<Hit>>) {
-        if self.world.is_empty() {
-            hits.clear();
-            hits.resize(rays.len(), None);
-        } else {
-            self.intersect_batch(rays, coherence, hits);
-        }
+        self.intersect_batch(rays, coherence, hits);
         if let Some(curves) = &self.curves {
             curves.intersect_before(rays, hits);
         }
     }
 
     fn occluded(&self, rays: &RayBatch, coherence: Coherence, occluded: &mut Vec<bool>) {
-        if self.world.is_empty() {
-            occluded.clear();
-            occluded.resize(rays.len(), false);
-        } else {
-            self.occluded_batch(rays, coherence, occluded);
-        }
+        self.occluded_batch(rays, coherence, occluded);
         if let Some(curves) = &self.curves {
             curves.occlude_others(rays, occluded);
         }

@@ -72,11 +72,6 @@ impl SceneIds {
         SceneIds { root, groups, instances, group_from_world, set }
     }
 
-    /// True if Embree has nothing to trace.
-    pub(super) fn is_empty(&self) -> bool {
-        self.root.is_empty() && self.instances.is_empty()
-    }
-
     /// The instance of an `instID`.
     #[inline]
     pub(super) fn instance(&self, inst_id: u32) -> u32 {

@@ -153,7 +153,7 @@ fn table(report: &Report) -> String {
     // Rays
     if let Some([ours, bare]) = report.build_seconds {
         text += &format!("\nbuild on all cores: renderer {ours:.3} s, bare {bare:.3} s\n");
-        text += "ratio: speed of the renderer relative to the bare loop, from medians of batches;\n\
+        text += "ratio: speed of the renderer relative to the bare loop, which has no curves, from medians of batches;\n\
                  whole runs: median (range) of the ratio of whole runs\n";
         text += &format!(
             "{:<22}{:>6}{:>10}{:>13}{:>13}{:>11}{:>20}\n",

@@ -5,7 +5,9 @@ use super::meshes::{Blade, MeshBuilder, Tube};
 use super::random::Stream;
 use lumiris::geometry::TriangleMesh;
 use lumiris_numbers::math::Vec3;
-use std::f32::consts::PI;
+
+/// The angle between leaves or branches that follow each other (radians): π (3 − √5).
+const GOLDEN_ANGLE: f32 = 2.399_963_2;
 
 /// The parameters of a plant. Lengths are in metres.
 #[derive(Clone, Copy, Debug)]
@@ -206,7 +208,7 @@ impl Kind {
 
         // Branches to points in the upper part of an ellipsoid, evenly spaced by the golden angle
         let branch = |i: u32| {
-            let azimuth = i as f32 * PI * (3.0 - 5_f32.sqrt()) + stream.within(-0.3, 0.3);
+            let azimuth = i as f32 * GOLDEN_ANGLE + stream.within(-0.3, 0.3);
             let z = 1.0 - 1.4 * (i as f32 + 0.5) / self.branches as f32;
             let r = (1.0 - z * z).sqrt();
             let direction = Vec3::new(azimuth.cos() * r, azimuth.sin() * r, z);
@@ -229,7 +231,7 @@ impl Kind {
             let [outer, inner] = self.elevations;
             leaves.add_blade(&Blade {
                 root: crown.point,
-                azimuth: crown.azimuth + i as f32 * PI * (3.0 - 5_f32.sqrt()) + stream.within(-0.2, 0.2),
+                azimuth: crown.azimuth + i as f32 * GOLDEN_ANGLE + stream.within(-0.2, 0.2),
                 elevation: (outer + (inner - outer) * age).to_radians(),
                 length: self.size[0] * size,
                 width: self.size[1] * size,

@@ -42,16 +42,16 @@ pub(super) struct Tube {
     pub(super) segments: u32,
 }
 
-impl MeshBuilder {
-    /// Two triangles of each cell between rows of `columns` + 1 vertices, the first of which is `first`.
-    fn grid(&mut self, first: u32, columns: u32, rows: u32) {
-        for i in 0..columns * rows {
-            let a = first + i / columns * (columns + 1) + i % columns;
-            let b = a + columns + 1;
-            self.triangles.extend([[a, a + 1, b + 1], [a, b + 1, b]]);
-        }
-    }
+/// Two triangles of each cell between rows of `columns` + 1 vertices, the first of which is `first`.
+pub(super) fn grid(first: u32, columns: u32, rows: u32) -> impl Iterator<Item = [u32; 3]> {
+    (0..columns * rows).flat_map(move |i| {
+        let a = first + i / columns * (columns + 1) + i % columns;
+        let b = a + columns + 1;
+        [[a, a + 1, b + 1], [a, b + 1, b]]
+    })
+}
 
+impl MeshBuilder {
     /// Adds a leaf, with texture coordinates across and along it.
     pub(super) fn add_blade(&mut self, blade: &Blade) {
         // Directions at the root
@@ -73,7 +73,7 @@ impl MeshBuilder {
             }
             middle += (outwards * cos + Vec3::Z * sin) * step;
         }
-        self.grid(first, 2, blade.segments);
+        self.triangles.extend(grid(first, 2, blade.segments));
     }
 
     /// Adds a tube without ends.
@@ -91,7 +91,7 @@ impl MeshBuilder {
                 center + (x * cos + y * sin) * radius
             }));
         }
-        self.grid(first, tube.sides, tube.segments);
+        self.triangles.extend(grid(first, tube.sides, tube.segments));
     }
 
     /// The mesh. `Err` with a message if it is too large.
@@ -117,7 +117,7 @@ pub(super) fn pebble(seed: u32) -> Result<TriangleMesh, String> {
         let direction = Vec3::new(x * sin, y * sin, -cos);
         mesh.positions.push(direction * axes * (1.0 + 0.35 * fractal(direction * 1.3, 2, seed)));
     }
-    mesh.grid(0, SIDES, RINGS);
+    mesh.triangles.extend(grid(0, SIDES, RINGS));
 
     // Normals of the ellipsoid
     let mut mesh = mesh.build()?;

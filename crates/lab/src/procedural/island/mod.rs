@@ -4,7 +4,7 @@
 //! lengths of the terrain are proportional to its side, which grows until the island has room for all instances.
 //! Lengths are in metres, z is up, and the sea is the plane z = 0.
 //!
-//! Reading order: `random`, `terrain`, `leaves` (alpha images), `meshes` (stems, blades, pebbles), `kinds` (the plants),
+//! Reading order: `random`, `meshes` (stems, blades, pebbles), `terrain`, `leaves` (alpha images), `kinds` (the plants),
 //! `patches`, `text` (the scene), `files`.
 
 mod files;

@@ -1,23 +1,18 @@
-//! Random numbers by counters.
+//! Random numbers in ranges.
 
-use lumiris_numbers::math::hash::{pcg4d, unit_f32};
+use lumiris_numbers::math::hash::HashStream;
 
 /// The random numbers of a key.
-pub(super) struct Stream {
-    key: [u32; 3],
-    next: u32,
-}
+pub(super) struct Stream(HashStream);
 
 impl Stream {
     pub(super) fn new(key: [u32; 3]) -> Self {
-        Stream { key, next: 0 }
+        Stream(HashStream::new(key))
     }
 
     /// Uniform in `low..high`.
     pub(super) fn within(&mut self, low: f32, high: f32) -> f32 {
-        let [a, b, c] = self.key;
-        self.next += 1;
-        low + (high - low) * unit_f32(pcg4d([a, b, c, self.next])[0])
+        low + (high - low) * self.0.next_f32()
     }
 
     /// An angle (radians).

@@ -1,5 +1,6 @@
 //! The ground of the island and of the sea around it: a height field on a square.
 
+use super::meshes::grid;
 use crate::procedural::gradient_noise::{fractal, ridged, smoothstep};
 use lumiris::geometry::TriangleMesh;
 use lumiris_numbers::math::{Vec2, Vec3};
@@ -75,13 +76,7 @@ impl Terrain {
         };
         let (positions, normals) = (0..(cells + 1) * (cells + 1)).into_par_iter().map(vertex).unzip();
 
-        // Two triangles of each square
-        let corners = |i: u32| {
-            let a = i / cells * (cells + 1) + i % cells;
-            let b = a + cells + 1;
-            [[a, a + 1, b + 1], [a, b + 1, b]]
-        };
-        let mut mesh = TriangleMesh::new(positions, (0..cells * cells).flat_map(corners).collect())?;
+        let mut mesh = TriangleMesh::new(positions, grid(0, cells, cells).collect())?;
         mesh.normals = normals;
         Ok(mesh)
     }
