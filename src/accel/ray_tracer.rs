@@ -117,6 +117,13 @@ impl RayBatch {
         Vec3::new(self.dx[i], self.dy[i], self.dz[i])
     }
 
+    /// Replaces `out` by the lengths of the directions.
+    pub fn lengths(&self, out: &mut Vec<f32>) {
+        out.clear();
+        let directions = self.dx.iter().zip(&self.dy).zip(&self.dz);
+        out.extend(directions.map(|((x, y), z)| (x * x + y * y + z * z).sqrt()));
+    }
+
     /// Ray `i`.
     #[inline]
     pub fn get(&self, i: usize) -> Ray {

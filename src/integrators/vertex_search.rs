@@ -65,6 +65,8 @@ pub(super) struct VertexSearch {
     /// Rays of the paths that are traced, if these are not all.
     rays: RayBatch,
     hits: Vec<Option<Hit>>,
+    /// Lengths of the directions of these rays.
+    lengths: Vec<f32>,
     /// Camera samples of the vertices, in the order of these vertices.
     sampled: Vec<u32>,
     /// Geometry and distance from the camera of first vertices on plain meshes, in the order of these vertices.
@@ -125,13 +127,14 @@ impl VertexSearch {
             let start = Instant::now();
             let (mut paths, hits, traced): (Paths, _, _) =
                 (std::mem::take(&mut self.active), std::mem::take(&mut self.hits), std::mem::take(&mut self.traced));
-            for (&index, hit) in traced.iter().zip(&hits) {
-                let is_done = hit.is_some_and(|hit| self.add_plain_mesh_hit(&mut at, &mut paths, index, &hit));
+            let lengths = std::mem::take(&mut self.lengths);
+            for ((&index, hit), &length) in traced.iter().zip(&hits).zip(&lengths) {
+                let is_done = hit.is_some_and(|hit| self.add_plain_mesh_hit(&mut at, &mut paths, index, &hit, length));
                 if !is_done {
                     self.process_hit(&mut at, &mut paths, index, hit.as_ref());
                 }
             }
-            (self.active, self.hits, self.traced) = (paths, hits, traced);
+            (self.active, self.hits, self.traced, self.lengths) = (paths, hits, traced, lengths);
 
             // Trace the paths again that passed a surface
             self.add_infinite(&mut at);
@@ -223,9 +226,16 @@ impl VertexSearch {
     }
 
     /// Handles the hit of a mesh with a constant Lambertian reflectance, whose points are computed together with
-    /// others. Returns false for all other hits.
+    /// others. `length` is the length of the ray's direction. Returns false for all other hits.
     #[inline(always)]
-    fn add_plain_mesh_hit(&mut self, at: &mut TraceStep<'_, '_>, paths: &mut Paths, index: u32, hit: &Hit) -> bool {
+    fn add_plain_mesh_hit(
+        &mut self,
+        at: &mut TraceStep<'_, '_>,
+        paths: &mut Paths,
+        index: u32,
+        hit: &Hit,
+        length: f32,
+    ) -> bool {
         let is_last = at.vertex >= at.depth;
         let Some(rho) = at.job.plain_reflectance(hit) else { return false };
         let path = &mut paths.states[index as usize];
@@ -239,7 +249,7 @@ impl VertexSearch {
             return false;
         };
         let d = paths.rays.direction(index as usize);
-        let distance = hit.t * d.length();
+        let distance = hit.t * length;
         if at.vertex == 0 {
             self.plain.push((hit.geometry, path.travelled + distance));
         }
@@ -450,6 +460,7 @@ impl VertexSearch {
         let start = Instant::now();
         job.world.accel.intersect(rays, coherence, &mut self.hits);
         let (count, time) = (rays.len() as u64, start.elapsed());
+        rays.lengths(&mut self.lengths);
         if vertex == 0 {
             self.stats.camera_rays += count;
             self.stats.camera_time += time;

@@ -38,6 +38,22 @@ pub fn select_rows(n: usize, is_kept: impl Fn(usize) -> bool, rows: &mut Vec<u32
     rows.truncate(count);
 }
 
+/// Sets `to[k]` to `from[rows[k]]`.
+#[inline]
+pub fn gather<T: Copy>(to: &mut [T], from: &[T], rows: &[u32]) {
+    for (to, &row) in to.iter_mut().zip(rows) {
+        *to = from[row as usize];
+    }
+}
+
+/// Sets `to[rows[k]]` to `from[k]`.
+#[inline]
+pub fn scatter<T: Copy>(to: &mut [T], rows: &[u32], from: &[T]) {
+    for (&from, &row) in from.iter().zip(rows) {
+        to[row as usize] = from;
+    }
+}
+
 impl Columns3 {
     /// Extends shorter columns to `len`.
     pub fn reserve(&mut self, len: usize) {
@@ -52,6 +68,21 @@ impl Columns3 {
     /// The first `len` numbers of each column, mutable.
     pub fn get_mut(&mut self, len: usize) -> [&mut [f32]; 3] {
         self.0.each_mut().map(|c| &mut c[..len])
+    }
+
+    /// Sets the first `n` vectors to `v`.
+    pub fn fill(&mut self, n: usize, v: Vec3) {
+        self.0.iter_mut().zip(v.to_array()).for_each(|(column, x)| column[..n].fill(x));
+    }
+
+    /// See [`gather`].
+    pub fn gather(&mut self, from: &Columns3, rows: &[u32]) {
+        self.0.iter_mut().zip(&from.0).for_each(|(to, from)| gather(to, from, rows));
+    }
+
+    /// See [`scatter`].
+    pub fn scatter(&mut self, rows: &[u32], from: &Columns3) {
+        self.0.iter_mut().zip(&from.0).for_each(|(to, from)| scatter(to, rows, from));
     }
 
     /// Sets the vector `i`.

@@ -7,7 +7,7 @@
 use super::lane::{Columns3, F, I, LANES, Vec3s, begin, load, or_zero, safe_sqrt, store};
 use super::light::LightLanes;
 use super::wide::{sin_cos_quadrant, sin_cos_turns};
-use fearless_simd::{Level, Simd, dispatch, f32x4, f32x8, prelude::*};
+use fearless_simd::{Level, Simd, dispatch, f32x4, f32x16, prelude::*};
 use lumiris_numbers::math::distribution::{Running, STEP, clamped};
 use lumiris_numbers::math::elementary::SinCos;
 use lumiris_numbers::math::sphere_map::{self, pdf_equal_area_square_to_sphere};
@@ -58,9 +58,9 @@ impl Places {
         let Running { cdf, guide } = *running;
         let u = clamped(u);
         let mut bin = usize::from(guide[((u * guide.len() as f32) as usize).min(guide.len() - 1)]);
-        let at = f32x8::splat(simd, u);
+        let at = f32x16::splat(simd, u);
         let bin = loop {
-            let next = f32x8::from_slice(simd, &cdf[bin + 1..bin + 1 + STEP]);
+            let next = f32x16::from_slice(simd, &cdf[bin + 1..bin + 1 + STEP]);
             let passed = next.simd_le(at).to_bitmask().count_ones() as usize;
             bin += passed;
             if passed < STEP {

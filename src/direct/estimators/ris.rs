@@ -21,7 +21,6 @@
 use crate::bsdfs::Bsdf;
 use crate::direct::candidates::{Candidate, Candidates, SampleAllocation};
 use crate::direct::domain;
-use crate::direct::light_samples::unshadowed_candidate;
 use crate::direct::point::ShadingPoint;
 use crate::direct::proposal_columns::{LightProposals, PointProposals, ProposalColumns, ProposalTechniques};
 use crate::direct::shadow_segments::Segments;
@@ -142,11 +141,7 @@ impl Ris {
             for draw in &b.draws {
                 let place = range.start + draw.index as usize;
                 let evaluated = if place < range.bsdf_start {
-                    let drawn = b.proposals.light_sample(place);
-                    drawn.and_then(|drawn| {
-                        let index = (chunk.first + i) as u32;
-                        unshadowed_candidate(index, point, &SampleAllocation::fixed(0, 0), drawn)
-                    })
+                    b.proposals.candidate(place, (chunk.first + i) as u32, point, self.target)
                 } else {
                     Some(own[place - range.bsdf_start])
                 };

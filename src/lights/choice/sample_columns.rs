@@ -11,7 +11,7 @@ use crate::lights::{
     AreaLight, AreaShape, BranchTable, LeAndPdf, Light, LightCtx, LightId, LightLanes, LightSample, SampledLight,
 };
 use lumiris_lanes::area::{Rectangle, many};
-use lumiris_lanes::columns::{Column, Columns3, padded, reserve};
+use lumiris_lanes::columns::{Column, Columns3, gather, padded, reserve, scatter};
 use lumiris_lanes::level;
 use lumiris_lanes::light_tree::{GlossyLobes, Receivers};
 use lumiris_numbers::math::light_bound::GlossyLobe;
@@ -117,17 +117,18 @@ impl LightSamples {
         })
     }
 
-    /// Copies sample `from` of `other` to `to`.
-    #[inline]
-    fn copy(&mut self, to: usize, other: &LightSamples, from: usize) {
-        self.wi.set(to, other.wi.vec3(from));
-        self.li.set(to, other.li.vec3(from));
-        self.pdf[to] = other.pdf[from];
-        self.p.set(to, other.p.vec3(from));
-        self.p_error.set(to, other.p_error.vec3(from));
-        self.n.set(to, other.n.vec3(from));
-        self.is_far[to] = other.is_far[from];
-        self.is_delta[to] = other.is_delta[from];
+    /// Sets the samples `places` to the first samples of `others`, without points, error bounds and normals if `is_far`.
+    fn scatter(&mut self, places: &[u32], others: &LightSamples, is_far: bool) {
+        self.wi.scatter(places, &others.wi);
+        self.li.scatter(places, &others.li);
+        scatter(&mut self.pdf, places, &others.pdf);
+        scatter(&mut self.is_delta, places, &others.is_delta);
+        scatter(&mut self.is_far, places, &others.is_far);
+        if !is_far {
+            self.p.scatter(places, &others.p);
+            self.p_error.scatter(places, &others.p_error);
+            self.n.scatter(places, &others.n);
+        }
     }
 }
 
@@ -263,16 +264,12 @@ impl JobLights {
             let count = rest.partition_point(|&i| chosen[i as usize].light == light);
             let (places, others) = rest.split_at(count);
             rest = others;
-            for (k, &i) in places.iter().enumerate() {
-                let i = i as usize;
-                scratch.p.set(k, p.vec3(i));
-                (u0[k], u1[k]) = (u[0][i], u[1][i]);
-            }
+            scratch.p.gather(p, places);
+            gather(u0, u[0], places);
+            gather(u1, u[1], places);
             let len = padded(count);
             self.sample_one_light(light, count, &scratch.p, [&u0[..len], &u1[..len]], &mut scratch.samples);
-            for (k, &i) in places.iter().enumerate() {
-                out.copy(i as usize, &scratch.samples, k);
-            }
+            out.scatter(places, &scratch.samples, self.infinite.contains(&light));
         }
         with_choices(chosen, out);
     }
@@ -386,13 +383,12 @@ impl AreaLight {
 
         // Emission and normal, the same for all points
         let l: Rgb = self.emission.l;
-        for i in 0..n {
-            if self.is_dark_from(p.vec3(i)) {
-                pdf[i] = 0.0;
-            }
-            li.set_rgb(i, l);
-            normals.set(i, normal);
+        let [x, y, z] = p.get(n);
+        for (i, pdf) in pdf[..n].iter_mut().enumerate() {
+            *pdf = if self.is_dark_from(Vec3::new(x[i], y[i], z[i])) { 0.0 } else { *pdf };
         }
+        li.fill(n, Vec3::from_array(l.to_array()));
+        normals.fill(n, normal);
         is_far[..n].fill(0.0);
         is_delta[..n].fill(false);
         true
