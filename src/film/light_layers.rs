@@ -135,7 +135,8 @@ impl PackedLayers {
             return Vec::new();
         };
         let is_lit = |pixel: &usize| mask[pixel / 8] >> (pixel % 8) & 1 == 1;
-        let mut lit: Vec<_> = pixels.clone().filter(is_lit).map(PixelLight::black).collect();
+        let mut lit = Vec::with_capacity(pixels.len());
+        lit.extend(pixels.clone().filter(is_lit).map(PixelLight::black));
 
         // Their sums
         let count: usize = mask.iter().map(|bits| bits.count_ones() as usize).sum();

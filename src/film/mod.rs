@@ -25,4 +25,4 @@ mod variance_scale;
 pub use pixel::{FeatureSet, Features, PixelSample, PixelSums};
 pub use pixel_bounds::PixelBounds;
 pub use summary::Summary;
-pub use tiled_film::{BAND, Film, FilmTile};
+pub use tiled_film::{BAND, Film, FilmTile, LayerPixel};

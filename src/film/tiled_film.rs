@@ -3,7 +3,7 @@
 use super::accumulator::PixelAccumulator;
 use super::fixed_sums::FixedSum;
 use super::image_noise;
-use super::light_layers::{LightSums, PackedLayers};
+use super::light_layers::{PackedLayers, PixelLight};
 use super::packed::PackedSums;
 use super::pixel::PixelSums;
 use super::pixel_bounds::PixelBounds;
@@ -26,6 +26,17 @@ pub struct FilmTile {
     pub sums: Arc<PackedSums>,
     /// The light-group layers; empty if there are none.
     pub layers: Arc<PackedLayers>,
+}
+
+/// A pixel with light in a light-group layer.
+#[derive(Clone, Copy, Debug)]
+pub struct LayerPixel {
+    /// The layer.
+    pub layer: usize,
+    /// Index of the pixel among those read, row by row.
+    pub pixel: usize,
+    /// Σ radiance.
+    pub radiance: [f64; 3],
 }
 
 /// The sums of all pixels inside the crop window. They remain packed, and are read some rows at a time. Pixels outside
@@ -145,8 +156,23 @@ impl Film {
 
     /// Reads the pixels of a rectangle inside the film, row by row.
     pub fn read(&self, pixels: &PixelBounds, out: &mut Vec<PixelSums>) {
-        let read = |tile: &FilmTile, range, sums: &mut [PixelAccumulator]| tile.sums.read(range, sums);
-        self.read_tiles(pixels, out, read, PixelAccumulator::sums);
+        out.clear();
+        out.resize(pixels.area(), PixelSums::default());
+        let mut sums = Vec::new();
+        for (tile, range) in self.tiles_of(pixels) {
+            sums.resize(range.len(), PixelAccumulator::default());
+            tile.sums.read(range.clone(), &mut sums);
+
+            // The common pixels of each row
+            let (bounds, width) = (&tile.bounds, tile.bounds.width() as usize);
+            let [left, right] = [bounds.x0.max(pixels.x0), bounds.x1.min(pixels.x1)];
+            let top = bounds.y0 + (range.start / width) as u32;
+            for (y, row) in (top..).zip(sums.chunks_exact(width)) {
+                let at = pixels.index_of([left, y]);
+                let row = &row[(left - bounds.x0) as usize..(right - bounds.x0) as usize];
+                out[at..at + row.len()].iter_mut().zip(row).for_each(|(pixel, sums)| *pixel = sums.sums());
+            }
+        }
 
         // Corrections
         if !self.corrections.is_empty() && !out.is_empty() {
@@ -157,45 +183,33 @@ impl Film {
         }
     }
 
-    /// Reads Σ radiance of the pixels of some rows of a light-group layer.
-    pub fn read_light(&self, layer: usize, rows: Range<u32>, out: &mut Vec<[f64; 3]>) {
+    /// Passes the pixels of some rows that have light in some of the light-group layers to `each`, tile by tile.
+    pub fn read_light(&self, layers: Range<usize>, rows: Range<u32>, mut each: impl FnMut(LayerPixel)) {
         let pixels = PixelBounds { y0: rows.start, y1: rows.end, ..self.bounds };
-        let read = |tile: &FilmTile, range, sums: &mut [LightSums]| tile.layers.read(layer, range, sums);
-        self.read_tiles(&pixels, out, read, |sums| sums.each_ref().map(FixedSum::value));
-    }
-
-    /// Reads values from the tiles that overlap a rectangle, row by row.
-    fn read_tiles<S: Clone + Default, T: Clone + Default>(
-        &self,
-        pixels: &PixelBounds,
-        out: &mut Vec<T>,
-        read: impl Fn(&FilmTile, Range<usize>, &mut [S]),
-        value: impl Fn(&S) -> T,
-    ) {
-        out.clear();
-        out.resize(pixels.area(), T::default());
-        let first = self.tiles.partition_point(|t| t.bounds.y1 <= pixels.y0);
-        let mut sums = Vec::new();
-        for tile in self.tiles[first..].iter().take_while(|t| t.bounds.y0 < pixels.y1) {
-            let bounds = &tile.bounds;
-            let [left, right] = [bounds.x0.max(pixels.x0), bounds.x1.min(pixels.x1)];
-            if left >= right {
-                continue;
-            }
-
-            // Whole rows of the tile, since sums are packed row by row
-            let (top, bottom, len) = (bounds.y0.max(pixels.y0), bounds.y1.min(pixels.y1), bounds.width() as usize);
-            let start = (top - bounds.y0) as usize * len;
-            sums.resize((bottom - top) as usize * len, S::default());
-            read(tile, start..start + sums.len(), &mut sums);
-
-            // Their common pixels
-            for (y, row) in (top..bottom).zip(sums.chunks_exact(len)) {
-                let at = pixels.index_of([left, y]);
-                let row = &row[(left - bounds.x0) as usize..(right - bounds.x0) as usize];
-                out[at..at + row.len()].iter_mut().zip(row).for_each(|(pixel, sums)| *pixel = value(sums));
+        for (tile, range) in self.tiles_of(&pixels) {
+            let PixelBounds { x0, y0, .. } = tile.bounds;
+            for layer in layers.clone() {
+                for PixelLight { pixel, sums } in tile.layers.lit(layer, range.clone()) {
+                    let [x, y] = [x0 + pixel % tile.bounds.width(), y0 + pixel / tile.bounds.width()];
+                    if (pixels.x0..pixels.x1).contains(&x) {
+                        let radiance = sums.each_ref().map(FixedSum::value);
+                        each(LayerPixel { layer, pixel: pixels.index_of([x, y]), radiance });
+                    }
+                }
             }
         }
+    }
+
+    /// The tiles that overlap a rectangle, and the pixels of their common rows. These are whole rows of the tile, since
+    /// sums are packed row by row.
+    fn tiles_of(&self, pixels: &PixelBounds) -> impl Iterator<Item = (&FilmTile, Range<usize>)> {
+        let &PixelBounds { x0, x1, y0, y1 } = pixels;
+        let first = self.tiles.partition_point(|t| t.bounds.y1 <= y0);
+        let in_rows = self.tiles[first..].iter().take_while(move |t| t.bounds.y0 < y1);
+        in_rows.filter(move |t| t.bounds.x0.max(x0) < t.bounds.x1.min(x1)).map(move |tile| {
+            let row = |y: u32| (y - tile.bounds.y0) as usize * tile.bounds.width() as usize;
+            (tile, row(tile.bounds.y0.max(y0))..row(tile.bounds.y1.min(y1)))
+        })
     }
 
     /// Statistics of the film.

@@ -21,82 +21,66 @@ pub fn count(job: &RenderJob) -> usize {
     names(job).len()
 }
 
-/// Per-group sums of the samples of a batch. Only samples and layers with light have an entry.
+/// Per-group sums of the samples of a batch. Contributions are appended to a list for each layer and summed at the end:
+/// sums by sample and layer would not fit in the cache of a core.
 #[derive(Debug, Default)]
 pub struct LayerSums {
-    /// Number of layers; 0 if disabled.
-    layers: usize,
-    entries: Vec<LayerSum>,
-    /// Index of the entry by sample, then by layer. Valid if that entry has this sample and layer, so that a batch
-    /// begins without clearing all indices.
-    indices: Vec<u32>,
+    /// Contributions by layer, in the order of their computation. Empty if layers are disabled.
+    layers: Vec<Vec<SampleLight>>,
+    /// Sum by sample. Black, except while a layer is summed.
+    sums: Vec<Rgb>,
 }
 
-/// Sum of the radiance of a light-group layer in a sample.
-#[derive(Clone, Copy, Debug)]
-pub struct LayerSum {
+/// Radiance of a light-group layer in a sample.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SampleLight {
     /// Index of the sample in the batch.
     pub sample: u32,
-    /// The layer.
-    pub layer: u32,
-    /// The sum.
+    /// The radiance.
     pub radiance: Rgb,
 }
 
 impl LayerSums {
     /// Sums for `layers` layers from the next batch on.
     pub(super) fn keep(&mut self, layers: usize) {
-        *self = LayerSums { layers, ..LayerSums::default() };
+        *self = LayerSums { layers: vec![Vec::new(); layers], ..LayerSums::default() };
     }
 
     /// Begins a batch of `samples` camera samples.
     pub(super) fn begin(&mut self, samples: usize) {
-        self.entries.clear();
-        if self.indices.len() < samples * self.layers {
-            self.indices.resize(samples * self.layers, 0);
-        }
+        self.layers.iter_mut().for_each(Vec::clear);
+        self.sums.resize(samples, Rgb::BLACK);
     }
 
     /// True if layers are enabled.
     #[inline]
     pub(super) fn are_kept(&self) -> bool {
-        self.layers > 0
+        !self.layers.is_empty()
     }
 
-    /// The sums of the last batch that are not known to be black, in any order, each layer of a sample once.
-    pub fn entries(&self) -> &[LayerSum] {
-        &self.entries
+    /// Number of layers.
+    pub fn count(&self) -> usize {
+        self.layers.len()
     }
 
-    /// Position of a sum in `indices`.
-    #[inline]
-    fn position(&self, sample: u32, layer: u32) -> usize {
-        sample as usize * self.layers + layer as usize
-    }
+    /// The sums of a layer that are not black, in any order, each sample once. Contributions may be added afterwards.
+    pub fn sums(&mut self, layer: usize) -> &[SampleLight] {
+        let LayerSums { layers, sums } = self;
+        let light = &mut layers[layer];
+        light.iter().for_each(|light| sums[light.sample as usize] += light.radiance);
 
-    /// Index of the entry of a sum, unless it is black.
-    #[inline]
-    fn find(&self, sample: u32, layer: u32) -> Option<usize> {
-        let index = self.indices[self.position(sample, layer)] as usize;
-        let is_here = |entry: &LayerSum| (entry.sample, entry.layer) == (sample, layer);
-        self.entries.get(index).is_some_and(is_here).then_some(index)
-    }
-
-    /// The sum of a layer in a sample.
-    pub fn of(&self, sample: u32, layer: u32) -> Rgb {
-        self.find(sample, layer).map_or(Rgb::BLACK, |index| self.entries[index].radiance)
-    }
-
-    /// The sum of a layer in a sample, to be changed.
-    #[inline]
-    pub fn at(&mut self, sample: u32, layer: u32) -> &mut Rgb {
-        let index = self.find(sample, layer).unwrap_or_else(|| {
-            let position = self.position(sample, layer);
-            self.indices[position] = self.entries.len() as u32;
-            self.entries.push(LayerSum { sample, layer, radiance: Rgb::BLACK });
-            self.entries.len() - 1
+        // The first contribution of a sample becomes its sum
+        light.retain_mut(|light| {
+            light.radiance = std::mem::replace(&mut sums[light.sample as usize], Rgb::BLACK);
+            !light.radiance.is_black()
         });
-        &mut self.entries[index].radiance
+        light
+    }
+
+    /// Adds radiance to a layer of a sample.
+    #[inline]
+    pub fn add_to(&mut self, layer: usize, sample: u32, radiance: Rgb) {
+        self.layers[layer].push(SampleLight { sample, radiance });
     }
 
     /// Adds the contribution `value` of a light to a sample, at the point `p`. `wi` is the unit direction to the light.
@@ -108,7 +92,7 @@ impl LayerSums {
         if lights.infinite.len() > 1 && lights.infinite.contains(&light) {
             return self.add_infinite(lights, sample, p, wi, value);
         }
-        *self.at(sample, lights.layers.of(light)) += value;
+        self.add_to(lights.layers.of(light) as usize, sample, value);
     }
 
     /// Adds surface emission that a path has hit.
@@ -118,7 +102,7 @@ impl LayerSums {
             return;
         }
         if let Some(light) = job.lights.light_of(hit.geometry, hit.primitive) {
-            *self.at(sample, job.lights.layers.of(light)) += value;
+            self.add_to(job.lights.layers.of(light) as usize, sample, value);
         }
     }
 
@@ -129,14 +113,14 @@ impl LayerSums {
             return;
         }
         if let [light] = lights.infinite[..] {
-            *self.at(sample, lights.layers.of(light)) += value;
+            self.add_to(lights.layers.of(light) as usize, sample, value);
             return;
         }
         let whole = lights.le(p, wi);
         for &light in &lights.infinite {
             let le = lights.lights[light as usize].le(p, wi);
             let share = |c: usize| if whole[c] == 0.0 { 0.0 } else { value[c] * (le[c] / whole[c]) };
-            *self.at(sample, lights.layers.of(light)) += Rgb::new(share(0), share(1), share(2));
+            self.add_to(lights.layers.of(light) as usize, sample, Rgb::new(share(0), share(1), share(2)));
         }
     }
 }
@@ -148,16 +132,22 @@ mod tests {
     #[test]
     fn a_batch_forgets_the_sums_of_the_last_one() {
         let mut sums = LayerSums::default();
+        let light = |sample, radiance| SampleLight { sample, radiance: Rgb::splat(radiance) };
         sums.keep(3);
         sums.begin(4);
-        for (sample, layer) in [(0, 2), (3, 1), (0, 2), (2, 0)] {
-            *sums.at(sample, layer) += Rgb::splat(0.5);
+        for (sample, layer) in [(0, 2), (3, 1), (0, 2), (3, 2), (2, 0)] {
+            sums.add_to(layer, sample, Rgb::splat(0.5));
         }
-        assert_eq!(sums.entries().len(), 3);
-        assert_eq!([(0, 2), (3, 1), (1, 2)].map(|(sample, layer)| sums.of(sample, layer).r), [1.0, 0.5, 0.0]);
+        assert_eq!([0, 1, 2].map(|layer| sums.sums(layer).len()), [1, 1, 2]);
+        assert_eq!(sums.sums(2), [light(0, 1.0), light(3, 0.5)]);
+
+        // Further contributions, and sums that become black
+        sums.add_to(2, 3, Rgb::splat(-0.5));
+        sums.add_to(2, 0, Rgb::splat(0.25));
+        assert_eq!(sums.sums(2), [light(0, 1.25)]);
         sums.begin(2);
-        *sums.at(1, 1) += Rgb::splat(0.25);
-        assert_eq!([(0, 2), (1, 1)].map(|(sample, layer)| sums.of(sample, layer).r), [0.0, 0.25]);
-        assert_eq!(sums.entries().len(), 1);
+        sums.add_to(1, 1, Rgb::splat(0.25));
+        assert_eq!([0, 1, 2].map(|layer| sums.sums(layer).len()), [0, 1, 0]);
+        assert_eq!(sums.sums(1), [light(1, 0.25)]);
     }
 }

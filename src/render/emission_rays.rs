@@ -12,7 +12,7 @@ use super::tiles::batches;
 use crate::film::{FeatureSet, PixelSample};
 use crate::integrators::CameraSamples;
 use crate::integrators::camera_sampler::{CameraSampler, PixelSampleRange, Scratch};
-use crate::integrators::light_layers::{LayerSum, LayerSums};
+use crate::integrators::light_layers::LayerSums;
 use crate::integrators::{PathStats, PathTracer, Tracer};
 use crate::scene::PixelSamples;
 use crate::settings::IntegratorSettings;
@@ -92,7 +92,9 @@ impl EmissionRays {
             // Replace the emission in the results
             let rays = rays(part);
             for (split, rays) in part.iter().zip(&rays) {
-                rays.exchange(&mut out[split.of_batch].radiance, |ray| self.results[ray as usize].radiance);
+                let Emission { own, mean } = rays.emission(|ray| self.results[ray as usize].radiance);
+                let radiance = &mut out[split.of_batch].radiance;
+                *radiance = *radiance - own + mean;
             }
             if let (Some(layers), Some(met)) = (layers.as_deref_mut(), self.tracer.light_layers()) {
                 replace_in_layers(part, &rays, met, layers);
@@ -112,15 +114,22 @@ fn samples_of(part: &[Split]) -> usize {
 }
 
 /// Replaces the emission in each layer that any ray of a sample meets. `met` has the layers of the rays.
-fn replace_in_layers(part: &[Split], rays: &[Rays], met: &LayerSums, layers: &mut LayerSums) {
-    let mut split_of_ray = vec![0; samples_of(part)];
+fn replace_in_layers(part: &[Split], rays: &[Rays], met: &mut LayerSums, layers: &mut LayerSums) {
+    let (mut split_of_ray, mut emission) = (vec![0; samples_of(part)], vec![Rgb::BLACK; samples_of(part)]);
     for (i, Rays { own, others }) in rays.iter().enumerate() {
         others.clone().chain([*own]).for_each(|ray| split_of_ray[ray as usize] = i);
     }
-    let layer_of_split = |sum: &LayerSum| (split_of_ray[sum.sample as usize], sum.layer);
-    let met_layers: BTreeSet<(usize, u32)> = met.entries().iter().map(layer_of_split).collect();
-    for (i, layer) in met_layers {
-        rays[i].exchange(layers.at(part[i].of_batch as u32, layer), |ray| met.of(ray, layer));
+    for layer in 0..met.count() {
+        let sums = met.sums(layer);
+        sums.iter().for_each(|sum| emission[sum.sample as usize] = sum.radiance);
+        let met_by: BTreeSet<usize> = sums.iter().map(|sum| split_of_ray[sum.sample as usize]).collect();
+        for i in met_by {
+            let (sample, Emission { own, mean }) =
+                (part[i].of_batch as u32, rays[i].emission(|ray| emission[ray as usize]));
+            layers.add_to(layer, sample, own * -1.0);
+            layers.add_to(layer, sample, mean);
+        }
+        sums.iter().for_each(|sum| emission[sum.sample as usize] = Rgb::BLACK);
     }
 }
 
@@ -145,12 +154,20 @@ struct Rays {
     others: Range<u32>,
 }
 
+/// Emission met by the emission rays of a sample.
+struct Emission {
+    /// By the own ray.
+    own: Rgb,
+    /// The mean over all rays.
+    mean: Rgb,
+}
+
 impl Rays {
-    /// Replaces the emission of the own ray in a radiance by the mean over all rays, given the emission of a ray.
-    fn exchange(&self, radiance: &mut Rgb, emission_of: impl Fn(u32) -> Rgb) {
-        let (emission, rays) = (emission_of(self.own), 1 + self.others.len());
-        let sum = self.others.clone().fold(emission, |sum, ray| sum + emission_of(ray));
-        *radiance = *radiance - emission + sum / rays as f32;
+    /// The emission met, given the emission of a ray.
+    fn emission(&self, emission_of: impl Fn(u32) -> Rgb) -> Emission {
+        let (own, rays) = (emission_of(self.own), 1 + self.others.len());
+        let sum = self.others.clone().fold(own, |sum, ray| sum + emission_of(ray));
+        Emission { own, mean: sum / rays as f32 }
     }
 }
 

@@ -1,7 +1,7 @@
 //! Conversion of films to images: named channels and metadata.
 
 use super::rendering::Rendering;
-use crate::film::{BAND, Film, PixelSums};
+use crate::film::{BAND, Film, LayerPixel, PixelSums};
 use crate::imaging::{IMAGE_LAYER, Image, TextEntries};
 use crate::scene::{FilmSettings, SampleCountMap};
 use crate::settings::Settings;
@@ -164,23 +164,18 @@ impl<'a> Layers<'a> {
             }
         }
         if self.aovs.contains(&Aov::LightGroups) {
-            for layer in 0..self.film.light_layers().len() {
-                let means = light_means(self.film, layer, rows.clone(), &pixels);
-                for (pixel, mean) in data.chunks_exact_mut(stride).zip(means) {
-                    pixel[first_of_groups + 3 * layer..][..3].copy_from_slice(&mean);
-                }
-            }
+            self.film.read_light(0..self.film.light_layers().len(), rows, |light| {
+                let at = stride * light.pixel + first_of_groups + 3 * light.layer;
+                data[at..at + 3].copy_from_slice(&mean_light(&light, &pixels));
+            });
         }
         data
     }
 }
 
-/// Mean radiance of a light-group layer in some rows, whose pixels are given.
-fn light_means(film: &Film, layer: usize, rows: Range<u32>, pixels: &[PixelSums]) -> impl Iterator<Item = [f32; 3]> {
-    let mut light = Vec::new();
-    film.read_light(layer, rows, &mut light);
-    let mean = |(sum, pixel): ([f64; 3], &PixelSums)| sum.map(|v| (v / pixel.count.max(1) as f64) as f32);
-    light.into_iter().zip(pixels).map(mean)
+/// Mean radiance of a light-group layer in one of the given pixels.
+fn mean_light(light: &LayerPixel, pixels: &[PixelSums]) -> [f32; 3] {
+    light.radiance.map(|sum| (sum / pixels[light.pixel].count.max(1) as f64) as f32)
 }
 
 /// The image `R G B` and the given AOVs, linear, all rows at once. Use [`Layers`] for large images.
@@ -205,7 +200,11 @@ pub fn layers(film: &Film, aovs: &[Aov], sample_count_map: Option<&SampleCountMa
         let band = |rows: Range<u32>| {
             let mut pixels = Vec::new();
             film.read_rows(rows.clone(), &mut pixels);
-            light_means(film, layer, rows, &pixels).flatten().collect()
+            let mut data = vec![0.0; 3 * pixels.len()];
+            film.read_light(layer..layer + 1, rows, |light| {
+                data[3 * light.pixel..][..3].copy_from_slice(&mean_light(&light, &pixels));
+            });
+            data
         };
         let data = film.bands().map(band).collect::<Vec<Vec<f32>>>().concat();
         (light_layer_name(name), Image { width, height, channels: COLOUR.map(str::to_owned).to_vec(), data })

@@ -9,6 +9,7 @@ use crate::film::light_layers::{LayerSample, LayerScratch};
 use crate::film::{FeatureSet, PixelBounds, PixelSample};
 use crate::integrators::CameraSamples;
 use crate::integrators::camera_sampler::{CameraSampler, PixelSampleRange, Scratch};
+use crate::integrators::light_layers::SampleLight;
 use crate::integrators::{Integrator, PathStats, Tracer};
 use crate::scene::FilmSettings;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -131,10 +132,14 @@ impl AnyWorker<'_> {
             sums[fit as usize].add_all(samples.start, &results[of_pixel]);
             pixel_of.resize(first, fit);
         }
-        for sum in tracer.light_layers().iter().flat_map(|layers| layers.entries()) {
-            let pixel = pixel_of[sum.sample as usize];
-            let radiance = film.balanced(sum.radiance);
-            light[sum.layer as usize].push(LayerSample { pixel, radiance });
+        if let Some(sums) = tracer.light_layers() {
+            let in_pixel = |of_sample: &SampleLight| {
+                let pixel = pixel_of[of_sample.sample as usize];
+                LayerSample { pixel, radiance: film.balanced(of_sample.radiance) }
+            };
+            for (layer, light) in light.iter_mut().enumerate().take(sums.count()) {
+                light.extend(sums.sums(layer).iter().map(in_pixel));
+            }
         }
         self.times.film += start.elapsed();
     }
