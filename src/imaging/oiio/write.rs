@@ -16,8 +16,8 @@ use std::ptr;
 /// Date of files without a date.
 pub(super) const NO_DATE: &str = "1970:01:01 00:00:00";
 
-/// Compression `zip` of EXR files, with its level. Level 4, the default of OpenImageIO, takes a third more time, and
-/// gives files that are 0.4 to 4 % smaller (docs/measurements/light-groups.md).
+/// Compression `zip` of EXR files, with its level. Level 4, the default of OpenImageIO, takes a quarter more time or
+/// more, and gives files that are 0.4 to 5 % smaller (docs/measurements/light-groups.md).
 const ZIP_OF_EXR: &str = "zip:1";
 
 /// A file being written.
