@@ -112,7 +112,13 @@ pub(super) fn mixed_scene(seed: u32, samples: usize) -> Arc<GeometrySet> {
             Instance { group: k % 3, world_from_group: (0..1 + k as usize % samples).map(moved).collect() }
         })
         .collect();
-    Arc::new(GeometrySet { geometries, groups, root: Group { geometries: (0..8).collect() }, instances })
+    Arc::new(GeometrySet {
+        geometries,
+        groups,
+        root: Group { geometries: (0..8).collect() },
+        instances,
+        ..GeometrySet::default()
+    })
 }
 
 /// A curve that is fine or wide, nearly straight or strongly bent, possibly of no width at one or both ends.
@@ -155,7 +161,8 @@ pub(super) fn curve_scene(seed: u32, samples: usize) -> Arc<GeometrySet> {
         Instance { group: k % 2, world_from_group: (0..1 + k as usize % samples).map(moved).collect() }
     });
     let instances = instances.collect();
-    Arc::new(GeometrySet { geometries, groups, root: Group { geometries: vec![0, 1, 2, 3, 7] }, instances })
+    let root = Group { geometries: vec![0, 1, 2, 3, 7] };
+    Arc::new(GeometrySet { geometries, groups, root, instances, ..GeometrySet::default() })
 }
 
 /// Rays at random, at points within the width of a curve in the root, along its tangent, and from its surface.

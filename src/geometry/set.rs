@@ -1,18 +1,18 @@
 //! All geometry of a scene: the input of a ray tracer.
 //!
 //! A [`GeometrySet`] has a root group of geometries in world space, and instances of other groups. Instances do not
-//! nest.
+//! nest, but many of them may be stored as places of [clusters](Clusters). Those have the ids after all others.
 
+use super::clusters::{Clusters, GroupId, Member};
 use super::hit::SurfaceHit;
 use super::shape::Shape;
 use lumiris_numbers::math::transform::transform_at;
 use lumiris_numbers::math::{Affine3A, Bounds3, Ray, Vec3};
 use rayon::prelude::*;
+use std::borrow::Cow;
 
 /// Index into [`GeometrySet::geometries`].
 pub type GeometryId = u32;
-/// Index into [`GeometrySet::groups`].
-pub type GroupId = u32;
 
 /// The instance index of the root group.
 pub const NO_INSTANCE: u32 = u32::MAX;
@@ -87,6 +87,8 @@ pub struct GeometrySet {
     pub root: Group,
     /// Instances.
     pub instances: Vec<Instance>,
+    /// Instances that are stored as places of clusters.
+    pub clusters: Clusters,
 }
 
 impl GeometrySet {
@@ -103,7 +105,67 @@ impl GeometrySet {
             let b = group_bounds[i.group as usize];
             i.world_from_group.iter().map(move |m| b.transformed(m))
         });
-        placed.fold(self.group_bounds(&self.root), Bounds3::union)
+        let all = placed.fold(self.group_bounds(&self.root), Bounds3::union);
+
+        // An instance of each place, then those of places that are not within the bounds so far: most are
+        let bounds_of =
+            |i| group_bounds[self.clusters.group(i) as usize].transformed(&self.clusters.world_from_group(i));
+        let places = self.clusters.places();
+        let mut all = places.iter().map(|place| bounds_of(place.first)).fold(all, Bounds3::union);
+        let cluster_bounds = self.cluster_bounds(&group_bounds);
+        for place in places {
+            let around = place.bounds(&cluster_bounds);
+            if !(all.contains(around.min) && all.contains(around.max)) {
+                all = self.clusters.instances_of(place).map(bounds_of).fold(all, Bounds3::union);
+            }
+        }
+        all
+    }
+
+    /// Bounds of the clusters in their own spaces, from those of the groups.
+    pub fn cluster_bounds(&self, group_bounds: &[Bounds3]) -> Vec<Bounds3> {
+        let bounds_of = |members: &Vec<Member>| {
+            let placed = members.iter().map(|member| {
+                group_bounds[member.group as usize].transformed(&member.cluster_from_group.as_affine3a())
+            });
+            placed.fold(Bounds3::EMPTY, Bounds3::union)
+        };
+        self.clusters.clusters().iter().map(bounds_of).collect()
+    }
+
+    /// True if there are instances.
+    pub fn has_instances(&self) -> bool {
+        self.instance_count() > 0
+    }
+
+    /// The group of an instance.
+    pub fn group_of(&self, instance: u32) -> GroupId {
+        match self.instances.get(instance as usize) {
+            Some(instance) => instance.group,
+            None => self.clusters.group(instance - self.instances.len() as u32),
+        }
+    }
+
+    /// Transform of an instance at `time` in 0..=1.
+    pub fn world_from_group_at(&self, instance: u32, time: f32) -> Affine3A {
+        match self.instances.get(instance as usize) {
+            Some(instance) => instance.world_from_group_at(time),
+            None => self.clusters.world_from_group(instance - self.instances.len() as u32),
+        }
+    }
+
+    /// An instance, stored or of a cluster.
+    pub fn instance(&self, instance: u32) -> Cow<'_, Instance> {
+        let of_cluster = || {
+            let world_from_group = vec![self.world_from_group_at(instance, 0.0)];
+            Cow::Owned(Instance { group: self.group_of(instance), world_from_group })
+        };
+        self.instances.get(instance as usize).map_or_else(of_cluster, Cow::Borrowed)
+    }
+
+    /// Number of instances, with those of clusters.
+    pub fn instance_count(&self) -> u32 {
+        self.instances.len() as u32 + self.clusters.instance_count()
     }
 
     /// True if an instance moves, so that time matters.
@@ -138,7 +200,7 @@ impl GeometrySet {
         if instance == NO_INSTANCE {
             return shape.surface_hit(primitive, uv, ray.d);
         }
-        let world_from_group = self.instances[instance as usize].world_from_group_at(ray.time);
+        let world_from_group = self.world_from_group_at(instance, ray.time);
         let d = match shape {
             Shape::Curves(_) => world_from_group.inverse().transform_vector3(ray.d),
             Shape::Mesh(_) | Shape::Quadric(_) | Shape::Bilinear(_) => ray.d,
@@ -198,6 +260,7 @@ mod tests {
                 Instance { group: 0, world_from_group: vec![shift(0.0), shift(1.0), shift(5.0)] },
                 Instance { group: 0, world_from_group: vec![mirror] },
             ],
+            ..GeometrySet::default()
         };
         let at = |instance, time| set.surface_hit(0, 0, instance, [0.25, 0.25], time);
         assert_eq!(at(NO_INSTANCE, 0.5).p, Vec3::new(0.25, 0.25, 0.0));

@@ -12,6 +12,10 @@ const BUILD: u64 = 62;
 const LIGHT: u64 = 430;
 /// Bytes of an instance.
 const INSTANCE: u64 = 400;
+/// Bytes of a place of a cluster beside its description, which takes more than Embree later.
+const PLACE: u64 = 112;
+/// Bytes of an instance of curves in a cluster while the hierarchy of curves is built.
+const CURVES: u64 = 230;
 /// Bytes per pixel with one sample: radiance, squared radiance, counts.
 pub const IMAGE: f64 = 38.0;
 /// Bytes per pixel of albedo, normal, depth and indices.
@@ -115,6 +119,13 @@ impl MemoryAccount {
         self.build = largest.saturating_mul(BUILD);
         self.add(format!("{emitting} emitting primitives and the light tree"), emitting.saturating_mul(LIGHT));
         self.add(format!("{instances} instances"), instances as u64 * INSTANCE);
+    }
+
+    /// Adds places and members of clusters, and the instances with curves that they stand for.
+    pub fn add_clusters(&mut self, places: u64, members: u64, with_curves: u64) {
+        self.add(format!("{places} places of clusters"), places.saturating_mul(PLACE));
+        self.add(format!("{members} members of clusters"), members.saturating_mul(INSTANCE));
+        self.add(format!("{with_curves} instances of curves in clusters"), with_curves.saturating_mul(CURVES));
     }
 
     /// Leaves room for an image.

@@ -106,21 +106,51 @@ fn objects_within_objects_are_the_shapes_that_they_hold() {
 }
 
 #[test]
+fn many_instances_of_objects_within_objects_are_clusters_with_the_same_image() {
+    // 300 places of 300 instances, nested and listed one by one
+    let matrix = |i: usize, scale: f64| {
+        let angle = i as f64 * 2.4;
+        let [x, y, z] =
+            [angle.cos() * (i as f64).sqrt(), angle.sin() * (i as f64).sqrt(), (i % 7) as f64].map(|p| p * 0.07);
+        format!("[ {scale} 0 0 0  0 {scale} 0 0  0 0 {scale} 0  {x} {y} {z} 1 ]")
+    };
+    let (mut flat, mut row, mut nested) = (String::new(), String::new(), String::new());
+    for i in 0..300 {
+        writeln!(row, "Transform {} ObjectInstance \"one\"", matrix(i, 0.1)).unwrap();
+        writeln!(nested, "Transform {} ObjectInstance \"row\"", matrix(i, 0.1)).unwrap();
+        for k in 0..300 {
+            let (outer, inner) = (matrix(i, 0.1), matrix(k, 0.1));
+            writeln!(flat, "Transform {outer} ConcatTransform {inner} ObjectInstance \"one\"").unwrap();
+        }
+    }
+    let one = format!("ObjectBegin \"one\" {SHAPE} ObjectEnd\n");
+    let nested = format!("{one}ObjectBegin \"row\" {row} ObjectEnd\n{nested}");
+    let geometry = load(&format!("{WORLD}{nested}")).unwrap().scene.geometry;
+    assert_eq!((geometry.instances.len(), geometry.clusters.instance_count()), (0, 90_000));
+
+    let images = TRACERS.map(|accel| image("", &nested, accel));
+    assert!(images[0].iter().filter(|x| **x > 0.0).count() > 100);
+    let flat = image("", &format!("{one}{flat}"), AccelKind::Embree);
+    let others = [&images[1], &flat].map(|other| fraction_of_others(&images[0], other));
+    assert!(others.iter().all(|others| *others < 0.02), "{others:?}");
+}
+
+#[test]
 fn objects_that_hold_themselves_or_too_much_are_errors() {
     let of = |world: &str| load(&format!("{WORLD}{world}")).map(|_| ()).unwrap_err();
     let error = of("ObjectBegin \"a\"\nObjectInstance \"a\"\nObjectEnd");
     assert!(error.contains("cannot contain itself") && error.contains("motion.pbrt:4:"), "{error}");
     let mut text = format!("ObjectBegin \"0\" {SHAPE} ObjectEnd\n");
-    for level in 1..=30 {
+    for level in 1..=32 {
         let inner = format!("ObjectInstance \"{}\" ", level - 1);
         writeln!(text, "ObjectBegin \"{level}\" {inner}{inner} ObjectEnd").unwrap();
     }
-    let error = of(&format!("{text}ObjectInstance \"30\""));
+    let error = of(&format!("{text}ObjectInstance \"32\""));
     let mut deep = format!("ObjectBegin \"0\" {SHAPE} ObjectEnd\n");
     for level in 1..=30_000 {
         writeln!(deep, "ObjectBegin \"{level}\" ObjectInstance \"{}\" ObjectEnd", level - 1).unwrap();
     }
     let loaded = load(&format!("{WORLD}{deep}ObjectInstance \"30000\"")).unwrap();
-    assert_eq!(loaded.scene.geometry.instances.len(), 30_001);
-    assert!(error.contains("2147483647 instances; at most 100000000"), "{error}");
+    assert_eq!(loaded.scene.geometry.instances.len(), 1);
+    assert!(error.contains("8589934591 instances; at most 2147483648"), "{error}");
 }

@@ -3,9 +3,9 @@
 //! Both trace five families of rays: camera rays, shadow segments towards the lights, random chords of the scene's
 //! bounds, rays that graze the surfaces hit by camera rays, and rays aimed at edges and vertices of triangles. Answers
 //! are *equal* if both hit the same primitive and their t differ by at most [`T_TOLERANCE_ULPS`] units in the last
-//! place of the largest number involved. A different answer is *explained* in two cases: the nearer primitive is tied
-//! in t with the other one, or the ray, in f64 arithmetic, passes one of its edges within [`EDGE_ULPS`] units in the
-//! last place. All other differences are disagreements.
+//! place of the largest number involved. A different answer is *explained* in three cases: the nearer primitive is
+//! tied in t with the other one; the ray, in f64 arithmetic, passes one of its edges within [`EDGE_ULPS`] units in the
+//! last place; or the ray starts within [`START_ULPS`] of it. All other differences are disagreements.
 
 use glam::DVec3;
 use lumiris::accel::{Accel, Coherence, Hit, RayBatch};
@@ -22,6 +22,8 @@ pub const T_TOLERANCE_ULPS: f64 = 64.0;
 /// Distance between a ray and an edge of a triangle below which rounding decides, in units in the last place of the
 /// largest coordinate involved.
 pub const EDGE_ULPS: f64 = 32.0;
+/// Distance of a hit from the start of its ray, in the same units, below which rounding decides.
+pub const START_ULPS: f64 = 1.0;
 
 /// A family of rays.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -327,6 +329,9 @@ impl Checker<'_> {
     }
 
     fn is_marginal(&self, ray: &Ray, hit: &Hit) -> bool {
+        if self.t_ulps(ray, hit.t, 0.0) <= START_ULPS {
+            return true;
+        }
         let Shape::Mesh(mesh) = &self.scene.geometry.geometries[hit.geometry as usize].shape else {
             // Both tracers intersect curved shapes with the same code; only rays transformed to an instance differ
             return hit.instance != Hit::NO_INSTANCE;
@@ -335,7 +340,7 @@ impl Checker<'_> {
         let world_scale = o.abs().max_element().max(ray.at(hit.t).as_dvec3().abs().max_element());
         let mut stretch = 1.0;
         if hit.instance != Hit::NO_INSTANCE {
-            let m = self.scene.geometry.instances[hit.instance as usize].world_from_group_at(ray.time);
+            let m = self.scene.geometry.world_from_group_at(hit.instance, ray.time);
             let inverse = glam::DAffine3::from_cols_array(&m.to_cols_array().map(f64::from)).inverse();
             (o, d) = (inverse.transform_point3(o), inverse.transform_vector3(d));
             let columns = inverse.matrix3;

@@ -129,23 +129,28 @@ fn group_prims(set: &GeometrySet, group: &Group, is_wanted: impl Fn(&Shape) -> b
 }
 
 /// Instances with their bounds over all times. Points move on straight lines between time samples, so the boxes at the
-/// samples suffice. Static instances with a singular transform are excluded.
+/// samples suffice. Static instances with a singular transform are excluded. Those of clusters are listed one by one.
 fn instance_prims(set: &GeometrySet, group_bounds: &[Bounds3]) -> Vec<PrimRef> {
-    let bounds_of = |i: usize| {
-        let instance = &set.instances[i];
-        let bounds = group_bounds[instance.group as usize];
-        if bounds.is_empty() || !instance.is_usable() {
-            return None;
-        }
+    // Clusters may stand for very many instances
+    let is_empty = |group: u32| group_bounds[group as usize].is_empty();
+    let clusters = set.clusters.clusters().iter();
+    let is_filled: Vec<bool> = clusters.map(|members| members.iter().any(|m| !is_empty(m.group))).collect();
+    let stored = set.instances.len() as u32;
+    let places = set.clusters.places().par_iter().filter(|place| is_filled[place.cluster as usize]);
+    let in_clusters = places.flat_map_iter(|place| set.clusters.instances_of(place)).map(|i| stored + i);
+
+    // Boxes of the others
+    let bounds_of = |i: u32| {
+        let bounds = group_bounds[set.group_of(i) as usize];
+        let instance = (!bounds.is_empty()).then(|| set.instance(i)).filter(|instance| instance.is_usable())?;
         let placed = instance.world_from_group.iter().map(|m| bounds.transformed(m));
         let all = placed.fold(Bounds3::EMPTY, Bounds3::union);
         // The transform of the ray into the group has rounding errors, too
         let pad = all.min.abs().max(all.max.abs()).max_element() * 2.0_f32.powi(-18);
-        Some(Bounds3 { min: all.min - Vec3::splat(pad), max: all.max + Vec3::splat(pad) })
+        let bounds = Bounds3 { min: all.min - Vec3::splat(pad), max: all.max + Vec3::splat(pad) };
+        PrimRef::of_bounds(PrimRef::INSTANCE, i as usize, bounds)
     };
-    (0..set.instances.len())
-        .filter_map(|i| bounds_of(i).and_then(|b| PrimRef::of_bounds(PrimRef::INSTANCE, i, b)))
-        .collect()
+    (0..stored).into_par_iter().chain(in_clusters).filter_map(bounds_of).collect()
 }
 
 #[cfg(test)]

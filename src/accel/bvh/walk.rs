@@ -318,17 +318,16 @@ impl<'a, Q: Query> Walk<'a, Q> {
     /// Traverses an instance. Ray parameters stay the same in world space, because the direction is transformed without
     /// normalisation.
     fn instance(&mut self, index: u32) -> bool {
-        let placed = &self.bvh.geometry.instances[index as usize];
-        let world = self.world_ray;
-        let group_from_world = self.bvh.group_from_world[index as usize]
-            .unwrap_or_else(|| placed.world_from_group_at(world.time).inverse());
+        let (set, world) = (&self.bvh.geometry, self.world_ray);
+        let stored = self.bvh.group_from_world.get(index as usize).copied().flatten();
+        let group_from_world = stored.unwrap_or_else(|| set.world_from_group_at(index, world.time).inverse());
         let ray = Ray {
             o: group_from_world.transform_point3(world.o),
             d: group_from_world.transform_vector3(world.d),
             ..*world
         };
         let bvh = self.bvh;
-        RayPrecomputed::new(&ray).is_some_and(|ray| self.tree(&bvh.groups[placed.group as usize], &ray, index))
+        RayPrecomputed::new(&ray).is_some_and(|ray| self.tree(&bvh.groups[set.group_of(index) as usize], &ray, index))
     }
 
     /// True if the query wants the hit and the hit stops the ray. `crossing` distinguishes hits on the same primitive.

@@ -5,11 +5,12 @@
 //! patches and alpha masks use callbacks as in the renderer. Curves are left out.
 #![allow(unsafe_code)]
 
-use super::calls::{self, Mode, QueryKind, RayHitPacket, RayPacket, Valid};
+use super::calls::{self, RayHitPacket, RayPacket, Valid, can_trace};
+use super::context::{Mode, QueryKind};
 use super::device::Device;
 use super::embree_accel::{Builder, checked_width, has_only_triangles};
 use super::error::EmbreeError;
-use super::query::{ANY_SINGLE, can_trace, load, single_ray};
+use super::query::{ANY_SINGLE, load, single_ray};
 use super::scene::EmbreeScene;
 use super::scene_ids::SceneIds;
 use crate::accel::RayBatch;

@@ -59,28 +59,28 @@ impl GeometryContext {
 
 /// N rays, followed by N hits if the callback gets both in one buffer.
 #[derive(Clone, Copy)]
-struct Lanes {
-    words: *mut f32,
-    n: usize,
+pub(super) struct Lanes {
+    pub words: *mut f32,
+    pub n: usize,
 }
 
-const TNEAR: usize = 3;
-const TFAR: usize = 8;
-const ID: usize = 10;
+pub(super) const TNEAR: usize = 3;
+pub(super) const TFAR: usize = 8;
+pub(super) const ID: usize = 10;
 /// Number of words in a ray.
-const RAY_WORDS: usize = 12;
+pub(super) const RAY_WORDS: usize = 12;
 
-const HIT_U: usize = 3;
-const HIT_V: usize = 4;
-const HIT_PRIM: usize = 5;
-const HIT_GEOM: usize = 6;
-const HIT_INST: usize = 7;
+pub(super) const HIT_U: usize = 3;
+pub(super) const HIT_V: usize = 4;
+pub(super) const HIT_PRIM: usize = 5;
+pub(super) const HIT_GEOM: usize = 6;
+pub(super) const HIT_INST: usize = 7;
 
 impl Lanes {
     /// # Safety
     /// `words` has fields beyond `field`, and `lane` is below n.
     #[inline]
-    unsafe fn get(self, field: usize, lane: usize) -> f32 {
+    pub(super) unsafe fn get(self, field: usize, lane: usize) -> f32 {
         // SAFETY: by the caller.
         unsafe { *self.words.add(field * self.n + lane) }
     }
@@ -88,7 +88,7 @@ impl Lanes {
     /// # Safety
     /// As [`Self::get`].
     #[inline]
-    unsafe fn set(self, field: usize, lane: usize, value: f32) {
+    pub(super) unsafe fn set(self, field: usize, lane: usize, value: f32) {
         // SAFETY: by the caller.
         unsafe { *self.words.add(field * self.n + lane) = value }
     }
@@ -96,7 +96,7 @@ impl Lanes {
     /// # Safety
     /// As [`Self::get`].
     #[inline]
-    unsafe fn get_u32(self, field: usize, lane: usize) -> u32 {
+    pub(super) unsafe fn get_u32(self, field: usize, lane: usize) -> u32 {
         // SAFETY: by the caller.
         unsafe { self.get(field, lane) }.to_bits()
     }
@@ -107,7 +107,7 @@ impl Lanes {
 /// # Safety
 /// `valid` has `n` elements, −1 or 0.
 #[inline]
-unsafe fn active(valid: *const i32, n: usize) -> impl Iterator<Item = usize> {
+pub(super) unsafe fn active(valid: *const i32, n: usize) -> impl Iterator<Item = usize> {
     let mut lanes = 0_u64;
     if n.is_multiple_of(4) {
         // Four signs at once: often only one of 8 or 16 lanes is active
@@ -140,7 +140,7 @@ pub(super) unsafe extern "C" fn alpha_filter(arguments: *const sys::RTCFilterFun
         let rays = Lanes { words: arguments.ray.cast(), n };
         let hits = Lanes { words: arguments.hit.cast(), n };
         for lane in active(arguments.valid, n) {
-            let (id, reported) = (rays.get_u32(ID, lane), reported(rays, hits, lane));
+            let (id, reported) = (rays.get_u32(ID, lane), reported(rays, hits, lane, query.first_instance));
             let mut stops = false;
             query.guard(|query| {
                 let ray = query.rays.get(id as usize);
@@ -170,7 +170,7 @@ pub(super) unsafe extern "C" fn first_filter(arguments: *const sys::RTCFilterFun
             let id = rays.get_u32(ID, lane);
             let end = match query.ties {
                 Ties::Noted => Some(query.note(id, rays.get(TFAR, lane))),
-                Ties::Settled => query.settle(id, &reported(rays, hits, lane)),
+                Ties::Settled => query.settle(id, &reported(rays, hits, lane, query.first_instance)),
             };
             match end {
                 Some(end) => rays.set(TFAR, lane, end),
@@ -180,18 +180,24 @@ pub(super) unsafe extern "C" fn first_filter(arguments: *const sys::RTCFilterFun
     }
 }
 
+/// The number of an instance for [`SceneIds::instance`].
+#[inline]
+pub(super) fn numbered(inst_id: u32, first_instance: u32) -> u32 {
+    if inst_id == u32::MAX { u32::MAX } else { inst_id + first_instance }
+}
+
 /// The hit of a triangle in a lane of a filter. The position on the triangle is computed later, with the exact hit.
 ///
 /// # Safety
 /// `rays` and `hits` have n lanes of rays and of hits, and `lane` is below n.
 #[inline]
-unsafe fn reported(rays: Lanes, hits: Lanes, lane: usize) -> Reported {
+unsafe fn reported(rays: Lanes, hits: Lanes, lane: usize, first_instance: u32) -> Reported {
     // SAFETY: by the caller.
     unsafe {
         Reported {
             geometry: hits.get_u32(HIT_GEOM, lane),
             primitive: hits.get_u32(HIT_PRIM, lane),
-            instance: hits.get_u32(HIT_INST, lane),
+            instance: numbered(hits.get_u32(HIT_INST, lane), first_instance),
             t: rays.get(TFAR, lane),
             uv: [0.0; 2],
         }
@@ -230,7 +236,7 @@ pub(super) unsafe extern "C" fn intersect(arguments: *const sys::RTCIntersectFun
         let n = arguments.N as usize;
         let rays = Lanes { words: arguments.rayhit.cast(), n };
         let hits = Lanes { words: rays.words.add(RAY_WORDS * n), n };
-        let inst_id = query.rtc.instID[0];
+        let (local, inst_id) = (query.rtc.instID[0], numbered(query.rtc.instID[0], query.first_instance));
         for lane in active(arguments.valid, n) {
             let intersect = |ray: &Ray, instance, range| geometry.intersect(ray, arguments.primID, instance, range);
             let found = lane_hit(geometry, query, rays, lane, inst_id, intersect);
@@ -246,7 +252,7 @@ pub(super) unsafe extern "C" fn intersect(arguments: *const sys::RTCIntersectFun
             hits.set(HIT_V, lane, hit.uv[1]);
             hits.set(HIT_PRIM, lane, f32::from_bits(arguments.primID));
             hits.set(HIT_GEOM, lane, f32::from_bits(arguments.geomID));
-            hits.set(HIT_INST, lane, f32::from_bits(inst_id));
+            hits.set(HIT_INST, lane, f32::from_bits(local));
         }
     }
 }
@@ -260,7 +266,7 @@ pub(super) unsafe extern "C" fn occluded(arguments: *const sys::RTCOccludedFunct
         let query = &mut *arguments.context.cast::<QueryContext<'_>>();
         let n = arguments.N as usize;
         let rays = Lanes { words: arguments.ray.cast(), n };
-        let inst_id = query.rtc.instID[0];
+        let inst_id = numbered(query.rtc.instID[0], query.first_instance);
         for lane in active(arguments.valid, n) {
             let occludes =
                 |ray: &Ray, instance, range| geometry.occludes(ray, arguments.primID, instance, range).then_some(());

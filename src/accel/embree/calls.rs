@@ -2,7 +2,7 @@
 #![allow(unsafe_code)]
 
 use super::callbacks::first_filter;
-use super::context::{QueryContext, RtcContext, Ties};
+use super::context::{Mode, QueryContext, QueryKind, RtcContext};
 use super::scene_ids::SceneIds;
 use crate::accel::RayBatch;
 use embree4_sys as sys;
@@ -10,26 +10,6 @@ use lumiris_lanes::hits::BLOCK;
 
 /// Words per hit in addition to the eight of all versions: `instPrimID`, if it exists.
 const EXTRA_HIT_WORDS: usize = if size_of::<sys::RTCRayHit8>() == 640 { 0 } else { 1 };
-
-/// The kind of query.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum QueryKind {
-    /// Nearest hits. The filter function of the query notes or settles ties.
-    First(Ties),
-    /// Nearest hits as determined by Embree.
-    Nearest,
-    /// Occlusion.
-    Any,
-}
-
-/// Query mode.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Mode {
-    /// The kind of query.
-    pub query: QueryKind,
-    /// True to traverse packets by their common frustum.
-    pub coherent: bool,
-}
 
 /// N rays.
 #[repr(C, align(64))]
@@ -84,6 +64,14 @@ const _: () = {
 /// multiplied.
 pub(super) const T_NEAR: f32 = 1e-20;
 
+/// True if the ray is finite, not empty, and has a direction. Other rays could break the traversal.
+#[inline]
+pub(super) fn can_trace(o: [f32; 3], d: [f32; 3], t_max: f32) -> bool {
+    // x·0 is NaN if x is not finite, and so is the sum
+    let zero = o[0] * 0.0 + o[1] * 0.0 + o[2] * 0.0 + d[0] * 0.0 + d[1] * 0.0 + d[2] * 0.0;
+    (zero == 0.0) & (t_max > 0.0) & ((d[0] != 0.0) | (d[1] != 0.0) | (d[2] != 0.0))
+}
+
 impl<const N: usize> RayPacket<N> {
     pub(super) fn new(mask: u32) -> Self {
         let zero = [0.0; N];
@@ -123,8 +111,7 @@ impl<const N: usize> RayHitPacket<N> {
 
 /// The context of queries for a batch.
 pub(super) fn query_context<'a>(world: &'a SceneIds, rays: &'a RayBatch, mode: Mode) -> QueryContext<'a> {
-    let ties = if let QueryKind::First(ties) = mode.query { ties } else { Ties::Noted };
-    QueryContext::new(rtc_context(mode), world, rays, ties)
+    QueryContext::new(rtc_context(mode), world, rays, mode)
 }
 
 #[cfg(embree3)]

@@ -21,6 +21,26 @@ pub(super) enum Ties {
     Settled,
 }
 
+/// The kind of query.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum QueryKind {
+    /// Nearest hits. The filter function of the query notes or settles ties.
+    First(Ties),
+    /// Nearest hits as determined by Embree.
+    Nearest,
+    /// Occlusion.
+    Any,
+}
+
+/// Query mode.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Mode {
+    /// The kind of query.
+    pub query: QueryKind,
+    /// True to traverse packets by their common frustum.
+    pub coherent: bool,
+}
+
 /// The part of a query context that Embree accesses.
 #[cfg(embree3)]
 pub(super) type RtcContext = sys::RTCIntersectContext;
@@ -80,6 +100,10 @@ pub(super) struct QueryContext<'a> {
     pub base: u32,
     /// Treatment of ties.
     pub ties: Ties,
+    /// Kind of the query.
+    pub mode: Mode,
+    /// Added to the `instID` of hits in the place of a cluster.
+    pub first_instance: u32,
     /// The smallest parameter reported for each ray of the block.
     pub best_t: [f32; BLOCK],
     /// Not 0 for rays of the block with a noted tie.
@@ -91,13 +115,16 @@ pub(super) struct QueryContext<'a> {
 }
 
 impl<'a> QueryContext<'a> {
-    pub(super) fn new(rtc: RtcContext, world: &'a SceneIds, rays: &'a RayBatch, ties: Ties) -> Self {
+    pub(super) fn new(rtc: RtcContext, world: &'a SceneIds, rays: &'a RayBatch, mode: Mode) -> Self {
+        let ties = if let QueryKind::First(ties) = mode.query { ties } else { Ties::Noted };
         QueryContext {
             rtc,
             world,
             rays,
             base: 0,
             ties,
+            mode,
+            first_instance: 0,
             best_t: [f32::INFINITY; BLOCK],
             tied: [0; BLOCK],
             first: ReportedBlock::NONE,

@@ -46,12 +46,13 @@
 //! coherent ray. The rest is loading rays, exact hits, and storing them (docs/measurements/wavefront).
 
 use super::callbacks::GeometryContext;
+use super::clusters::ClustersContext;
 use super::device::Device;
 use super::error::EmbreeError;
 use super::scene::EmbreeScene;
 use super::scene_ids::SceneIds;
 use crate::accel::{Accel, AccelStats, AlphaTest, Bvh, Coherence, Hit, RayBatch};
-use crate::geometry::{AlphaSource, GeometryId, GeometrySet, Shape};
+use crate::geometry::{AlphaSource, GeometryId, GeometrySet, Member, Shape};
 use embree4_sys::RTCDeviceProperty as Property;
 use std::ffi::CString;
 use std::sync::Arc;
@@ -88,7 +89,7 @@ impl Widths {
 /// True if Embree gets only triangles and no instances. In other scenes Embree 3.13.5 may not return from coherent
 /// queries for packets of 16 (observed for occlusion).
 pub(super) fn has_only_triangles(set: &GeometrySet) -> bool {
-    set.instances.is_empty() && set.geometries.iter().all(|g| matches!(g.shape, Shape::Mesh(_) | Shape::Curves(_)))
+    !set.has_instances() && set.geometries.iter().all(|g| matches!(g.shape, Shape::Mesh(_) | Shape::Curves(_)))
 }
 
 /// Embree's data structures for a scene.
@@ -195,26 +196,46 @@ impl Builder<'_> {
     pub(super) fn root(&self) -> Result<EmbreeScene, EmbreeError> {
         // A scene for each group with instances
         let (world, set) = (self.world, &self.world.set);
+        let of_instances = world.instances.iter().map(|&i| set.instances[i as usize].group);
+        let of_members = set.clusters.clusters().iter().flatten().map(|member| member.group);
         let mut groups: Vec<Option<Arc<EmbreeScene>>> = vec![None; set.groups.len()];
-        for &i in &world.instances {
-            let group = set.instances[i as usize].group as usize;
-            if groups[group].is_none() {
-                let scene = self.scene(&world.groups[group])?;
-                scene.commit()?;
-                groups[group] = Some(Arc::new(scene));
+        for group in of_instances.chain(of_members) {
+            let (scene, geometries) = (&mut groups[group as usize], &world.groups[group as usize]);
+            if scene.is_none() && !geometries.is_empty() {
+                *scene = Some(committed(self.scene(geometries)?)?);
             }
         }
 
-        // The root scene with the instances
+        // The root scene with the instances, and with the places of clusters after them
         let mut root = self.scene(&world.root)?;
         for &i in &world.instances {
             let instance = &set.instances[i as usize];
             if let Some(group) = &groups[instance.group as usize] {
-                root.add_instance(group, instance)?;
+                root.add_instance(group, &instance.world_from_group)?;
             }
+        }
+        if !set.clusters.places().is_empty() {
+            let scenes = self.clusters(&groups)?;
+            ClustersContext::new(set, scenes, world.first_of_clusters()).add_to(&mut root)?;
         }
         root.commit()?;
         Ok(root)
+    }
+
+    /// A scene for each cluster, whose ids are the indices of its members.
+    fn clusters(&self, groups: &[Option<Arc<EmbreeScene>>]) -> Result<Vec<Arc<EmbreeScene>>, EmbreeError> {
+        let cluster = |members: &Vec<Member>| {
+            let mut scene = self.scene(&[])?;
+            for Member { group, cluster_from_group } in members {
+                let transform = cluster_from_group.as_affine3a();
+                match &groups[*group as usize] {
+                    Some(group) if transform.inverse().is_finite() => scene.add_instance(group, &[transform])?,
+                    _ => scene.skip_id(),
+                }
+            }
+            committed(scene)
+        };
+        self.world.set.clusters.clusters().iter().map(cluster).collect()
     }
 
     /// A scene of geometries, before its commit.
@@ -228,6 +249,11 @@ impl Builder<'_> {
         }
         Ok(scene)
     }
+}
+
+fn committed(scene: EmbreeScene) -> Result<Arc<EmbreeScene>, EmbreeError> {
+    scene.commit()?;
+    Ok(Arc::new(scene))
 }
 
 /// The requested packet width, or the widest ones that pay off.

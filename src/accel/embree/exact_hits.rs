@@ -72,7 +72,7 @@ impl ExactHits {
                 self.set_corners::<1>(lane, triangle.corners());
             }
         }
-        if !world.instances.is_empty() {
+        if world.set.has_instances() {
             self.enter_instances(world, rays, range);
         }
         hits::exact(level(), &self.pairs, count, &mut self.hits);

@@ -1,8 +1,8 @@
 //! Conversion of ray batches to Embree's single rays and packets, and of the results.
 #![allow(unsafe_code)]
 
-use super::calls::{self, Mode, QueryKind, RayHitPacket, RayPacket, Valid};
-use super::context::{QueryContext, Ties};
+use super::calls::{self, RayHitPacket, RayPacket, Valid, can_trace};
+use super::context::{Mode, QueryContext, QueryKind, Ties};
 use super::embree_accel::EmbreeAccel;
 use super::exact_hits::ExactHits;
 use super::scene_ids::{Refined, Reported};
@@ -255,14 +255,6 @@ fn empty_others<const N: usize>(packet: &mut RayPacket<N>, valid: &Valid<N>) {
         (packet.d[0][lane], packet.d[1][lane], packet.d[2][lane]) = (0.0, 0.0, 1.0);
         packet.tfar[lane] = f32::NEG_INFINITY;
     }
-}
-
-/// True if the ray is finite, not empty, and has a direction. Other rays could break the traversal.
-#[inline]
-pub(super) fn can_trace(o: [f32; 3], d: [f32; 3], t_max: f32) -> bool {
-    // x·0 is NaN if x is not finite, and so is the sum
-    let zero = o[0] * 0.0 + o[1] * 0.0 + o[2] * 0.0 + d[0] * 0.0 + d[1] * 0.0 + d[2] * 0.0;
-    (zero == 0.0) & (t_max > 0.0) & ((d[0] != 0.0) | (d[1] != 0.0) | (d[2] != 0.0))
 }
 
 /// `time` clamped to 0..=1; 0 for NaN.

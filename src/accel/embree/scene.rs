@@ -4,9 +4,11 @@
 use super::callbacks::{self, GeometryContext};
 use super::device::Device;
 use super::error::EmbreeError;
-use crate::geometry::{GeometryId, GeometrySet, Instance, Shape};
+use crate::geometry::{GeometryId, GeometrySet, Shape};
 use embree4_sys as sys;
 use embree4_sys::{RTCBufferType, RTCFormat, RTCGeometryType, RTCSceneFlags};
+use lumiris_numbers::math::Affine3A;
+use std::any::Any;
 use std::ffi::c_void;
 use std::sync::Arc;
 
@@ -18,6 +20,20 @@ const INSTANCE_MASK: u32 = u32::MAX;
 const QUERY_FILTER: RTCSceneFlags = RTCSceneFlags::RTC_SCENE_FLAG_CONTEXT_FILTER_FUNCTION;
 #[cfg(embree4)]
 const QUERY_FILTER: RTCSceneFlags = RTCSceneFlags::RTC_SCENE_FLAG_FILTER_FUNCTION_IN_ARGUMENTS;
+
+/// Callbacks of a geometry.
+pub(super) struct UserCallbacks {
+    pub bounds: sys::RTCBoundsFunction,
+    pub intersect: sys::RTCIntersectFunctionN,
+    pub occluded: sys::RTCOccludedFunctionN,
+}
+
+/// Callbacks of quadrics and patches.
+const OF_SHAPES: UserCallbacks = UserCallbacks {
+    bounds: Some(callbacks::bounds),
+    intersect: Some(callbacks::intersect),
+    occluded: Some(callbacks::occluded),
+};
 
 /// A geometry that is not attached to a scene yet.
 pub(super) struct EmbreeGeometry {
@@ -52,10 +68,10 @@ impl EmbreeGeometry {
                 result.share(RTCBufferType::RTC_BUFFER_TYPE_INDEX, indices.as_ptr(), indices.len())?;
                 result
             }
-            Shape::Quadric(_) => Self::user(device, 1)?,
-            Shape::Bilinear(mesh) => Self::user(device, mesh.patch_count())?,
+            Shape::Quadric(_) => Self::user(device, 1, &OF_SHAPES)?,
+            Shape::Bilinear(mesh) => Self::user(device, mesh.patch_count(), &OF_SHAPES)?,
             // No scene has them
-            Shape::Curves(_) => Self::user(device, 0)?,
+            Shape::Curves(_) => Self::user(device, 0, &OF_SHAPES)?,
         };
         let user: *mut c_void = Arc::as_ptr(&context).cast_mut().cast();
         // SAFETY: the geometry, then the scene keeps the context, so it outlives the callbacks, which only read it.
@@ -86,24 +102,23 @@ impl EmbreeGeometry {
     }
 
     /// A geometry of `count` primitives that are intersected by callbacks.
-    fn user(device: &Arc<Device>, count: usize) -> Result<Self, EmbreeError> {
+    fn user(device: &Arc<Device>, count: usize, callbacks: &UserCallbacks) -> Result<Self, EmbreeError> {
         let count = u32::try_from(count).map_err(|_| EmbreeError::TooManyPrimitives)?;
         let result = Self::new(device, RTCGeometryType::RTC_GEOMETRY_TYPE_USER)?;
         // SAFETY: the geometry is live; the callbacks get the user data, which is set before the commit.
         unsafe {
             sys::rtcSetGeometryUserPrimitiveCount(result.raw, count);
-            sys::rtcSetGeometryBoundsFunction(result.raw, Some(callbacks::bounds), std::ptr::null_mut());
-            sys::rtcSetGeometryIntersectFunction(result.raw, Some(callbacks::intersect));
-            sys::rtcSetGeometryOccludedFunction(result.raw, Some(callbacks::occluded));
+            sys::rtcSetGeometryBoundsFunction(result.raw, callbacks.bounds, std::ptr::null_mut());
+            sys::rtcSetGeometryIntersectFunction(result.raw, callbacks.intersect);
+            sys::rtcSetGeometryOccludedFunction(result.raw, callbacks.occluded);
         }
         device.check("describe a quadric or patches")?;
         Ok(result)
     }
 
     /// An instance of a group's scene.
-    fn placing(device: &Arc<Device>, group: &EmbreeScene, instance: &Instance) -> Result<Self, EmbreeError> {
+    fn placing(device: &Arc<Device>, group: &EmbreeScene, samples: &[Affine3A]) -> Result<Self, EmbreeError> {
         let result = Self::new(device, RTCGeometryType::RTC_GEOMETRY_TYPE_INSTANCE)?;
-        let samples = &instance.world_from_group;
         // SAFETY: both handles are live; each matrix is read during its call: 12 floats, column by column.
         unsafe {
             sys::rtcSetGeometryInstancedScene(result.raw, group.raw);
@@ -146,6 +161,10 @@ pub(super) struct EmbreeScene {
     contexts: Vec<Arc<GeometryContext>>,
     /// Scenes of the instances.
     groups: Vec<Arc<EmbreeScene>>,
+    /// The id of the next geometry or instance.
+    next_id: u32,
+    /// User data of [`Self::add_user`].
+    user_data: Vec<Arc<dyn Any + Send + Sync>>,
     /// Owner of the shared buffers.
     _set: Arc<GeometrySet>,
 }
@@ -166,6 +185,8 @@ impl EmbreeScene {
             device: Arc::clone(device),
             contexts: Vec::new(),
             groups: Vec::new(),
+            next_id: 0,
+            user_data: Vec::new(),
             _set: Arc::clone(set),
         };
         device.check("create a scene")?;
@@ -186,9 +207,36 @@ impl EmbreeScene {
         self.attach(geometry)
     }
 
-    /// Adds an instance of a committed scene.
-    pub(super) fn add_instance(&mut self, group: &Arc<EmbreeScene>, instance: &Instance) -> Result<(), EmbreeError> {
-        let geometry = EmbreeGeometry::placing(&self.device, group, instance)?;
+    /// Adds `count` primitives that are intersected by callbacks, with `data` for them.
+    ///
+    /// # Safety
+    /// The callbacks only read their user data, as a `T`.
+    pub(super) unsafe fn add_user<T: Any + Send + Sync>(
+        &mut self,
+        data: T,
+        count: usize,
+        callbacks: &UserCallbacks,
+    ) -> Result<(), EmbreeError> {
+        let geometry = EmbreeGeometry::user(&self.device, count, callbacks)?;
+        let data = Arc::new(data);
+        let pointer: *mut c_void = Arc::as_ptr(&data).cast_mut().cast();
+        self.user_data.push(data);
+        // SAFETY: the geometry is live, and the scene keeps the data, so it outlives the callbacks.
+        unsafe {
+            sys::rtcSetGeometryUserData(geometry.raw, pointer);
+            sys::rtcSetGeometryMask(geometry.raw, INSTANCE_MASK);
+        }
+        geometry.commit()?;
+        self.attach(geometry)
+    }
+
+    /// Adds an instance of a committed scene, with its transforms at equidistant times.
+    pub(super) fn add_instance(
+        &mut self,
+        group: &Arc<EmbreeScene>,
+        world_from_group: &[Affine3A],
+    ) -> Result<(), EmbreeError> {
+        let geometry = EmbreeGeometry::placing(&self.device, group, world_from_group)?;
         if self.groups.last().is_none_or(|last| !Arc::ptr_eq(last, group)) {
             self.groups.push(Arc::clone(group));
         }
@@ -198,8 +246,14 @@ impl EmbreeScene {
     fn attach(&mut self, mut geometry: EmbreeGeometry) -> Result<(), EmbreeError> {
         self.contexts.extend(geometry.context.take());
         // SAFETY: both are live; the scene takes a reference.
-        unsafe { sys::rtcAttachGeometry(self.raw, geometry.raw) };
+        unsafe { sys::rtcAttachGeometryByID(self.raw, geometry.raw, self.next_id) };
+        self.skip_id();
         self.device.check("attach a geometry")
+    }
+
+    /// Leaves out an id.
+    pub(super) fn skip_id(&mut self) {
+        self.next_id += 1;
     }
 
     /// Builds the hierarchy, on all cores.

@@ -14,7 +14,7 @@ pub(super) struct Reported {
     pub geometry: u32,
     /// `primID`.
     pub primitive: u32,
-    /// `instID[0]`; `u32::MAX` in the root.
+    /// `instID[0]`, or the number of a cluster's instance after all ids of the root; `u32::MAX` in the root.
     pub instance: u32,
     /// Ray parameter.
     pub t: f32,
@@ -75,7 +75,19 @@ impl SceneIds {
     /// The instance of an `instID`.
     #[inline]
     pub(super) fn instance(&self, inst_id: u32) -> u32 {
-        if inst_id == u32::MAX { Hit::NO_INSTANCE } else { self.instances[inst_id as usize - self.root.len()] }
+        if inst_id == u32::MAX {
+            return Hit::NO_INSTANCE;
+        }
+        match self.instances.get(inst_id as usize - self.root.len()) {
+            Some(&instance) => instance,
+            None => self.set.instances.len() as u32 + (inst_id - self.first_of_clusters()),
+        }
+    }
+
+    /// Number of the first instance of a cluster: the ids of Embree's root scene are before it.
+    #[inline]
+    pub(super) fn first_of_clusters(&self) -> u32 {
+        (self.root.len() + self.instances.len()) as u32
     }
 
     /// The geometry of a `geomID` in `instance`.
@@ -84,7 +96,7 @@ impl SceneIds {
         if instance == Hit::NO_INSTANCE {
             return self.root[geom_id as usize];
         }
-        self.groups[self.set.instances[instance as usize].group as usize][geom_id as usize]
+        self.groups[self.set.group_of(instance) as usize][geom_id as usize]
     }
 
     /// The ray in the space of the group of `instance`.
@@ -93,9 +105,8 @@ impl SceneIds {
         if instance == Hit::NO_INSTANCE {
             return *world;
         }
-        let instance = instance as usize;
-        let group_from_world = self.group_from_world[instance]
-            .unwrap_or_else(|| self.set.instances[instance].world_from_group_at(world.time).inverse());
+        let stored = self.group_from_world.get(instance as usize).copied().flatten();
+        let group_from_world = stored.unwrap_or_else(|| self.set.world_from_group_at(instance, world.time).inverse());
         Ray { o: group_from_world.transform_point3(world.o), d: group_from_world.transform_vector3(world.d), ..*world }
     }
 

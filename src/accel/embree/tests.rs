@@ -8,7 +8,7 @@ use crate::accel::scenes_for_tests::{
     soup,
 };
 use crate::geometry::reference_for_tests::{random_point, triangle_hit};
-use crate::geometry::{Geometry, Group, Instance, Shape, TriangleMesh, Visibility};
+use crate::geometry::{Clusters, Geometry, Group, Instance, Member, Shape, TriangleMesh, Visibility};
 use lumiris_numbers::math::ray::offset_origin;
 use lumiris_numbers::math::{Affine3A, Frame, Ray, Vec2, Vec3, warp};
 use lumiris_test_support::random::{Pcg32, RngExt, pcg32};
@@ -281,6 +281,66 @@ fn curves_among_triangles_are_hit_as_by_the_rust_tracer() {
     }
 }
 
+/// The set with clusters of its groups, two places of which coincide, and the same set with instances only.
+fn with_clusters(set: &GeometrySet) -> [Arc<GeometrySet>; 2] {
+    let mut set = set.clone();
+    let mut s = pcg32([4, 4, 4]);
+    for count in [3_u32, 5] {
+        let mut placement = || random_placement(&mut s).as_daffine3();
+        let group = |k| k % set.groups.len() as u32;
+        let members = (0..count).map(|k| Member { group: group(k), cluster_from_group: placement() }).collect();
+        let cluster = set.clusters.add(members);
+        let places = [placement(), placement(), placement()];
+        [0, 1, 2, 1].iter().for_each(|&i| set.clusters.place(cluster, places[i]));
+    }
+    assert_eq!(set.instance_count(), set.instances.len() as u32 + 32);
+    let instances = (0..set.instance_count()).map(|i| set.instance(i).into_owned()).collect();
+    let expanded = GeometrySet { instances, clusters: Clusters::default(), ..set.clone() };
+    [set, expanded].map(Arc::new)
+}
+
+#[test]
+fn clusters_give_the_hits_of_their_instances() {
+    // Shapes of all kinds with alpha masks, moving instances beside clusters, and curves
+    let curves = curve_scene(0, 1);
+    let rays = curve_rays(&curves, 20_000, 0);
+    let others = [mixed_scene(4, 1), mixed_scene(5, 3)].map(|set| (set, random_rays(20_000, 4)));
+    for (set, rays) in others.into_iter().chain([(curves, rays)]) {
+        let sets = with_clusters(&set);
+        let bvhs = sets.each_ref().map(|set| Bvh::new(Arc::clone(set), Some(Arc::new(Stripes))));
+        let [hits, expected] = bvhs.each_ref().map(|bvh| intersect(bvh, &rays, Coherence::Incoherent));
+        assert!(hits.iter().zip(&expected).all(|(a, b)| bits(a) == bits(b)), "the BVH traces the same instances");
+        let expected_occluded = occluded(&bvhs[0], &rays, Coherence::Incoherent);
+
+        // Single rays and packets
+        for (width, coherence) in WIDTHS.into_iter().flat_map(|w| COHERENCES.map(|c| (w, c))) {
+            let accels = sets.each_ref().map(|set| embree(set, width));
+            let [hits, of_instances] = accels.each_ref().map(|accel| intersect(accel, &rays, coherence));
+            let in_clusters = hits.iter().flatten().filter(|hit| hit.instance >= set.instances.len() as u32).count();
+            assert!(in_clusters > 2_000, "{in_clusters}");
+            let [found, of_instances_too] = accels.each_ref().map(|accel| occluded(accel, &rays, coherence));
+            for (expected, expected_occluded) in [(&expected, &expected_occluded), (&of_instances, &of_instances_too)] {
+                let differ = hits.iter().zip(expected).filter(|(a, b)| bits(a) != bits(b)).count();
+                let differ_in_occlusion = found.iter().zip(expected_occluded).filter(|(a, b)| a != b).count();
+                assert!(
+                    differ <= 3 && differ_in_occlusion <= 3,
+                    "{width} {coherence:?}: {differ} {differ_in_occlusion}"
+                );
+            }
+        }
+
+        // Surfaces and bounds
+        assert_eq!(sets[0].world_bounds(), sets[1].world_bounds());
+        for (i, hit) in hits.iter().enumerate().filter_map(|(i, hit)| hit.map(|hit| (i, hit))) {
+            let surface = |set: &Arc<GeometrySet>| {
+                set.surface_hit_of_ray(hit.geometry, hit.primitive, hit.instance, hit.uv, &rays.get(i))
+            };
+            let [a, b] = sets.each_ref().map(surface);
+            assert_eq!((a.p, a.n), (b.p, b.n));
+        }
+    }
+}
+
 #[test]
 fn answers_agree_with_brute_force_in_f64() {
     // Trace with Embree
@@ -400,6 +460,7 @@ fn flat_and_infinite_placements_are_left_out() {
             placed(Affine3A::from_translation(Vec3::INFINITY)),
             placed(Affine3A::from_translation(Vec3::X * 4.0)),
         ],
+        ..GeometrySet::default()
     };
     let accel = EmbreeAccel::new(Arc::new(set), None, None).unwrap();
     let mut rays = RayBatch::default();
@@ -475,6 +536,7 @@ fn many_instances_build_fast_and_small() {
         groups: vec![Group { geometries: vec![0] }],
         root: Group::default(),
         instances: instances.collect(),
+        ..GeometrySet::default()
     };
     let accel = EmbreeAccel::new(Arc::new(set), None, None).unwrap();
     let stats = accel.stats();

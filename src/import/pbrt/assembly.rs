@@ -264,10 +264,12 @@ impl Builder<'_> {
     pub(super) fn place_instances(&mut self, assembly: &mut Assembly, d: &mut Diagnostics) {
         let instances = std::mem::take(&mut self.instances);
         let (moving, shutter) = (&assembly.moving, assembly.shutter);
-        let objects = Objects { objects: &self.objects, moving, shutter, origin: self.origin };
+        let groups = &assembly.set.groups[..];
+        let objects = Objects { objects: &self.objects, groups, moving, shutter, origin: self.origin };
         match objects.place(instances) {
             Ok(placed) => {
                 assembly.set.instances.extend(placed.instances);
+                assembly.set.clusters = placed.clusters;
                 placed.flat.iter().for_each(|flat| assembly.add_flat(&flat.instance, flat.span, d));
             }
             Err(reason) => {

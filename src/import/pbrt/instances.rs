@@ -1,15 +1,13 @@
 //! Instances of objects, and of moving or nested parts within them.
 
 use super::descriptions::{InstanceDesc, ObjectDesc};
+use super::layout::{Groups, Layout};
 use super::make_shapes::placed_quadric;
-use crate::geometry::{GroupId, Instance, Quadric, Shape};
+use crate::geometry::{ClusterId, Clusters, Group, GroupId, Instance, Member, Quadric, Shape};
 use lumiris_formats::source::Span;
 use lumiris_numbers::math::origin::rebased;
 use lumiris_numbers::math::transform::{compose_placements, swaps_handedness};
 use lumiris_numbers::math::{Affine3A, DAffine3, DVec3};
-
-/// Maximum number of instances of groups in a scene.
-pub(super) const MAX_INSTANCES: u64 = 100_000_000;
 
 /// A group that moves within an object, or is far from its origin.
 pub(super) struct MovingGroup {
@@ -22,6 +20,8 @@ pub(super) struct MovingGroup {
 pub(super) struct Objects<'a> {
     /// Objects; each contains only earlier ones.
     pub objects: &'a [ObjectDesc],
+    /// The groups of static shapes, by object.
+    pub groups: &'a [Group],
     /// By object, groups that move within it or are far from its origin.
     pub moving: &'a [Vec<MovingGroup>],
     /// Opening and closing of the shutter, as fractions of the motion.
@@ -39,6 +39,7 @@ pub(super) fn rendered(placements: &[DAffine3], origin: DVec3, of_group: DVec3) 
 #[derive(Default)]
 pub(super) struct Placed {
     pub instances: Vec<Instance>,
+    pub clusters: Clusters,
     /// Singular instances.
     pub flat: Vec<FlatInstance>,
 }
@@ -76,39 +77,91 @@ pub(super) fn flattened(shape: &Shape, world_from_group: &Affine3A) -> Option<Sh
 }
 
 impl Objects<'_> {
-    /// The instances of groups that these instances of objects expand to.
+    /// The instances of groups that these instances of objects expand to, and the clusters, which are not expanded.
     ///
     /// Returns `Err` with a message if they are too many.
     pub(super) fn place(&self, instances: Vec<InstanceDesc>) -> Result<Placed, String> {
-        // Number of instances
-        let mut sizes: Vec<u64> = Vec::new();
-        for (object, moving) in self.objects.iter().zip(self.moving) {
-            let nested = object.instances.iter().map(|i| sizes[i.object]).fold(0, u64::saturating_add);
-            sizes.push(nested.saturating_add(1 + moving.len() as u64));
-        }
-        let all = instances.iter().map(|i| sizes[i.object]).fold(0, u64::saturating_add);
-        if all > MAX_INSTANCES {
-            return Err(format!("objects within objects make {all} instances; at most {MAX_INSTANCES} are"));
+        // Clusters
+        let layout = Layout::new(self.objects, &self.own_groups(), &instances)?;
+        let mut placed = Placed::default();
+        placed.instances.reserve(layout.stored.instances as usize);
+        let mut clusters: Vec<Option<ClusterId>> = vec![None; self.objects.len()];
+        for object in layout.clusters {
+            clusters[object] = Some(placed.clusters.add(self.members(object)));
         }
 
-        // Expand
-        let mut placed = Placed { instances: Vec::with_capacity(all as usize), flat: Vec::new() };
-        for asked in instances {
-            // Iterative, since the nesting depth of objects is unlimited
-            let mut open = vec![(asked.object, asked.ctm.samples(self.shutter))];
-            while let Some((object, placement)) = open.pop() {
-                let instance = |group: GroupId, placement: &[DAffine3]| Instance {
-                    group,
-                    world_from_group: rendered(placement, self.origin, DVec3::ZERO),
-                };
-                for MovingGroup { group, placements } in &self.moving[object] {
-                    placed.push(instance(*group, &compose_placements(&placement, placements)), asked.span);
+        // Instances and places
+        for InstanceDesc { object, ctm, span } in instances {
+            let outer = ctm.samples(self.shutter).iter().map(|m| rebased(m, self.origin, DVec3::ZERO)).collect();
+            let nested = Nested { object, outer, is_fixed: ctm.is_fixed() };
+            self.expand(nested, &clusters, |part, placements| match part {
+                Part::Cluster(cluster) => placed.clusters.place(cluster, placements[0]),
+                Part::Group(group) => {
+                    let world_from_group = placements.iter().map(DAffine3::as_affine3a).collect();
+                    placed.push(Instance { group, world_from_group }, span);
                 }
-                let within = |i: &InstanceDesc| compose_placements(&placement, &i.ctm.samples(self.shutter));
-                open.extend(self.objects[object].instances.iter().map(|i| (i.object, within(i))));
-                placed.push(instance(object as GroupId, &placement), asked.span);
-            }
+            });
         }
         Ok(placed)
     }
+
+    /// By object, the groups of its shapes. Curves do not matter here.
+    fn own_groups(&self) -> Vec<Groups> {
+        let of_object = |moving: &Vec<MovingGroup>| Groups {
+            count: 1 + moving.len() as u64,
+            with_curves: 0,
+            is_moving: moving.iter().any(|group| group.placements.len() > 1),
+        };
+        self.moving.iter().map(of_object).collect()
+    }
+
+    /// The groups of an object and of those within it.
+    fn members(&self, object: usize) -> Vec<Member> {
+        let mut members = Vec::new();
+        let nested = Nested { object, outer: vec![DAffine3::IDENTITY], is_fixed: true };
+        self.expand(nested, &[], |part, placements| {
+            if let Part::Group(group) = part {
+                members.push(Member { group, cluster_from_group: placements[0] });
+            }
+        });
+        members
+    }
+
+    /// Calls `visit` with the parts of an object and their transforms. `clusters` are those of objects, if there are
+    /// any.
+    fn expand(&self, nested: Nested, clusters: &[Option<ClusterId>], mut visit: impl FnMut(Part, Vec<DAffine3>)) {
+        // Iterative, since the nesting depth of objects is unlimited
+        let mut open = vec![nested];
+        while let Some(Nested { object, outer, is_fixed }) = open.pop() {
+            if let Some(Some(cluster)) = clusters.get(object).filter(|_| is_fixed) {
+                visit(Part::Cluster(*cluster), outer);
+                continue;
+            }
+            for MovingGroup { group, placements } in &self.moving[object] {
+                visit(Part::Group(*group), compose_placements(&outer, placements));
+            }
+            open.extend(self.objects[object].instances.iter().map(|i| Nested {
+                object: i.object,
+                outer: compose_placements(&outer, &i.ctm.samples(self.shutter)),
+                is_fixed: is_fixed && i.ctm.is_fixed(),
+            }));
+            if !self.groups[object].geometries.is_empty() {
+                visit(Part::Group(object as GroupId), outer);
+            }
+        }
+    }
+}
+
+/// An instance of an object within others.
+struct Nested {
+    object: usize,
+    outer: Vec<DAffine3>,
+    /// True if neither this nor an outer instance moves or is singular.
+    is_fixed: bool,
+}
+
+/// A part of an object.
+enum Part {
+    Group(GroupId),
+    Cluster(ClusterId),
 }

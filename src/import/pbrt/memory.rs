@@ -1,6 +1,7 @@
 //! The memory that a scene takes beside textures, before its files are read.
 
 use super::descriptions::{ShapeDesc, ShapeSource};
+use super::layout::{Groups, Layout, Stored};
 use super::state::Builder;
 use crate::import::cache::FileCache;
 use crate::import::face_maps::face_map_size;
@@ -23,8 +24,12 @@ impl Builder<'_> {
 
         // Shapes, instances and lights
         let sizes: Vec<ShapeSize> = shapes.par_iter().map(|shape| size_of(shape, files)).collect();
-        let nested: usize = self.objects.iter().map(|object| object.instances.len()).sum();
-        account.add_geometry(sizes.into_iter(), self.objects.len(), self.instances.len() + nested);
+        let layout = Layout::new(&self.objects, &self.own_groups(shapes), &self.instances);
+        // Too many are reported later
+        let Stored { instances, places, members, with_curves } =
+            layout.map_or_else(|_| Stored::default(), |l| l.stored);
+        account.add_geometry(sizes.into_iter(), self.objects.len(), instances as usize);
+        account.add_clusters(places, members, with_curves);
 
         // Other files
         let mut add = |path: &Path, size: &dyn Fn() -> FileSize| {
@@ -41,6 +46,21 @@ impl Builder<'_> {
         }
         self.volume_requests().iter().for_each(|request| add(&request.path, &|| volume_size(request)));
         account
+    }
+}
+
+impl Builder<'_> {
+    /// By object, the groups of its shapes. Shapes that move alike may be fewer groups.
+    fn own_groups(&self, shapes: &[ShapeDesc]) -> Vec<Groups> {
+        let mut own = vec![Groups { count: 1, with_curves: 0, is_moving: false }; self.objects.len()];
+        for shape in shapes {
+            let Some(own) = shape.object.map(|object| &mut own[object]) else { continue };
+            let is_curves = matches!(shape.source, ShapeSource::Curves(_));
+            own.count += u64::from(shape.ctm.is_moving());
+            own.is_moving |= shape.ctm.is_moving();
+            own.with_curves = own.with_curves.max(u64::from(is_curves));
+        }
+        own
     }
 }
 

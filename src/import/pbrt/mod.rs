@@ -4,8 +4,8 @@
 //! each kind of directive: [`transform`], [`options`], [`settings`], [`film`], [`spectrum`], `texture_names`,
 //! [`textures`], `ptex`, [`materials`], `hair`, `measured`, [`lights`], `image_lights`, [`media`] with `media_presets`
 //! and `volumes`, `curves`, [`shapes`]; [`directives`] (the state machine over `lumiris_formats::pbrt`'s directives);
-//! `resolve` (names that may be used before their definition); `files`, `make_shapes`, `instances` and `assembly`
-//! (geometry from descriptions and files); and [`finish`] (the steps from the read text to the scene).
+//! `resolve` (names that may be used before their definition); `files`, `make_shapes`, `layout`, `instances` and
+//! `assembly` (geometry from descriptions and files); and [`finish`] (the steps from the read text to the scene).
 
 mod assembly;
 pub mod checks;
@@ -18,6 +18,7 @@ pub mod finish;
 mod hair;
 mod image_lights;
 mod instances;
+mod layout;
 mod lenses;
 pub mod lights;
 mod make_shapes;

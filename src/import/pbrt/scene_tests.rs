@@ -244,7 +244,7 @@ fn objects_that_are_placed_once_need_no_instance() {
     let turning = format!(r#"ObjectBegin "o" {mesh} ObjectEnd ActiveTransform EndTime {place} ObjectInstance "o""#);
     assert_eq!(geometry(&turning).instances.len(), 1);
     let nested = r#"ObjectBegin "a" ObjectInstance "o" ObjectEnd ObjectInstance "a" ObjectInstance "a""#;
-    assert_eq!(geometry(&format!(r#"ObjectBegin "o" {mesh} ObjectEnd {nested}"#)).instances.len(), 4);
+    assert_eq!(geometry(&format!(r#"ObjectBegin "o" {mesh} ObjectEnd {nested}"#)).instances.len(), 2);
 }
 
 #[test]

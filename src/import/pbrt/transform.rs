@@ -88,6 +88,11 @@ impl Ctm {
         })
     }
 
+    /// True if it is invertible and does not move.
+    pub fn is_fixed(&self) -> bool {
+        !self.is_moving() && self.is_invertible()
+    }
+
     /// The transforms at equidistant times 0..=1 of the shutter, which opens and closes at the given fractions of the
     /// motion: one without motion, two without rotation, otherwise enough for the rotation.
     pub fn samples(&self, shutter: [f32; 2]) -> Vec<DAffine3> {

@@ -5,7 +5,7 @@ use super::info_file::facts_of_file;
 use super::progress;
 use super::settings::{Setup, load_job};
 use clap::Args;
-use lumiris::geometry::Shape;
+use lumiris::geometry::{Member, Shape};
 use lumiris::import::memory::{peak_resident, resident};
 use lumiris::lights::Light;
 use lumiris::render::RenderSettings;
@@ -67,7 +67,10 @@ fn facts(job: &RenderJob) -> Value {
         meshes.sum()
     };
     let per_group: Vec<usize> = set.groups.iter().map(group_triangles).collect();
-    let instanced: usize = set.instances.iter().map(|i| per_group[i.group as usize]).sum();
+    let per_cluster = |members: &Vec<Member>| members.iter().map(|m| per_group[m.group as usize]).sum::<usize>();
+    let per_cluster: Vec<usize> = set.clusters.clusters().iter().map(per_cluster).collect();
+    let in_clusters: usize = set.clusters.places().iter().map(|place| per_cluster[place.cluster as usize]).sum();
+    let instanced = in_clusters + set.instances.iter().map(|i| per_group[i.group as usize]).sum::<usize>();
     let bounds = set.world_bounds();
     let bounds = [bounds.min, bounds.max].map(|corner| (corner.as_dvec3() + scene.origin).to_array());
 
@@ -93,7 +96,8 @@ fn facts(job: &RenderJob) -> Value {
             "geometries": set.geometries.len(),
             "curves": counts.curves, "curve_pieces": counts.curve_pieces,
             "triangles": counts.triangles, "quadrics": counts.quadrics, "patches": counts.patches,
-            "groups": set.groups.len(), "instances": set.instances.len(),
+            "groups": set.groups.len(),
+            "instances": set.instances.len() + set.clusters.instance_count() as usize,
             "triangles_with_instances": group_triangles(&set.root) + instanced,
             "bounds": bounds,
         },

@@ -172,7 +172,7 @@ impl Planting {
         let mut side = (instances as f32 / 14.0).sqrt();
         loop {
             let terrain = Terrain { side, seed };
-            let places = places(&terrain);
+            let places = sites(&terrain);
             let room: usize = places.iter().map(|place| patches[place.patch].contents.len()).sum();
             if room >= instances {
                 return Planting::of(terrain, patches, &places, instances);
@@ -182,7 +182,7 @@ impl Planting {
     }
 
     /// Uses places in their order until there are enough instances. The last patch is cut off.
-    fn of(terrain: Terrain, mut patches: Vec<Patch>, places: &[Place], instances: usize) -> Self {
+    fn of(terrain: Terrain, mut patches: Vec<Patch>, places: &[Site], instances: usize) -> Self {
         let (mut placements, mut left) = (Vec::new(), instances);
         let (mut plants, mut pebbles) = (0, 0);
         for place in places {
@@ -208,7 +208,7 @@ impl Planting {
 }
 
 /// A place for a patch.
-struct Place {
+struct Site {
     /// Index of the patch.
     patch: usize,
     transform: Affine3A,
@@ -217,7 +217,7 @@ struct Place {
 }
 
 /// All places on the terrain, in a random order.
-fn places(terrain: &Terrain) -> Vec<Place> {
+fn sites(terrain: &Terrain) -> Vec<Site> {
     let cells = (terrain.side / PATCH).ceil() as u32;
     let place = |i: u32| {
         // A point in the cell of the grid
@@ -233,9 +233,9 @@ fn places(terrain: &Terrain) -> Vec<Place> {
         let cover = Cover::at(terrain, p, &ground)?;
         let variant = stream.within(0.0, VARIANTS as f32) as u32;
         let transform = on_ground(p, &ground, stream.angle());
-        Some(Place { patch: (cover as u32 * VARIANTS + variant) as usize, transform, order: stream.within(0.0, 1.0) })
+        Some(Site { patch: (cover as u32 * VARIANTS + variant) as usize, transform, order: stream.within(0.0, 1.0) })
     };
-    let mut places: Vec<Place> = (0..cells * cells).into_par_iter().filter_map(place).collect();
+    let mut places: Vec<Site> = (0..cells * cells).into_par_iter().filter_map(place).collect();
     places.sort_by(|a, b| a.order.total_cmp(&b.order));
     places
 }
