@@ -30,15 +30,10 @@ pub struct ClusterInstance {
     pub first: u32,
 }
 
-/// Growth of the bounds of places, relative to coordinates, for rounding errors of transforms of points and rays.
-const BOUNDS_GROWTH: f32 = 1.0 / (1 << 18) as f32;
-
 impl ClusterInstance {
     /// Bounds of the place from those of all clusters.
     pub fn bounds(&self, cluster_bounds: &[Bounds3]) -> Bounds3 {
-        let exact = cluster_bounds[self.cluster as usize].transformed(&self.world_from_cluster.as_affine3a());
-        let growth = exact.min.abs().max(exact.max.abs()).max_element() * BOUNDS_GROWTH;
-        Bounds3 { min: exact.min - growth, max: exact.max + growth }
+        cluster_bounds[self.cluster as usize].transformed(&self.world_from_cluster.as_affine3a())
     }
 }
 

@@ -15,6 +15,9 @@ use embree4_sys as sys;
 use lumiris_numbers::math::{Affine3A, Bounds3, Vec3};
 use std::sync::Arc;
 
+/// Growth of the boxes of places, relative to coordinates, for rounding errors of rays transformed into a cluster.
+const BOX_GROWTH: f32 = 1.0 / (1 << 18) as f32;
+
 const TIME: usize = 7;
 const MASK: usize = 9;
 
@@ -100,10 +103,12 @@ unsafe extern "C" fn bounds(arguments: *const sys::RTCBoundsFunctionArguments) {
     unsafe {
         let arguments = &*arguments;
         let context = &*arguments.geometryUserPtr.cast::<ClustersContext>();
-        let bounds = context.set.clusters.places()[arguments.primID as usize].bounds(&context.bounds);
+        let found = context.set.clusters.places()[arguments.primID as usize].bounds(&context.bounds);
+        let growth = found.min.abs().max(found.max.abs()).max_element() * BOX_GROWTH;
+        let (lower, upper) = (found.min - growth, found.max + growth);
         let out = &mut *arguments.bounds_o;
-        (out.lower_x, out.lower_y, out.lower_z) = bounds.min.into();
-        (out.upper_x, out.upper_y, out.upper_z) = bounds.max.into();
+        (out.lower_x, out.lower_y, out.lower_z) = lower.into();
+        (out.upper_x, out.upper_y, out.upper_z) = upper.into();
     }
 }
 
