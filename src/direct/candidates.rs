@@ -2,7 +2,7 @@
 
 use super::domain;
 use super::stats::DirectStats;
-use crate::lights::LightId;
+use crate::lights::{LightId, SampleOfLight};
 use lumiris_numbers::estimators::heuristics::{Heuristic, Technique};
 use lumiris_numbers::estimators::mc;
 use lumiris_numbers::math::{Ray, Rgb};
@@ -61,6 +61,27 @@ pub struct Candidate {
 }
 
 impl Candidate {
+    /// The light sample `drawn` from a point whose unshadowed integrand is `f`, without densities of other techniques and
+    /// numbers of samples.
+    #[inline]
+    pub(super) fn of_light(point: u32, f: Rgb, drawn: &SampleOfLight, segment: Ray) -> Candidate {
+        let SampleOfLight { light, sample } = *drawn;
+        Candidate {
+            point,
+            sampled_by: if sample.is_delta { SampledBy::DeltaLight } else { SampledBy::Light },
+            f,
+            li: sample.li,
+            light,
+            p_light: sample.pdf,
+            p_bsdf: 0.0,
+            n_light: 0.0,
+            n_bsdf: 0.0,
+            p_lobe: 0.0,
+            group: 0,
+            segment,
+        }
+    }
+
     /// The factor 1/(n·p) of f in the estimate by the candidate's own technique.
     #[inline]
     pub fn own_factor(&self) -> f32 {

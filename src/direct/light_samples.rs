@@ -1,6 +1,6 @@
 //! T1 by light sampling, one sample at a time.
 
-use super::candidates::{Candidate, SampleAllocation, SampledBy};
+use super::candidates::{Candidate, SampleAllocation};
 use super::domain;
 use super::point::ShadingPoint;
 use crate::lights::{LeAndPdf, LightCtx, SampleOfLight};
@@ -58,7 +58,7 @@ pub(super) fn unshadowed_candidate(
     drawn: SampleOfLight,
 ) -> Option<Candidate> {
     // Unshadowed integrand
-    let SampleOfLight { light, sample } = drawn;
+    let sample = &drawn.sample;
     let f_cos = point.bsdf.f(point.wo, sample.wi) * point.bsdf.cos(sample.wi);
     let f = f_cos * sample.li;
     if f.is_black() || !(sample.pdf > 0.0) {
@@ -66,20 +66,8 @@ pub(super) fn unshadowed_candidate(
     }
 
     // A technique without samples has no weight
-    let sampled_by = if sample.is_delta { SampledBy::DeltaLight } else { SampledBy::Light };
     let p_bsdf = if sample.is_delta || allocation.n_bsdf == 0.0 { 0.0 } else { point.bsdf.pdf(point.wo, sample.wi) };
-    Some(Candidate {
-        point: index,
-        sampled_by,
-        f,
-        li: sample.li,
-        light,
-        p_light: sample.pdf,
-        p_bsdf,
-        n_light: allocation.n_light,
-        n_bsdf: allocation.n_bsdf,
-        p_lobe: 0.0,
-        group: 0,
-        segment: point.light_segment(&sample),
-    })
+    let SampleAllocation { n_light, n_bsdf, .. } = *allocation;
+    let segment = point.light_segment(sample);
+    Some(Candidate { p_bsdf, n_light, n_bsdf, ..Candidate::of_light(index, f, &drawn, segment) })
 }

@@ -8,8 +8,8 @@
 //! All light samples of a chunk of points are made together, sorted by light, and kept, so that selected samples are
 //! not sampled again.
 
-use super::candidates::{Candidate, SampledBy};
-use super::point::{LightPoint, ShadingPoint};
+use super::candidates::Candidate;
+use super::point::ShadingPoint;
 use crate::lights::sample_columns::{ChosenLight, LightSamples, NO_LIGHT, Scratch};
 use crate::lights::{LightRun, SampleOfLight};
 use crate::scene::RenderJob;
@@ -109,8 +109,8 @@ impl ProposalColumns {
         Some(SampleOfLight { light: self.chosen[proposal].light, sample })
     }
 
-    /// The candidate of a light sample of `point`; `None` if it failed or its integrand is zero. Its density of BSDF
-    /// sampling is not set.
+    /// The candidate of a light sample of `point`, see [`Candidate::of_light`]; `None` if it failed or its integrand is
+    /// zero.
     pub(super) fn candidate(
         &self,
         proposal: usize,
@@ -118,33 +118,15 @@ impl ProposalColumns {
         point: &ShadingPoint<'_>,
         target: Target,
     ) -> Option<Candidate> {
-        let LightSamples { wi, li, pdf, p, p_error, n, is_far, is_delta } = &self.samples;
-        let (wi, li) = (wi.vec3(proposal), li.rgb(proposal));
+        let drawn = self.light_sample(proposal)?;
+        let sample = &drawn.sample;
         let f_cos = if target.has_visibility() {
-            point.bsdf.f(point.wo, wi) * point.bsdf.cos(wi)
+            point.bsdf.f(point.wo, sample.wi) * point.bsdf.cos(sample.wi)
         } else {
             Rgb::from_array(self.f_cos.each_ref().map(|column| column[proposal]))
         };
-        let f = f_cos * li;
-        if f.is_black() || !(pdf[proposal] > 0.0) {
-            return None;
-        }
-        let [p, p_error, n] = [p, p_error, n].map(|column| column.vec3(proposal));
-        let end = (is_far[proposal] == 0.0).then_some(LightPoint { p, p_error, n });
-        Some(Candidate {
-            point: index,
-            sampled_by: if is_delta[proposal] { SampledBy::DeltaLight } else { SampledBy::Light },
-            f,
-            li,
-            light: self.chosen[proposal].light,
-            p_light: pdf[proposal],
-            p_bsdf: 0.0,
-            n_light: 0.0,
-            n_bsdf: 0.0,
-            p_lobe: 0.0,
-            group: 0,
-            segment: point.segment(wi, end),
-        })
+        let f = f_cos * sample.li;
+        (!f.is_black()).then(|| Candidate::of_light(index, f, &drawn, point.light_segment(sample)))
     }
 
     /// Σ c·V̂ over the proposals of a point; `bsdf_samples` are its BSDF samples.

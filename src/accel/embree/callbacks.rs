@@ -217,12 +217,20 @@ pub(super) unsafe extern "C" fn bounds(arguments: *const sys::RTCBoundsFunctionA
         };
         // An empty box excludes the primitive
         let found = catch_unwind(AssertUnwindSafe(box_of)).unwrap_or(Bounds3::EMPTY);
-        let growth = found.min.abs().max(found.max.abs()).max_element() * BOX_GROWTH;
-        let (lower, upper) = (found.min - growth, found.max + growth);
-        let out = &mut *arguments.bounds_o;
-        (out.lower_x, out.lower_y, out.lower_z) = lower.into();
-        (out.upper_x, out.upper_y, out.upper_z) = upper.into();
+        set_bounds(arguments, found, BOX_GROWTH);
     }
+}
+
+/// Sets the box of a primitive. `growth` is relative to coordinates.
+///
+/// # Safety
+/// The arguments are those of a callback.
+pub(super) unsafe fn set_bounds(arguments: &sys::RTCBoundsFunctionArguments, bounds: Bounds3, growth: f32) {
+    let growth = bounds.min.abs().max(bounds.max.abs()).max_element() * growth;
+    // SAFETY: by the caller.
+    let out = unsafe { &mut *arguments.bounds_o };
+    (out.lower_x, out.lower_y, out.lower_z) = (bounds.min - growth).into();
+    (out.upper_x, out.upper_y, out.upper_z) = (bounds.max + growth).into();
 }
 
 /// Intersects quadrics and patches.

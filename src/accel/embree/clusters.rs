@@ -4,7 +4,7 @@
 #![allow(unsafe_code)]
 
 use super::callbacks::{
-    HIT_GEOM, HIT_INST, HIT_PRIM, HIT_U, HIT_V, ID, Lanes, RAY_WORDS, TFAR, TNEAR, active, numbered,
+    HIT_GEOM, HIT_INST, HIT_PRIM, HIT_U, HIT_V, ID, Lanes, RAY_WORDS, TFAR, TNEAR, active, numbered, set_bounds,
 };
 use super::calls::{self, can_trace};
 use super::context::{Mode, QueryContext};
@@ -103,12 +103,8 @@ unsafe extern "C" fn bounds(arguments: *const sys::RTCBoundsFunctionArguments) {
     unsafe {
         let arguments = &*arguments;
         let context = &*arguments.geometryUserPtr.cast::<ClustersContext>();
-        let found = context.set.clusters.places()[arguments.primID as usize].bounds(&context.bounds);
-        let growth = found.min.abs().max(found.max.abs()).max_element() * BOX_GROWTH;
-        let (lower, upper) = (found.min - growth, found.max + growth);
-        let out = &mut *arguments.bounds_o;
-        (out.lower_x, out.lower_y, out.lower_z) = lower.into();
-        (out.upper_x, out.upper_y, out.upper_z) = upper.into();
+        let place = &context.set.clusters.places()[arguments.primID as usize];
+        set_bounds(arguments, place.bounds(&context.bounds), BOX_GROWTH);
     }
 }
 
