@@ -47,7 +47,27 @@ pub enum SphericalMapping {
 pub struct CameraBase {
     /// Transforms at equidistant times 0..=1, interpolated linearly; a single one if the camera does not move.
     pub(super) world_from_camera: Arc<[Affine3A]>,
+    /// The placement by the first transform.
+    first: Placement,
     resolution: Vec2,
+}
+
+/// A camera in world space.
+#[derive(Clone, Copy, Debug)]
+struct Placement {
+    origin: Vec3,
+    /// Unit axis upwards.
+    up: Vec3,
+    /// Unit axis of view.
+    forward: Vec3,
+}
+
+impl Placement {
+    fn new(world_from_camera: &Affine3A) -> Self {
+        let axis = |axis: Vec3| world_from_camera.transform_vector3(axis).normalize();
+        let origin = world_from_camera.transform_point3(Vec3::ZERO);
+        Placement { origin, up: axis(Vec3::Y), forward: axis(Vec3::Z) }
+    }
 }
 
 /// A thin lens of a perspective or orthographic camera.
@@ -112,7 +132,17 @@ pub fn default_screen_window(frame_aspect: f32) -> [f32; 4] {
 impl CameraBase {
     fn new(world_from_camera: Affine3A, resolution: [u32; 2]) -> Self {
         let resolution = Vec2::new(resolution[0].max(1) as f32, resolution[1].max(1) as f32);
-        CameraBase { world_from_camera: Arc::new([world_from_camera]), resolution }
+        let first = Placement::new(&world_from_camera);
+        CameraBase { world_from_camera: Arc::new([world_from_camera]), first, resolution }
+    }
+
+    /// The placement at a time (0 to 1).
+    #[inline]
+    fn placement(&self, time: f32) -> Placement {
+        match &*self.world_from_camera {
+            [_] => self.first,
+            moving => Placement::new(&transform_at(moving, time)),
+        }
     }
 
     /// The ray of a point and a direction given in camera space.
@@ -221,7 +251,9 @@ impl Camera {
     /// moves linearly between them. There must be at least one.
     #[must_use]
     pub fn moving(mut self, world_from_camera: &[Affine3A]) -> Self {
-        self.base_mut().world_from_camera = world_from_camera.into();
+        let base = self.base_mut();
+        base.world_from_camera = world_from_camera.into();
+        base.first = Placement::new(&world_from_camera[0]);
         self
     }
 
@@ -308,26 +340,26 @@ impl Camera {
     pub fn pixel_width(&self, p: Vec3, time: f32) -> f32 {
         // Distance and direction from the camera
         let base = self.base();
-        let world_from_camera = transform_at(&base.world_from_camera, time);
-        let d = p - world_from_camera.transform_point3(Vec3::ZERO);
+        let placement = base.placement(time);
+        let d = p - placement.origin;
         let distance = d.length();
         if !(distance > 0.0) {
             return 0.0;
         }
 
         // Width = distance × spread of the camera in this direction
-        let cos_to = |axis: Vec3| (d.dot(world_from_camera.transform_vector3(axis).normalize()) / distance).abs();
+        let cos_to = |axis: Vec3| (d.dot(axis) / distance).abs();
         match self {
             Camera::Perspective { base, screen_window, tan_half_fov, .. } => {
-                base.perspective_spread(screen_window, *tan_half_fov, cos_to(Vec3::Z)) * distance
+                base.perspective_spread(screen_window, *tan_half_fov, cos_to(placement.forward)) * distance
             }
             Camera::Orthographic { base, screen_window, .. } => base.parallel_width(screen_window, time),
             Camera::Spherical { base, mapping } => {
-                let sin = (1.0 - cos_to(Vec3::Y).powi(2)).max(0.0).sqrt();
+                let sin = (1.0 - cos_to(placement.up).powi(2)).max(0.0).sqrt();
                 base.spherical_spread(*mapping, sin) * distance
             }
             Camera::Realistic { base, film_size, lens } => {
-                lens.spread_towards(cos_to(Vec3::Z)) * film_size.x / base.resolution.x * distance
+                lens.spread_towards(cos_to(placement.forward)) * film_size.x / base.resolution.x * distance
             }
         }
     }

@@ -267,19 +267,26 @@ impl MipMap {
     /// Bilinear interpolation between the pixel centres of level `index`.
     pub fn bilinear(&self, index: usize, st: Vec2) -> Rgb {
         let level = &self.levels[index];
-        let at = st * level.size - Vec2::splat(0.5);
-        let corner = Vec2::new(floor(at.x), floor(at.y));
-        let (x, y) = (saturated(corner.x), saturated(corner.y));
+        let corner = Corner::of(level, st);
         let [a, b, c, d] = match self.wrap.axes() {
-            Some([of_x, of_y]) => {
-                let [x0, x1] = [x, x + 1].map(|x| of_x.pixel(x, level.width as i64) as usize);
-                let [y0, y1] = [y, y + 1].map(|y| of_y.pixel(y, level.height as i64) as usize);
+            Some(axes) => {
+                let [[x0, x1], [y0, y1]] = corner.pixels(level, axes);
                 level.colors([[x0, y0], [x1, y0], [x0, y1], [x1, y1]], self.channels, &self.table)
             }
-            None => [[x, y], [x + 1, y], [x, y + 1], [x + 1, y + 1]].map(|[x, y]| self.texel(index, x, y)),
+            None => {
+                let Corner { x, y, .. } = corner;
+                [[x, y], [x + 1, y], [x, y + 1], [x + 1, y + 1]].map(|[x, y]| self.texel(index, x, y))
+            }
         };
-        let d_at = at - corner;
-        a.lerp(b, d_at.x).lerp(c.lerp(d, d_at.x), d_at.y)
+        a.lerp(b, corner.fraction.x).lerp(c.lerp(d, corner.fraction.x), corner.fraction.y)
+    }
+
+    /// Requests the pixels of [`Self::bilinear`], which is called soon.
+    fn prefetch_bilinear(&self, index: usize, st: Vec2) {
+        let (Some(axes), Some(level)) = (self.wrap.axes(), self.levels.get(index)) else { return };
+        let [[x, _], [y0, y1]] = Corner::of(level, st).pixels(level, axes);
+        level.prefetch([x, y0], self.channels);
+        level.prefetch([x, y1], self.channels);
     }
 
     fn nearest(&self, level: usize, st: Vec2) -> Rgb {
@@ -298,24 +305,9 @@ impl MipMap {
         if !st.is_finite() {
             return Rgb::BLACK;
         }
-        let width = width.abs();
-        let extent = match self.filter {
-            Filter::Point | Filter::Bilinear | Filter::Trilinear => width.max_element(),
-            Filter::Ewa => 0.5 * (width.x + width.y),
-        };
-        // pbrt-v4 takes twice the derivative as the width of the filter
-        let extent = (2.0 * extent).max(1e-8);
         let top = self.levels.len() - 1;
-        // ⌊log₂⌋ of a positive float is its exponent less 127. Just below a power of two, log₂ is rounded up to it
-        let bits = extent.to_bits();
-        let below = match bits & 0x7f_ff00 {
-            0x7f_ff00 => (top as f32 + extent.log2()).floor() as isize,
-            _ => top as isize + (bits >> 23) as isize - 127,
-        };
-        if below >= top as isize {
-            return self.texel(top, 0, 0);
-        }
-        let below = below.max(0) as usize;
+        let extent = self.extent(width);
+        let Some(below) = self.level_below(extent) else { return self.texel(top, 0, 0) };
         match self.filter {
             Filter::Point => self.nearest(below, st),
             Filter::Bilinear => self.bilinear(below, st),
@@ -325,6 +317,64 @@ impl MipMap {
                 if delta <= 0.0 { fine } else { fine.lerp(self.bilinear(below + 1, st), delta) }
             }
         }
+    }
+
+    /// Requests the pixels of [`Self::lookup`], which is called soon.
+    pub fn prefetch(&self, st: Vec2, width: Vec2) {
+        if let Some(below) = self.level_below(self.extent(width)).filter(|_| st.is_finite()) {
+            self.prefetch_bilinear(below, st);
+            if matches!(self.filter, Filter::Trilinear | Filter::Ewa) {
+                self.prefetch_bilinear(below + 1, st);
+            }
+        }
+    }
+
+    /// Width of the filter whose value at the coarsest level is 1.
+    fn extent(&self, width: Vec2) -> f32 {
+        let width = width.abs();
+        let extent = match self.filter {
+            Filter::Point | Filter::Bilinear | Filter::Trilinear => width.max_element(),
+            Filter::Ewa => 0.5 * (width.x + width.y),
+        };
+        // pbrt-v4 takes twice the derivative as the width of the filter
+        (2.0 * extent).max(1e-8)
+    }
+
+    /// The level below the filter's width; `None` for the coarsest one.
+    fn level_below(&self, extent: f32) -> Option<usize> {
+        let top = self.levels.len() - 1;
+        // ⌊log₂⌋ of a positive float is its exponent less 127. Just below a power of two, log₂ is rounded up to it
+        let bits = extent.to_bits();
+        let below = match bits & 0x7f_ff00 {
+            0x7f_ff00 => (top as f32 + extent.log2()).floor() as isize,
+            _ => top as isize + (bits >> 23) as isize - 127,
+        };
+        (below < top as isize).then(|| below.max(0) as usize)
+    }
+}
+
+/// The pixel at the lower corner of a bilinear interpolation, and the position between it and the next one.
+struct Corner {
+    x: i64,
+    y: i64,
+    fraction: Vec2,
+}
+
+impl Corner {
+    #[inline]
+    fn of(level: &Level, st: Vec2) -> Self {
+        let at = st * level.size - Vec2::splat(0.5);
+        let corner = Vec2::new(floor(at.x), floor(at.y));
+        Corner { x: saturated(corner.x), y: saturated(corner.y), fraction: at - corner }
+    }
+
+    /// Columns and rows of the four pixels.
+    #[inline]
+    fn pixels(&self, level: &Level, [of_x, of_y]: [AxisWrap; 2]) -> [[usize; 2]; 2] {
+        [
+            [self.x, self.x + 1].map(|x| of_x.pixel(x, level.width as i64) as usize),
+            [self.y, self.y + 1].map(|y| of_y.pixel(y, level.height as i64) as usize),
+        ]
     }
 }
 

@@ -3,6 +3,7 @@
 
 use super::ColorEncoding;
 use super::tiles::{TILE, TileStore};
+use lumiris_lanes::prefetch::prefetch;
 use lumiris_numbers::math::{Rgb, Vec2};
 use std::sync::Arc;
 
@@ -115,6 +116,17 @@ impl Level {
             }),
             (Texels::Tiled(tiled), 1) => pixels.map(|pixel| Rgb::splat(tiled.values::<1>(channels, pixel, table)[0])),
             (Texels::Tiled(tiled), _) => pixels.map(|pixel| Rgb::from_array(tiled.values(channels, pixel, table))),
+        }
+    }
+
+    /// Requests a pixel that is read soon, if it is in memory.
+    #[inline]
+    pub(super) fn prefetch(&self, [x, y]: [usize; 2], channels: usize) {
+        let i = (y * self.width + x) * channels;
+        match &self.texels {
+            Texels::Bytes(v) => prefetch(v, i),
+            Texels::Floats(v) => prefetch(v, i),
+            Texels::Tiled(_) => {}
         }
     }
 

@@ -26,6 +26,9 @@ use std::time::Instant;
 /// Maximum number of non-scattering surfaces between two vertices.
 const MAX_PASSED: u32 = 64;
 
+/// Hits whose texels are requested before the first of them is shaded.
+const GROUP: usize = 16;
+
 /// A batch of paths to be traced to the next vertices.
 pub(super) struct TraceStep<'a, 'w> {
     pub(super) job: &'w RenderJob,
@@ -60,6 +63,8 @@ pub(super) struct VertexSearch {
     traced: Vec<u32>,
     /// Indices of the paths that continue in the next trace, without a vertex.
     pub(super) passing: Vec<u32>,
+    /// Indices of paths of a group, and the surfaces that they hit.
+    reached: Vec<(u32, SurfaceInteraction)>,
     /// Indices of the paths that hit nothing, and receive light from infinite lights.
     escaped: Vec<u32>,
     /// Rays of the paths that are traced, if these are not all.
@@ -128,11 +133,16 @@ impl VertexSearch {
             let (mut paths, hits, traced): (Paths, _, _) =
                 (std::mem::take(&mut self.active), std::mem::take(&mut self.hits), std::mem::take(&mut self.traced));
             let lengths = std::mem::take(&mut self.lengths);
-            for ((&index, hit), &length) in traced.iter().zip(&hits).zip(&lengths) {
-                let is_done = hit.is_some_and(|hit| self.add_plain_mesh_hit(&mut at, &mut paths, index, &hit, length));
-                if !is_done {
-                    self.process_hit(&mut at, &mut paths, index, hit.as_ref());
+            for group in (0..traced.len()).step_by(GROUP).map(|first| first..traced.len().min(first + GROUP)) {
+                for i in group {
+                    let (index, hit, length) = (traced[i], hits[i], lengths[i]);
+                    let is_done =
+                        hit.is_some_and(|hit| self.add_plain_mesh_hit(&mut at, &mut paths, index, &hit, length));
+                    if !is_done {
+                        self.process_hit(&mut at, &mut paths, index, hit.as_ref());
+                    }
                 }
+                self.process_surfaces(&mut at, &mut paths);
             }
             (self.active, self.hits, self.traced, self.lengths) = (paths, hits, traced, lengths);
 
@@ -153,7 +163,8 @@ impl VertexSearch {
         self.stats.shade_time += start.elapsed();
     }
 
-    /// Processes a traced path: flight through its medium, emission, and vertex or continuation.
+    /// Processes a traced path: flight through its medium, and the surface that it reaches, which is left to
+    /// [`Self::process_surfaces`].
     fn process_hit(&mut self, at: &mut TraceStep<'_, '_>, paths: &mut Paths, index: u32, hit: Option<&Hit>) {
         let mut index = index;
 
@@ -174,14 +185,27 @@ impl VertexSearch {
         // Surface or environment
         match hit {
             Some(hit) => {
-                let mut traced = paths.traced(index);
-                self.process_surface(at, &mut traced, hit);
-                let ray = traced.ray;
-                paths.rays.replace(index as usize, &ray);
+                let TracedPath { state: path, ray, .. } = paths.traced(index);
+                let interaction = SurfaceInteraction::new(at.job, &ray, path.width, path.spread, hit);
+                interaction.prefetch(at.job);
+                self.reached.push((index, interaction));
             }
             None if self.adds_emission(at.vertex, &paths.states[index as usize]) => self.escaped.push(index),
             None => {}
         }
+    }
+
+    /// Processes the surfaces that paths have reached: emission, and vertex or continuation.
+    fn process_surfaces(&mut self, at: &mut TraceStep<'_, '_>, paths: &mut Paths) {
+        let mut reached = std::mem::take(&mut self.reached);
+        for (index, interaction) in &reached {
+            let mut traced = paths.traced(*index);
+            self.process_surface(at, &mut traced, interaction);
+            let ray = traced.ray;
+            paths.rays.replace(*index as usize, &ray);
+        }
+        reached.clear();
+        self.reached = reached;
     }
 
     /// Sets times and random numbers of the vertices.
@@ -267,14 +291,18 @@ impl VertexSearch {
 
     /// Handles any other hit, and adds its vertex if the path continues.
     #[inline]
-    fn process_surface(&mut self, at: &mut TraceStep<'_, '_>, traced: &mut TracedPath<'_>, hit: &Hit) {
+    fn process_surface(
+        &mut self,
+        at: &mut TraceStep<'_, '_>,
+        traced: &mut TracedPath<'_>,
+        interaction: &SurfaceInteraction,
+    ) {
         let TracedPath { index, state: path, ray } = traced;
-        let interaction = SurfaceInteraction::new(at.job, ray, path.width, path.spread, hit);
         let out = &mut at.out[path.sample as usize];
 
         // Emission
         if self.adds_emission(at.vertex, path) {
-            let emission = path.emission(ray, at.job, &at.left, &interaction, self.guide.as_deref());
+            let emission = path.emission(ray, at.job, &at.left, interaction, self.guide.as_deref());
             out.radiance += emission;
             self.layers.add_emission(at.job, path.sample, &interaction.hit, emission);
         }
@@ -283,7 +311,7 @@ impl VertexSearch {
         let Some(mut beta) = path.beta_beyond_emitter() else { return };
         let Some(mut bsdf) = interaction.scatter(at.job) else {
             if path.passed < MAX_PASSED || self.walks(at.job, path) {
-                path.pass(ray, at.job, beta, &interaction);
+                path.pass(ray, at.job, beta, interaction);
                 self.passing.push(*index);
             }
             return;
@@ -293,10 +321,10 @@ impl VertexSearch {
         if at.vertex == 0 && self.features != FeatureSet::None {
             out.features.get_or_insert_with(|| {
                 if self.only_reflected {
-                    Features { depth: path.depth(&interaction), ..Features::default() }
+                    Features { depth: path.depth(interaction), ..Features::default() }
                 } else {
                     let stream = at.samples.streams.get(path.sample as usize).domain(domain::VERTEX);
-                    path.features(at.job, &interaction, &bsdf, self.features, &stream)
+                    path.features(at.job, interaction, &bsdf, self.features, &stream)
                 }
             });
         }
@@ -315,10 +343,10 @@ impl VertexSearch {
         // The vertex, unless the path stays in an interior
         let media = interaction.sides(at.job, path.medium);
         path.beta = beta;
-        let Some(bsdf) = self.exit_or_reflect(at, traced, &interaction, bsdf, media) else { return };
+        let Some(bsdf) = self.exit_or_reflect(at, traced, interaction, bsdf, media) else { return };
         let TracedPath { index, state: path, .. } = traced;
-        let SurfaceInteraction { surface, wo, width, .. } = interaction;
-        path.chain = self.chain(at, path, &interaction, &bsdf);
+        let SurfaceInteraction { surface, wo, width, .. } = *interaction;
+        path.chain = self.chain(at, path, interaction, &bsdf);
         path.width = width;
         at.vertices.push(VertexData { path: *index, p: surface.p, p_error: surface.p_error, wo, bsdf, media });
     }

@@ -9,9 +9,9 @@ use crate::bsdfs::{
     MeasuredTables, ProposalDensity, ThinDielectric, TrowbridgeReitz,
 };
 use crate::geometry::SurfaceHit;
-use crate::textures::{TextureContext, TextureSet};
+use crate::textures::{FloatTextureId, ImageTexture, RgbTextureId, TextureContext, TextureSet};
 use lumiris_numbers::math::hash::{hash_floats, unit_f32};
-use lumiris_numbers::math::{Rgb, Vec3};
+use lumiris_numbers::math::{Rgb, Vec2, Vec3};
 use rayon::prelude::*;
 use std::sync::Arc;
 
@@ -26,6 +26,8 @@ pub struct MaterialSet {
     measured: Vec<Arc<MeasuredTables>>,
     /// Per material, true if it makes caustics.
     caustics: Vec<bool>,
+    /// Per material, the images of its colours, roughness and displacement.
+    images: Vec<Vec<ImageTexture>>,
 }
 
 /// The arguments of a coat's table, as bits: η, thickness, and the alphas unless they are textured.
@@ -55,7 +57,8 @@ impl MaterialSet {
         };
         let mut coats: Vec<CoatTable> = keys.par_iter().map(tabulate).collect();
         CoatTable::join(&mut coats);
-        MaterialSet { caustics: vec![false; entries.len()], entries, coats, coat_of, measured: Vec::new() }
+        let images = entries.iter().map(|entry| images_of(entry, textures)).collect();
+        MaterialSet { caustics: vec![false; entries.len()], images, entries, coats, coat_of, measured: Vec::new() }
     }
 
     /// With the tables that measured materials refer to.
@@ -163,6 +166,14 @@ impl MaterialSet {
         textures.constant_rgb(reflectance).map(|c| c.clamp(0.0, 1.0))
     }
 
+    /// Requests the texels that [`Self::bsdf`] reads, if it is called soon with the same arguments.
+    pub fn prefetch(&self, id: MaterialId, textures: &TextureSet, ctx: &TextureContext) {
+        textures.prefetch(&self.images[id as usize], ctx);
+        if let Some(map) = &self.entries[id as usize].normal_map {
+            textures.prefetch(&[map.image], &TextureContext { uv_width: Vec2::ZERO, ..*ctx });
+        }
+    }
+
     /// The BSDF at a hit for the world-space direction `wo`; `None` if rays pass through. `id` and its textures must
     /// belong to the sets that the materials were made with.
     pub fn bsdf(
@@ -222,6 +233,28 @@ impl MaterialSet {
             Material::Mix { .. } | Material::Interface => return None,
         })
     }
+}
+
+/// The images of the colours, the roughness and the displacement of a material; none for a mixture.
+fn images_of(entry: &MaterialEntry, textures: &TextureSet) -> Vec<ImageTexture> {
+    let (rgbs, floats): (Vec<RgbTextureId>, Vec<FloatTextureId>) = match entry.material {
+        Material::Diffuse { reflectance } => (vec![reflectance], vec![]),
+        Material::DiffuseTransmission { reflectance, transmittance, .. } => (vec![reflectance, transmittance], vec![]),
+        Material::CoatedDiffuse { reflectance, coat } => (vec![reflectance], vec![coat.roughness.u]),
+        Material::Conductor { roughness, .. } | Material::Dielectric { roughness, .. } => (vec![], vec![roughness.u]),
+        Material::Principled(material) => (vec![material.base_color], vec![material.metalness, material.roughness]),
+        Material::CoatedConductor { .. }
+        | Material::ThinDielectric { .. }
+        | Material::Hair(_)
+        | Material::Measured { .. }
+        | Material::Evaluated(_)
+        | Material::Mix { .. }
+        | Material::Interface => (vec![], vec![]),
+    };
+    let mut images = Vec::new();
+    rgbs.into_iter().for_each(|id| textures.images_of_rgb(id, &mut images));
+    floats.into_iter().chain(entry.displacement).for_each(|id| textures.images_of_float(id, &mut images));
+    images
 }
 
 /// The key of the coat table of a material; `None` if it has no closed form.

@@ -259,3 +259,29 @@ fn indices_are_relative_to_the_coat_and_roughness_is_remapped() {
     let x = bsdf(glass).sample(UP, 0.0, [0.5, 0.5]).unwrap();
     assert!(x.lobe.contains(Lobe::SPECULAR | Lobe::TRANSMISSION) && (x.wi + UP).length() < 1e-6);
 }
+
+#[test]
+fn images_are_requested_wherever_they_are_in_the_trees_of_a_material() {
+    let mut bench = Bench::new();
+    let image = |bench: &mut Bench, scale| {
+        let image = bench.image(2, |_, _| [0.5; 3]);
+        ImageTexture { image, mapping: Mapping2d::default(), udim: None, scale, invert: false }
+    };
+    let [color, weight, roughness, height] = [1.0, 2.0, 3.0, 4.0].map(|scale| image(&mut bench, scale));
+    let tex = bench.textures.add_rgb(RgbTexture::Image(color));
+    let scale = bench.textures.add_float(FloatTexture::Channel(weight, 1));
+    let reflectance = bench.textures.add_rgb(RgbTexture::Scale { tex, scale });
+    let [u, displacement] = [roughness, height].map(|image| bench.textures.add_float(FloatTexture::Image(image)));
+
+    // A coated material with all of them, and a mixture with itself
+    let coated = bench.coated(Roughness { u, v: u, remap: false }, 0.0);
+    if let Material::CoatedDiffuse { reflectance: of_coated, .. } = &mut bench.entries[coated as usize].material {
+        *of_coated = reflectance;
+    }
+    bench.entries[coated as usize].displacement = Some(displacement);
+    let mixture = bench.material(Material::Mix { materials: [coated; 2], amount: scale });
+    let images = |id: MaterialId| images_of(&bench.entries[id as usize], &bench.textures);
+    let ids: Vec<ImageId> = images(coated).iter().map(|image| image.image).collect();
+    assert_eq!(ids, [color, weight, roughness, height].map(|image| image.image));
+    assert!(images(mixture).is_empty());
+}

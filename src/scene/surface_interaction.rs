@@ -49,6 +49,13 @@ impl SurfaceInteraction {
         SurfaceInteraction { hit: *hit, surface, wo: -ray.d.normalize(), width, distance, context }
     }
 
+    /// Requests the texels of [`Self::scatter`], if it is called soon.
+    pub fn prefetch(&self, job: &RenderJob) {
+        let scene = &job.world.scene;
+        let material = scene.surfaces[self.hit.geometry as usize].material;
+        scene.materials.prefetch(material, &scene.textures, &self.context);
+    }
+
     /// The BSDF at the hit; `None` if rays pass the surface.
     pub fn scatter<'j>(&self, job: &'j RenderJob) -> Option<SurfaceBsdf<'j>> {
         let scene = &job.world.scene;

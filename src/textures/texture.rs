@@ -104,6 +104,23 @@ pub enum FloatTexture {
     Bilerp(Bilerp<f32>),
 }
 
+impl FloatTexture {
+    /// The textures that it refers to.
+    pub(super) fn children(&self) -> Vec<FloatTextureId> {
+        match *self {
+            FloatTexture::Constant(_) | FloatTexture::VertexOpacity => vec![],
+            FloatTexture::Image(_) | FloatTexture::Channel(..) | FloatTexture::Faces(_) => vec![],
+            FloatTexture::Noise(_) | FloatTexture::Bilerp(_) => vec![],
+            FloatTexture::Threshold { tex, .. } => vec![tex],
+            FloatTexture::Scale { tex, scale } => vec![tex, scale],
+            FloatTexture::Mix { tex1, tex2, amount } => vec![tex1, tex2, amount],
+            FloatTexture::DirectionMix { tex1, tex2, .. }
+            | FloatTexture::Checkerboard { tex1, tex2, .. }
+            | FloatTexture::Dots { tex1, tex2, .. } => vec![tex1, tex2],
+        }
+    }
+}
+
 /// An RGB texture.
 #[derive(Clone, Copy, Debug)]
 pub enum RgbTexture {
@@ -169,4 +186,21 @@ pub enum RgbTexture {
     },
     /// Bilinear interpolation between corners.
     Bilerp(Bilerp<Rgb>),
+}
+
+impl RgbTexture {
+    /// The textures that it refers to.
+    pub(super) fn children(&self) -> (Vec<RgbTextureId>, Option<FloatTextureId>) {
+        match *self {
+            RgbTexture::Constant(_) | RgbTexture::VertexColor => (vec![], None),
+            RgbTexture::Image(_) | RgbTexture::Faces(_) => (vec![], None),
+            RgbTexture::Marble(_) | RgbTexture::Bilerp(_) => (vec![], None),
+            RgbTexture::Product { tex1, tex2 } => (vec![tex1, tex2], None),
+            RgbTexture::Scale { tex, scale } => (vec![tex], Some(scale)),
+            RgbTexture::Mix { tex1, tex2, amount } => (vec![tex1, tex2], Some(amount)),
+            RgbTexture::DirectionMix { tex1, tex2, .. }
+            | RgbTexture::Checkerboard { tex1, tex2, .. }
+            | RgbTexture::Dots { tex1, tex2, .. } => (vec![tex1, tex2], None),
+        }
+    }
 }

@@ -31,18 +31,8 @@ impl TextureSet {
     /// Adds a float texture. Panics if it refers to a texture that is not in the set yet. Its image may be added later,
     /// before the first lookup.
     pub fn add_float(&mut self, texture: FloatTexture) -> FloatTextureId {
-        let children: &[FloatTextureId] = match &texture {
-            FloatTexture::Constant(_) | FloatTexture::VertexOpacity => &[],
-            // Images are added later: an importer reads all of them at once
-            FloatTexture::Image(_) | FloatTexture::Channel(..) | FloatTexture::Faces(_) => &[],
-            FloatTexture::Noise(_) | FloatTexture::Bilerp(_) => &[],
-            FloatTexture::Threshold { tex, .. } => &[*tex],
-            FloatTexture::Scale { tex, scale } => &[*tex, *scale],
-            FloatTexture::Mix { tex1, tex2, amount } => &[*tex1, *tex2, *amount],
-            FloatTexture::DirectionMix { tex1, tex2, .. }
-            | FloatTexture::Checkerboard { tex1, tex2, .. }
-            | FloatTexture::Dots { tex1, tex2, .. } => &[*tex1, *tex2],
-        };
+        // Images are added later: an importer reads all of them at once
+        let children = texture.children();
         let id = self.floats.len() as FloatTextureId;
         assert!(children.iter().all(|&c| c < id), "a texture refers to earlier ones only");
         let depths = children.iter().map(|&c| self.float_depths[c as usize]);
@@ -68,18 +58,7 @@ impl TextureSet {
     /// Adds an RGB texture. Panics if it refers to a texture that is not in the set yet. Its image may be added later,
     /// before the first lookup.
     pub fn add_rgb(&mut self, texture: RgbTexture) -> RgbTextureId {
-        // References to other textures
-        let (children, weight): (&[RgbTextureId], Option<FloatTextureId>) = match &texture {
-            RgbTexture::Constant(_) | RgbTexture::VertexColor => (&[], None),
-            RgbTexture::Image(_) | RgbTexture::Faces(_) => (&[], None),
-            RgbTexture::Marble(_) | RgbTexture::Bilerp(_) => (&[], None),
-            RgbTexture::Product { tex1, tex2 } => (&[*tex1, *tex2], None),
-            RgbTexture::Scale { tex, scale } => (&[*tex], Some(*scale)),
-            RgbTexture::Mix { tex1, tex2, amount } => (&[*tex1, *tex2], Some(*amount)),
-            RgbTexture::DirectionMix { tex1, tex2, .. }
-            | RgbTexture::Checkerboard { tex1, tex2, .. }
-            | RgbTexture::Dots { tex1, tex2, .. } => (&[*tex1, *tex2], None),
-        };
+        let (children, weight) = texture.children();
 
         // All of them must be earlier
         let id = self.rgbs.len() as RgbTextureId;
@@ -234,16 +213,48 @@ impl TextureSet {
 
     /// Value of an image at a point; black where there is no tile.
     pub fn image_value(&self, texture: &ImageTexture, ctx: &TextureContext) -> Rgb {
+        self.image_at(texture, ctx).map_or(Rgb::BLACK, |(image, st)| image.lookup(st, texture.mapping.width(ctx)))
+    }
+
+    /// Requests the texels of images at a point, which are looked up soon.
+    pub fn prefetch(&self, textures: &[ImageTexture], ctx: &TextureContext) {
+        for texture in textures {
+            if let Some((image, st)) = self.image_at(texture, ctx) {
+                image.prefetch(st, texture.mapping.width(ctx));
+            }
+        }
+    }
+
+    /// The image and its coordinates at a point; `None` where there is no tile.
+    #[inline]
+    fn image_at(&self, texture: &ImageTexture, ctx: &TextureContext) -> Option<(&MipMap, Vec2)> {
         let st = texture.mapping.st(ctx);
         let (image, st) = match texture.udim {
-            Some(udim) => match self.udims[udim as usize].tile(st) {
-                Some(image) => (image, Udim::within_tile(st)),
-                None => return Rgb::BLACK,
-            },
+            Some(udim) => (self.udims[udim as usize].tile(st)?, Udim::within_tile(st)),
             None => (texture.image, self.images[texture.image as usize].within_periods(st)),
         };
         // Images have t downwards
-        self.images[image as usize].lookup(Vec2::new(st.x, 1.0 - st.y), texture.mapping.width(ctx))
+        Some((&self.images[image as usize], Vec2::new(st.x, 1.0 - st.y)))
+    }
+
+    /// Appends the images in the tree of a float texture.
+    pub fn images_of_float(&self, id: FloatTextureId, images: &mut Vec<ImageTexture>) {
+        let texture = &self.floats[id as usize];
+        if let FloatTexture::Image(image) | FloatTexture::Channel(image, _) = texture {
+            images.push(*image);
+        }
+        texture.children().into_iter().for_each(|child| self.images_of_float(child, images));
+    }
+
+    /// Appends the images in the tree of an RGB texture.
+    pub fn images_of_rgb(&self, id: RgbTextureId, images: &mut Vec<ImageTexture>) {
+        let texture = &self.rgbs[id as usize];
+        if let RgbTexture::Image(image) = texture {
+            images.push(*image);
+        }
+        let (children, weight) = texture.children();
+        children.into_iter().for_each(|child| self.images_of_rgb(child, images));
+        weight.into_iter().for_each(|weight| self.images_of_float(weight, images));
     }
 
     /// Value of the face texture at a point.

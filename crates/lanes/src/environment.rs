@@ -1,11 +1,13 @@
 //! Importance sampling of directions from an environment map.
 //!
-//! The cumulative distributions are inverted sample by sample, since cache misses dominate. Directions and densities
-//! are computed in lanes. A texel is one load of four floats. The mappings between square and sphere are in
+//! The cumulative distributions are inverted sample by sample, since cache misses dominate: tables are read in steps,
+//! and each step requests the entries of the next for all samples of a chunk. Directions and densities are computed in
+//! lanes. A texel is one load of four floats. The mappings between square and sphere are in
 //! [`lumiris_numbers::math::sphere_map`].
 
 use super::lane::{Columns3, F, I, LANES, Vec3s, begin, load, or_zero, safe_sqrt, store};
 use super::light::LightLanes;
+use super::prefetch::prefetch;
 use super::wide::{sin_cos_quadrant, sin_cos_turns};
 use fearless_simd::{Level, Simd, dispatch, f32x4, f32x16, prelude::*};
 use lumiris_numbers::math::distribution::{Running, STEP, clamped};
@@ -52,15 +54,14 @@ impl Places {
         Places { bin: [0; CHUNK], above: [0.0; CHUNK], width: [1.0; CHUNK] }
     }
 
-    /// Inverts the cumulative distribution at `u`: the last bin with `cdf[i] <= u`.
+    /// Inverts the cumulative distribution at `u`: the last bin with `cdf[i] <= u`, which is not before `first`.
     #[inline(always)]
-    fn set<S: Simd>(&mut self, i: usize, simd: S, running: &Running<'_>, u: f32) {
-        let Running { cdf, guide } = *running;
+    fn set<S: Simd>(&mut self, i: usize, simd: S, running: &Running<'_>, first: usize, u: f32) {
         let u = clamped(u);
-        let mut bin = usize::from(guide[((u * guide.len() as f32) as usize).min(guide.len() - 1)]);
         let at = f32x16::splat(simd, u);
+        let mut bin = first;
         let bin = loop {
-            let next = f32x16::from_slice(simd, &cdf[bin + 1..bin + 1 + STEP]);
+            let next = f32x16::from_slice(simd, &running.cdf[bin + 1..bin + 1 + STEP]);
             let passed = next.simd_le(at).to_bitmask().count_ones() as usize;
             bin += passed;
             if passed < STEP {
@@ -213,15 +214,25 @@ impl Environment<'_> {
     /// Inverts the cumulative distributions.
     #[inline(always)]
     fn places<S: Simd>(&self, simd: S, start: usize, count: usize, u: [&[f32]; 2]) -> [Along; 2] {
-        // Invert: rows, then columns within the rows
+        // Invert: rows, then columns within the rows. Each loop requests the entries that the next one reads
         let [mut x, mut y] = [Places::new(), Places::new()];
         let (u0, u1) = (&u[0][start..start + count], &u[1][start..start + count]);
         let rows = self.distribution.rows();
+        let (mut parts, mut firsts) = ([0; CHUNK], [0; CHUNK]);
         for i in 0..count {
-            y.set(i, simd, &rows, u1[i]);
+            let first = usize::from(rows.guide[rows.part(clamped(u1[i]))]);
+            y.set(i, simd, &rows, first, u1[i]);
+            let row = self.distribution.row(y.bin[i] as usize);
+            parts[i] = row.part(clamped(u0[i]));
+            prefetch(row.guide, parts[i]);
         }
         for i in 0..count {
-            x.set(i, simd, &self.distribution.row(y.bin[i] as usize), u0[i]);
+            let row = self.distribution.row(y.bin[i] as usize);
+            firsts[i] = usize::from(row.guide[parts[i]]);
+            prefetch(row.cdf, firsts[i] + 1);
+        }
+        for i in 0..count {
+            x.set(i, simd, &self.distribution.row(y.bin[i] as usize), firsts[i], u0[i]);
         }
 
         // Blocks to texels
@@ -242,9 +253,16 @@ impl Environment<'_> {
     #[inline(always)]
     fn tell_apart(&self, x: &Places, y: &Places, count: usize, along: &mut [Along; 2]) {
         let edge = self.distribution.edge() as i32;
+        let mut within = [None; CHUNK];
+        for i in 0..count {
+            within[i] = self.distribution.within([x.bin[i] as usize, y.bin[i] as usize]);
+            if let Some(within) = within[i] {
+                prefetch(std::slice::from_ref(within), 0);
+            }
+        }
         for i in 0..count {
             let block = [x.bin[i], y.bin[i]];
-            let Some(within) = self.distribution.within([block[0] as usize, block[1] as usize]) else { continue };
+            let Some(within) = within[i] else { continue };
             let place = within.choose([x.fraction(i), y.fraction(i)]);
             for k in 0..2 {
                 let texel = block[k] * edge + place.texel[k] as i32;
@@ -296,6 +314,13 @@ impl Environment<'_> {
         let [red, green, blue] = &mut out.li;
         let (red, green) = (&mut red[start..start + count], &mut green[start..start + count]);
         let blue = &mut blue[start..start + count];
+        for i in 0..count {
+            let first = lookups.first[i] as usize;
+            for row in [first, first + stride] {
+                prefetch(self.texels, row);
+                prefetch(self.texels, row + 1);
+            }
+        }
         for i in 0..count {
             let cell = self.texel(simd, lookups.cell[i] as usize);
             lookups.pdf_area[i] = cell[3];

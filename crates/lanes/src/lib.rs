@@ -7,7 +7,7 @@
 //!
 //! Reading order: [`lane`], [`wide`], [`columns`], [`hilbert`], [`sampler`], [`light`], [`area`], [`environment`],
 //! [`kernels`], [`ris_weights`], [`camera`], [`hits`], [`triangles`], [`vertex`], [`connections`], [`light_tree`],
-//! [`sums`].
+//! [`sums`], [`prefetch`].
 
 pub mod area;
 pub mod camera;
@@ -20,6 +20,7 @@ pub mod kernels;
 pub mod lane;
 pub mod light;
 pub mod light_tree;
+pub mod prefetch;
 pub mod ris_weights;
 pub mod sampler;
 pub mod sums;

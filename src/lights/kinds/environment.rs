@@ -11,6 +11,7 @@
 use crate::lights::{LeAndPdf, LightSample};
 use lumiris_lanes::environment::{Environment, equal_area_squares};
 use lumiris_lanes::level;
+use lumiris_lanes::prefetch::prefetch;
 use lumiris_numbers::math::sphere_map::{
     equal_area_sphere_to_square, equal_area_square_to_sphere, lat_long_to_sphere, pdf_equal_area_square_to_sphere,
     pdf_lat_long_to_sphere, sphere_to_lat_long, wrap_equal_area_texel,
@@ -51,6 +52,12 @@ pub struct EnvironmentSample {
     pub le: Rgb,
     /// Density per steradian.
     pub pdf: f32,
+}
+
+/// The first of four texels, and a position between their centres (0 to 1 per axis).
+struct BilinearCorner {
+    first: usize,
+    fraction: Vec2,
 }
 
 /// The direction of a point of the unit square.
@@ -227,7 +234,14 @@ impl EnvironmentMap {
                 }
             }
 
-            // Lookups
+            // Lookups, all of whose texels are requested first
+            for (&x, &y) in points[0].iter().zip(&points[1]).take(count) {
+                let first = self.bilinear_corner(Vec2::new(x, y)).first;
+                for row in [first, first + self.width + 2] {
+                    prefetch(&self.texels, row);
+                    prefetch(&self.texels, row + 1);
+                }
+            }
             for (i, value) in values[..count].iter_mut().enumerate() {
                 let p = Vec2::new(points[0][i], points[1][i]);
                 *value = LeAndPdf { le: self.lookup(p), pdf: self.pdf_at(w(i), p) };
@@ -276,15 +290,20 @@ impl EnvironmentMap {
         match self.filter {
             EnvironmentFilter::Nearest => color(self.texels[self.nearest(p)]),
             EnvironmentFilter::Bilinear => {
-                // With the border, texel centres are at 1.5, 2.5, …
-                let (x, y) = (p.x * self.width as f32 + 0.5, p.y * self.height as f32 + 0.5);
-                let (x0, y0) = ((x as usize).min(self.width), (y as usize).min(self.height));
-                let (dx, dy) = (x - x0 as f32, y - y0 as f32);
-                let first = y0 * (self.width + 2) + x0;
-                let pair = |i: usize| color(self.texels[i]).lerp(color(self.texels[i + 1]), dx);
-                pair(first).lerp(pair(first + self.width + 2), dy)
+                let BilinearCorner { first, fraction } = self.bilinear_corner(p);
+                let pair = |i: usize| color(self.texels[i]).lerp(color(self.texels[i + 1]), fraction.x);
+                pair(first).lerp(pair(first + self.width + 2), fraction.y)
             }
         }
+    }
+
+    /// The first of the four texels around a point of the unit square, and the position between them.
+    #[inline]
+    fn bilinear_corner(&self, p: Vec2) -> BilinearCorner {
+        // With the border, texel centres are at 1.5, 2.5, …
+        let (x, y) = (p.x * self.width as f32 + 0.5, p.y * self.height as f32 + 0.5);
+        let (x0, y0) = ((x as usize).min(self.width), (y as usize).min(self.height));
+        BilinearCorner { first: y0 * (self.width + 2) + x0, fraction: Vec2::new(x - x0 as f32, y - y0 as f32) }
     }
 
     /// ∫ luminance · `weight` dω over the sphere, by lookups in parts of texels.

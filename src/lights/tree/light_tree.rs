@@ -9,6 +9,7 @@ use crate::lights::{Light, LightBounds, LightCtx, LightId};
 use lumiris_numbers::math::ONE_MINUS_EPSILON;
 use lumiris_numbers::math::light_bound::{LightBound, first_probability};
 use rayon::prelude::*;
+use std::hint::select_unpredictable;
 use std::ops::Deref;
 
 /// Maximum size of the stack of subtrees in [`LightTree::runs`]: one per level.
@@ -222,18 +223,14 @@ impl LightTree {
         let mut pmf = 1.0;
         let mut node = &self.nodes[indexed.index as usize];
         while !node.is_leaf {
-            // Descend, and rescale the random number
+            // Descend, and rescale the random number. Without branches, since half of them would be predicted wrongly
             let p = left(indexed);
-            if u < p {
-                u /= p;
-                pmf *= p;
-                indexed = indexed.child(indexed.index + 1, false);
-            } else {
-                u = (u - p) / (1.0 - p);
-                pmf *= 1.0 - p;
-                indexed = indexed.child(node.light_or_right_child, true);
-            }
-            u = u.min(ONE_MINUS_EPSILON);
+            let is_left = u < p;
+            let (offset, taken) = select_unpredictable(is_left, (u, p), (u - p, 1.0 - p));
+            pmf *= taken;
+            u = (offset / taken).min(ONE_MINUS_EPSILON);
+            let child = select_unpredictable(is_left, indexed.index + 1, node.light_or_right_child);
+            indexed = indexed.child(child, !is_left);
             node = &self.nodes[indexed.index as usize];
         }
         (pmf > 0.0).then_some(SampledLight { light: node.light_or_right_child, pmf, u })

@@ -102,7 +102,7 @@ impl Running<'_> {
     /// The last bin with `cdf[i] <= u`, for u in [0, 1).
     #[inline]
     fn bin(&self, u: f32) -> Bin {
-        let mut i = usize::from(self.guide[((u * self.guide.len() as f32) as usize).min(self.guide.len() - 1)]);
+        let mut i = usize::from(self.guide[self.part(u)]);
         loop {
             let next = &self.cdf[i + 1..i + 1 + STEP];
             let passed = next.iter().fold(0, |sum, &c| sum + u32::from(c <= u)) as usize;
@@ -111,6 +111,12 @@ impl Running<'_> {
                 return self.found(i);
             }
         }
+    }
+
+    /// The part of the guide for u in [0, 1).
+    #[inline(always)]
+    pub fn part(&self, u: f32) -> usize {
+        ((u * self.guide.len() as f32) as usize).min(self.guide.len() - 1)
     }
 
     /// The bin that begins at bound `i`, or the last one.
