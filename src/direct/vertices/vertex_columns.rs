@@ -57,6 +57,25 @@ pub(super) struct Run {
     pub(super) rows: Range<usize>,
 }
 
+/// The run of a vertex. Runs have this order.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+enum RunKind {
+    OneByOne,
+    Kernel(Kernel),
+    /// Rows without BSDFs of their own.
+    Lambertian,
+}
+
+impl RunKind {
+    fn of(vertex: &VertexData<'_>) -> Self {
+        match vertex.bsdf.bsdf.kernel() {
+            _ if vertex.is_lambertian() => RunKind::Lambertian,
+            Some(kernel) => RunKind::Kernel(kernel),
+            None => RunKind::OneByOne,
+        }
+    }
+}
+
 impl<'w> Vertices<'w> {
     /// Empty columns in the memory of `old`, whose vertices may belong to another scene.
     pub fn emptied(mut old: Vertices<'_>) -> Self {
@@ -172,27 +191,26 @@ impl<'w> Vertices<'w> {
 
     /// Adds the rows with their own BSDFs, kernel by kernel.
     fn add_runs(&mut self, pending: &[VertexData<'w>]) {
-        let kernel =
-            |vertex: &VertexData<'w>| if vertex.is_lambertian() { None } else { Some(vertex.bsdf.bsdf.kernel()) };
-
-        // Kernels in use
-        let mut kinds: Vec<Option<Kernel>> = Vec::new();
-        for kind in pending.iter().filter_map(kernel) {
-            if !kinds.contains(&kind) {
-                kinds.push(kind);
+        // Runs in use
+        let kinds: Vec<RunKind> = pending.iter().map(RunKind::of).collect();
+        let mut used: Vec<RunKind> = Vec::new();
+        for &kind in &kinds {
+            if kind != RunKind::Lambertian && !used.contains(&kind) {
+                used.push(kind);
             }
         }
-        kinds.sort_by_key(|kind| kind.map(|kernel| kernel as u32));
+        used.sort();
 
-        // One run for each kernel
-        for kind in kinds {
+        // Rows of each run
+        for kind in used {
             let first = self.len();
-            for vertex in pending.iter().filter(|vertex| kernel(vertex) == Some(kind)) {
+            for (vertex, _) in pending.iter().zip(&kinds).filter(|&(_, &other)| other == kind) {
                 self.bsdfs.push(vertex.bsdf);
                 self.media.push(vertex.media);
                 self.add_row(vertex);
             }
-            self.runs.push(Run { kernel: kind, rows: first..self.len() });
+            let kernel = if let RunKind::Kernel(kernel) = kind { Some(kernel) } else { None };
+            self.runs.push(Run { kernel, rows: first..self.len() });
         }
         self.set_params();
     }

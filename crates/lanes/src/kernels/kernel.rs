@@ -13,7 +13,7 @@ use super::thin_dielectric::ThinDielectric;
 pub const MAX_PARAMS: usize = principled::PARAMS;
 
 /// The kernels.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Kernel {
     /// Lambertian reflection.
     Diffuse,
