@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import difflib
-import json
 import numbers
 import os
 import warnings
@@ -42,7 +41,7 @@ class Setting:
     values: str
     #: The names among the allowed values.
     names: Tuple[str, ...]
-    #: The name in metadata and plans.
+    #: The name in metadata.
     key: str
     #: Former keywords, which are still accepted.
     aliases: Tuple[str, ...]
@@ -78,8 +77,6 @@ class Merged(Layers):
 class Rendering(Layers):
     """A rendered image: its layers, and data on its rendering."""
 
-    #: Choices made by measurements, by their metadata names. With these as `plan`, the image is bit-identical.
-    plan: Dict[str, str]
     #: True if every pixel has all of its samples.
     complete: bool
     #: Wall-clock time of the rendering without loading (s).
@@ -108,19 +105,6 @@ def _texts(given: Mapping[str, object]) -> List[Tuple[str, str]]:
             hint = f": did you mean {near[0]!r}?" if near else ""
             raise TypeError(f"render() has no keyword {name!r}{hint}")
     return [(name, _text(name, value)) for name, value in given.items() if value is not None]
-
-
-def _plan(plan: Union[None, Path, Mapping[str, str]]) -> List[Tuple[str, str]]:
-    if plan is None:
-        return []
-    if isinstance(plan, Mapping):
-        return list(plan.items())
-    with open(plan, encoding="utf-8") as file:
-        try:
-            stored = json.load(file)["settings"]
-            return [(str(key), str(value)) for key, value in stored.items()]
-        except (AttributeError, KeyError, TypeError, json.JSONDecodeError) as error:
-            raise ValueError(f"{os.fspath(plan)} is no plan") from error
 
 
 def _source(scene: Path, folder: Optional[Path]) -> Union[str, Tuple[str, str, str]]:
@@ -174,7 +158,6 @@ def render(
     folder: Optional[Path] = None,
     callback: Optional[Callable[[_lumiris.Progress], object]] = None,
     interval: float = 0.1,
-    plan: Union[None, Path, Mapping[str, str]] = None,
     resolution: Union[None, str, Tuple[int, int]] = None,
     crop: Optional[Tuple[float, float, float, float]] = None,
     box_filter: bool = False,
@@ -220,9 +203,6 @@ def render(
         far. An exception ends the rendering and is raised. The callback runs in the thread that calls `render`.
     interval
         Time between calls within a pass (s).
-    plan
-        Choices that an earlier rendering made by measurements (`Rendering.plan`), or a file by `lumiris plan`. Settings
-        take precedence.
     resolution, crop, box_filter, accel, packet_width, threads, tile_size, time
         As on the command line: columns and rows, or text such as "640x360"; x0, x1, y0, y1 in fractions of the image;
         use a pixel filter of one pixel; `embree` or `bvh`; rays per packet; threads; edge of a tile (pixels); time
@@ -298,7 +278,6 @@ def render(
         "aov": _aov(aov),
         "interval": interval,
         "settings": _texts(settings),
-        "plan": _plan(plan),
         "parts": {
             "part": _part(part),
             "part_by": part_by,
@@ -309,11 +288,10 @@ def render(
             "resume": None if resume is None else os.fspath(resume),
         },
     }
-    layers, metadata, place, chosen, complete, seconds, remarks = _lumiris.render(options, callback)
+    layers, metadata, place, complete, seconds, remarks = _lumiris.render(options, callback)
     for remark in remarks:
         warnings.warn(remark.strip(), SceneWarning, stacklevel=2)
     rendering = Rendering._of(layers, metadata, place)
-    rendering.plan = dict(chosen)
     rendering.complete = complete
     rendering.seconds = seconds
     return rendering

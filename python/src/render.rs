@@ -4,7 +4,7 @@ use crate::attendant::{Attendant, Event};
 use crate::images::{Layer, Place, arrays, split};
 use crate::parts::{PartOptions, Parts, in_words_of_python, part_error, place};
 use crate::progress::Canvas;
-use crate::settings::{Given, apply, named, parse, parse_plan};
+use crate::settings::{Given, apply, named, parse};
 use lumiris::film::filter::PixelFilter;
 use lumiris::film::{Film, PixelBounds};
 use lumiris::imaging::Image;
@@ -68,7 +68,6 @@ pub(crate) struct Options {
     cryptomatte: Vec<String>,
     interval: f64,
     settings: Vec<(String, String)>,
-    plan: Vec<(String, String)>,
     parts: PartOptions,
 }
 
@@ -85,7 +84,6 @@ struct Request {
     cryptomatte: Vec<Cryptomatte>,
     interval: Duration,
     settings: Given,
-    plan: Given,
 }
 
 /// Results of a rendering.
@@ -93,7 +91,6 @@ struct Done {
     layers: NamedImages,
     metadata: Vec<(String, String)>,
     place: Place,
-    plan: Vec<(&'static str, String)>,
     complete: bool,
     seconds: f64,
     warnings: Vec<String>,
@@ -181,7 +178,6 @@ impl Options {
             cryptomatte,
             interval: seconds("interval", self.interval)?,
             settings: parse(&self.settings)?,
-            plan: parse_plan(&self.plan)?,
         })
     }
 }
@@ -214,7 +210,6 @@ impl Request {
         if let Some(stored) = stored {
             stored.apply(&mut loaded.settings).map_err(Failure::Part)?;
         }
-        apply(&self.plan, &mut loaded.settings);
         apply(&self.settings, &mut loaded.settings);
         loaded.given.extend(named(&self.settings));
         if let Some(time) = self.render.time_limit.filter(|_| stored.is_none()) {
@@ -307,7 +302,6 @@ impl Request {
             layers,
             metadata,
             place: place(&rendering.film),
-            plan: plan.chosen,
             complete: rendering.complete,
             seconds: rendering.elapsed.as_secs_f64(),
             warnings,
@@ -343,7 +337,7 @@ impl Request {
         if file.is_none() && checkpoint.is_none() && stored.is_none() {
             return Ok((None, told));
         }
-        let storage = Storage { checkpoint: checkpoint.clone(), keeps_sums: file.is_some(), stored, plan: None };
+        let storage = Storage { checkpoint: checkpoint.clone(), keeps_sums: file.is_some(), stored };
         // Nobody receives after the rendering has ended: that is no error
         let warn = move |text: &str| drop(warn.send(text.to_owned()));
         let film_file = FilmFile::new(asked, job, files, settings, spp, storage, warn).map_err(Failure::Part)?;
@@ -441,9 +435,8 @@ fn exception(py: Python<'_>, request: &Request, failure: Failure) -> PyErr {
     }
 }
 
-/// Return value of `render`: layers, metadata, position, plan, true if all samples are done, time (s), and warnings.
-type Rendered<'py> =
-    (Vec<Layer<'py>>, Vec<(String, String)>, Place, Vec<(&'static str, String)>, bool, f64, Vec<String>);
+/// Return value of `render`: layers, metadata, position, true if all samples are done, time (s), and warnings.
+type Rendered<'py> = (Vec<Layer<'py>>, Vec<(String, String)>, Place, bool, f64, Vec<String>);
 
 /// Renders in another thread, while this one calls back and checks for Ctrl-C.
 #[pyfunction]
@@ -484,5 +477,5 @@ pub(crate) fn render(py: Python<'_>, options: Options, callback: Option<Py<PyAny
     let done = result.map_err(|_| PyRuntimeError::new_err("the renderer has panicked: this is a bug"))?;
     let done = done.map_err(|failure| exception(py, &request, failure))?;
     let layers = arrays(py, done.layers)?;
-    Ok((layers, done.metadata, done.place, done.plan, done.complete, done.seconds, done.warnings))
+    Ok((layers, done.metadata, done.place, done.complete, done.seconds, done.warnings))
 }

@@ -1,12 +1,11 @@
 //! The table of settings as keyword arguments: command-line names with underscores.
 
 use lumiris::settings::Settings;
-use lumiris::settings::table::{GROUPS, Removed, Setting, rows};
+use lumiris::settings::table::{GROUPS, Setting, rows};
 use lumiris::settings::value::{Kind, Value};
-use pyo3::exceptions::{PyTypeError, PyUserWarning, PyValueError};
+use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use std::ffi::CString;
 
 /// Settings with their values, in table order.
 pub(crate) type Given = Vec<(&'static Setting, Value)>;
@@ -34,22 +33,6 @@ pub(crate) fn parse(given: &[(String, String)]) -> PyResult<Given> {
         .flat_map(|row| given.iter().filter(|(name, _)| is_called(row, name)).map(move |given| (row, given)))
         .map(|(row, (name, text))| parse(row, name, text))
         .collect()
-}
-
-/// Parses the settings of a plan, by their metadata names.
-pub(crate) fn parse_plan(plan: &[(String, String)]) -> PyResult<Given> {
-    let parse = |(key, text): &(String, String)| {
-        let row = rows().find(|row| row.key == key);
-        let row = row.ok_or_else(|| PyValueError::new_err(format!("plan: there is no setting `{key}`")))?;
-        let wrong = |expected| PyValueError::new_err(format!("plan: `{key}`: {expected}, but found `{text}`"));
-        Ok((row, row.kind.parse(text).map_err(wrong)?))
-    };
-    let (removed, present): (Vec<_>, Vec<_>) = plan.iter().partition(|(key, _)| Removed::of_key(key).is_some());
-    for removed in removed.iter().filter_map(|(key, _)| Removed::of_key(key)) {
-        let note = CString::new(format!("plan: {}", removed.note(removed.key)))?;
-        Python::attach(|py| PyErr::warn(py, &py.get_type::<PyUserWarning>(), &note, 1))?;
-    }
-    present.into_iter().map(parse).collect()
 }
 
 /// The settings with their text for messages.

@@ -131,7 +131,6 @@ def test_none_leaves_a_setting_and_old_names_are_accepted() -> None:
         ({"texture_memory": "much"}, ValueError, "texture_memory"),
         ({"cryptomatte": ["light"]}, ValueError, "cryptomatte: expected object or material, not `light`"),
         ({"noise": 0.1, "spp": 64, "estimator": "optimal-mis"}, ValueError, "noise needs the integrator direct or path"),
-        ({"plan": {"colour": "red"}}, ValueError, "there is no setting `colour`"),
         ({"callback": 3}, TypeError, "not callable"),
     ],
 )
@@ -173,14 +172,6 @@ def test_light_groups_are_layers_that_add_up_to_the_image() -> None:
     assert sorted(names) == ["light_other", "light_rim"] and image["light_rim"].max() > 0
     assert np.allclose(image["light_other"] + image["light_rim"], image["beauty"], rtol=1e-5, atol=1e-7)
     assert not any(name.startswith("light_") for name in lumiris.render(scene, **TINY, estimator="mis", light_groups="none"))
-
-
-def test_a_plan_gives_the_image_that_it_came_from() -> None:
-    options: Dict[str, Any] = {"spp": 4, "resolution": (16, 16)}
-    first = lumiris.render(SCENE, **options)
-    assert "samples" in first.plan
-    again = lumiris.render(SCENE, **options, plan=first.plan)
-    assert np.array_equal(first["beauty"], again["beauty"])
 
 
 def test_textures_beyond_a_limit_give_the_same_image(

@@ -80,14 +80,6 @@ pub fn complete_for_noise(settings: &mut Settings, has_spp: bool) -> Result<(), 
     }
 }
 
-/// True if samples of an image rendered with the settings `of_paths` may have several emission rays, which then take
-/// over the noise of visible lights.
-pub(super) fn may_split(settings: &Settings, of_paths: &IntegratorSettings) -> bool {
-    let sampling = settings.sampling;
-    let is_open = sampling.allocation != Allocation::Uniform || sampling.noise.is_some();
-    is_open && Settings { integrator: *of_paths, sampling }.allows_adaptive()
-}
-
 /// Statistics of the pilot's samples of a pixel. Compact, because a pilot holds all pixels of an image at once.
 #[derive(Clone, Copy, Debug, Default)]
 struct PixelStatistics {

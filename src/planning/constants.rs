@@ -56,22 +56,6 @@ pub(super) const COLLISION_COST: f64 = 1.5;
 /// camera ray and 8 proposals.
 pub(super) const EMISSION_RAY_COST: f64 = 2.0;
 
-// Trials: docs/measurements/efficiency/README.md#trials
-
-/// Edge of the cells of trials (pixels).
-pub(super) const CELL: u32 = 16;
-/// Cells of a trial, and samples per pixel and seed.
-pub(super) const TUNE_CELLS: usize = 32;
-pub(super) const TUNE_SPP: u32 = 16;
-/// Expected number of trials.
-pub(super) const TUNE_TRIALS: f64 = 20.0;
-/// Minimum efficiency of a trial relative to the best so far ([`MIN_GAIN`]), and of the result relative to the rule
-/// ([`TUNE_GAIN`]).
-pub(super) const MIN_GAIN: f64 = 1.03;
-/// Minimum gain of both in standard errors. A single cell can account for one.
-pub(super) const MIN_ERRORS: f64 = 1.5;
-pub(super) const TUNE_GAIN: f64 = 1.1;
-
 // The pilot of adaptive sampling: docs/measurements/efficiency/README.md#emission_rays
 
 /// Minimum and maximum samples per pixel of the pilot. If the budget is below the minimum, the pilot samples a fraction

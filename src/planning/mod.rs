@@ -2,12 +2,12 @@
 //!
 //! * [`plan`]: the entry point [`prepare`], and the record of the choices; [`preparation`]: its parameters and errors.
 //! * `rule`, [`facts`]: chooses the estimator for `auto` from facts of the scene.
-//! * [`tune`], `trials`: searches for more efficient settings by timed trials, on request; [`processor_time`].
+//! * [`processor_time`]: the clock of statistics.
 //! * [`allocation`], `allocation_counts`, `noise_target`, `probe`: pilots for the camera samples of each pixel.
 //! * [`proposals`], [`visibility_cache`]: proposals of `ris` per pixel; the cache of contributing lights.
 //! * `constants`: all constants of these, with the measurements that they follow from.
 //!
-//! Except for trials, the results are a function of scene, settings and seed: work is counted, not timed.
+//! The results are a function of scene, settings and seed: work is counted, not timed.
 
 pub mod allocation;
 mod allocation_counts;
@@ -20,8 +20,6 @@ mod probe;
 pub mod processor_time;
 pub mod proposals;
 mod rule;
-mod trials;
-pub mod tune;
 pub mod visibility_cache;
 
 pub use plan::{Plan, has_pilot, prepare};

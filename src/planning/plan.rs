@@ -1,7 +1,6 @@
 //! Completes the open settings of a job: the steps in their order, and the record of the choices.
 
 use super::preparation::{PlanError, Preparation, thread_pool};
-use super::tune::{Tuning, tune};
 use super::visibility_cache::build_visibility_cache;
 use super::{allocation, proposals, rule};
 use crate::integrators::exclusions::{self, OPTIONAL};
@@ -12,8 +11,6 @@ use crate::settings::{Allocation, EstimatorKind, Settings};
 /// Choices made for an image where its settings were open.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Plan {
-    /// Result of the trials, if requested.
-    pub tuning: Option<Tuning>,
     /// The chosen settings, by their names in metadata. Rendering with them gives a bit-identical image.
     pub chosen: Vec<(&'static str, String)>,
     /// Warnings about settings without effect.
@@ -26,10 +23,10 @@ pub fn prepare(job: &mut RenderJob, how: &Preparation<'_>) -> Result<Plan, PlanE
         return Err(conflict.into());
     }
     let open = *job.settings();
-    let mut plan = match how.until_deadline(|how| complete(job, &open, how)) {
+    let mut plan = match how.until_deadline(|how| complete(job, how)) {
         Err(PlanError::Stopped) if how.goes_on().is_ok() => {
             job.change(|s| (s.sampling.allocation, s.sampling.noise) = (Allocation::Uniform, None));
-            let plan = complete(job, &open, &Preparation { tunes: false, ..*how })?;
+            let plan = complete(job, how)?;
             let given_up = "the pilots did not finish in time: all pixels have the same number of samples".to_owned();
             Plan { warnings: [vec![given_up], plan.warnings].concat(), ..plan }
         }
@@ -48,11 +45,10 @@ pub fn has_pilot(settings: &Settings) -> bool {
 }
 
 /// Makes the choices, but does not record them in the plan.
-fn complete(job: &mut RenderJob, open: &Settings, how: &Preparation<'_>) -> Result<Plan, PlanError> {
+fn complete(job: &mut RenderJob, how: &Preparation<'_>) -> Result<Plan, PlanError> {
     let pool = thread_pool(how.threads)?;
     (how.observe)("measuring facts of the scene", None);
-    let facts = pool.install(|| rule::apply(job)).filter(|_| how.tunes);
-    let tuning = facts.map(|facts| pool.install(|| tune(job, open, &facts, how))).transpose()?;
+    pool.install(|| rule::apply(job));
     if job.settings().sampling.allocation == Allocation::Auto {
         job.change(|s| s.sampling.allocation = Allocation::Uniform);
     }
@@ -64,7 +60,7 @@ fn complete(job: &mut RenderJob, open: &Settings, how: &Preparation<'_>) -> Resu
     how.goes_on()?;
     pool.install(|| proposals::choose(job, how));
     job.pixel_samples = pool.install(|| allocation::allocate(job, how))?;
-    Ok(Plan { tuning, chosen: Vec::new(), warnings: warnings(job) })
+    Ok(Plan { chosen: Vec::new(), warnings: warnings(job) })
 }
 
 /// Warnings about requested features that the scene does not allow. Settings that do not apply are reported elsewhere.

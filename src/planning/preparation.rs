@@ -25,10 +25,6 @@ pub struct Preparation<'a> {
     pub ratio_map: bool,
     /// Time after which unfinished pilots are abandoned. The image then has settings that need none.
     pub deadline: Option<Instant>,
-    /// True if trials may replace the choice of the rule.
-    pub tunes: bool,
-    /// Receives the expected CPU time of trials.
-    pub expect: &'a (dyn Fn(Duration) + Sync),
     /// Stops the preparation.
     pub stop: &'a AtomicBool,
     /// Receives the current stage.
@@ -39,15 +35,7 @@ impl Default for Preparation<'_> {
     fn default() -> Self {
         static NEVER: AtomicBool = AtomicBool::new(false);
         let observe = &|_: &'static str, _: Option<f64>| ();
-        Preparation {
-            threads: None,
-            ratio_map: false,
-            tunes: false,
-            expect: &|_| (),
-            deadline: None,
-            stop: &NEVER,
-            observe,
-        }
+        Preparation { threads: None, ratio_map: false, deadline: None, stop: &NEVER, observe }
     }
 }
 

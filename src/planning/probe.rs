@@ -30,11 +30,6 @@ impl LeftToLightPaths {
         let pilot = (per_sample > 0.0).then(|| LightPilot::new(job, LIGHT_PILOT)).flatten();
         LeftToLightPaths(pilot.map(|pilot| (pilot, per_sample)))
     }
-
-    /// Nothing is left to light paths.
-    pub(super) const fn none() -> Self {
-        LeftToLightPaths(None)
-    }
 }
 
 /// Traces samples. Holds the buffers of a thread.

@@ -24,19 +24,18 @@ use crate::integrators::exclusions::{self, Feature};
 use crate::scene::RenderJob;
 use crate::settings::{Allocation, ContributingSettings, EstimatorKind, IntegratorKind, IntegratorSettings, Settings};
 
-/// Chooses the open settings of `job` if its estimator is `auto`, and returns the facts. Runs on the threads of the
-/// current pool.
-pub(super) fn apply(job: &mut RenderJob) -> Option<Facts> {
+/// Chooses the open settings of `job` if its estimator is `auto`. Runs on the threads of the current pool.
+pub(super) fn apply(job: &mut RenderJob) {
     let Settings { integrator: base, sampling } = *job.settings();
     if base.estimator != EstimatorKind::Auto {
-        return None;
+        return;
     }
     job.change(|s| s.integrator.estimator = EstimatorKind::Mis);
     if sampling.allocation == Allocation::Auto {
         job.change(|s| s.sampling.allocation = Allocation::Adaptive);
     }
     if !matches!(base.kind, IntegratorKind::Direct | IntegratorKind::Path) {
-        return None;
+        return;
     }
     // Emitting media are lights only if the path continues by the one BSDF sample
     if job.lights.samples_volumes() && base.bsdf_fraction.is_none() {
@@ -54,7 +53,6 @@ pub(super) fn apply(job: &mut RenderJob) -> Option<Facts> {
     {
         job.change(|s| s.integrator.light_paths = Some(LIGHT_PATHS));
     }
-    Some(facts)
 }
 
 /// `mis` with the sample counts for a scene with these facts, where they are open.

@@ -3,7 +3,7 @@
 use super::cell_progress::CellProgress;
 use super::continuation::Continuation;
 use super::parts::notes::SECONDS;
-use super::parts::{Asked, Checkpoints, FilmHeader, PLAN_NOTE, PartError, Stored, StoredTile, write_film};
+use super::parts::{Asked, Checkpoints, FilmHeader, PartError, Stored, StoredTile, write_film};
 use super::render_settings::RenderSettings;
 use super::rendering::Rendering;
 use crate::import::fingerprint::SceneFiles;
@@ -20,8 +20,6 @@ pub struct Storage {
     pub keeps_sums: bool,
     /// Stored sums to resume from.
     pub stored: Option<Stored>,
-    /// The plan: settings chosen by measurements, as text.
-    pub plan: Option<String>,
 }
 
 /// Header, checkpoints and stored sums of a rendering.
@@ -47,13 +45,10 @@ impl FilmFile {
     ) -> Result<FilmFile, PartError> {
         let fingerprint = files.fingerprint().map_err(|file| PartError::io(&file.path, file.error))?;
         let described = asked.described(job, settings);
-        let notes = asked.notes(storage.plan, &job.world.scene.camera);
-        let mut header = FilmHeader::new(job, settings, spp, fingerprint, [described, notes]);
+        let notes = asked.notes(&job.world.scene.camera);
+        let header = FilmHeader::new(job, settings, spp, fingerprint, [described, notes]);
         if let Some(stored) = &storage.stored {
             check_resumable(stored, &header)?;
-            // A stored plan is not measured again
-            let plan = stored.header.note(PLAN_NOTE).filter(|_| header.note(PLAN_NOTE).is_none());
-            header.notes.extend(plan.map(|text| (PLAN_NOTE.to_owned(), text.to_owned())));
         }
         let checkpoints =
             storage.checkpoint.map(|(path, interval)| Checkpoints::new(path, interval, header.clone(), warn));

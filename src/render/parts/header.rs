@@ -11,9 +11,6 @@ use crate::scene::RenderJob;
 use std::ops::Range;
 use std::str::FromStr;
 
-/// Name of the note with the plan: the settings chosen by measurements.
-pub const PLAN_NOTE: &str = "plan";
-
 /// The header of a file of sums.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FilmHeader {

@@ -5,7 +5,7 @@
 
 use super::error::PartError;
 use super::file::FilmReader;
-use super::header::{FilmHeader, PLAN_NOTE};
+use super::header::FilmHeader;
 use super::notes::{SCENE_NOTE, SECONDS, asked_aovs, has_features};
 use super::stored_tile::StoredTile;
 use crate::direct::Fits;
@@ -62,9 +62,6 @@ impl Merged {
         let mut metadata: TextEntries = settings.collect();
         let mut add = |key: &str, value: String| metadata.push((format!("lumiris:{key}"), value));
         add("scene", self.header.note(SCENE_NOTE).unwrap_or_default().to_owned());
-        if let Some(plan) = self.header.note(PLAN_NOTE) {
-            add("plan", plan.to_owned());
-        }
         add("complete", self.missing.is_empty().to_string());
         add("samples_done", self.film.summary().samples_text("per pixel"));
         add("seconds", format!("{:.3}", self.seconds));

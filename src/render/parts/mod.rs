@@ -21,7 +21,7 @@ pub use checkpoint::Checkpoints;
 pub use error::PartError;
 pub use extent::{Extent, ExtentError};
 pub use file::{FilmReader, write_film};
-pub use header::{FilmHeader, PLAN_NOTE};
+pub use header::FilmHeader;
 pub use merge::{Merged, merge};
 pub use notes::{Asked, CameraMatrices};
 pub use stored::Stored;

@@ -2,7 +2,7 @@
 //! and merge.
 
 use super::error::PartError;
-use super::header::{FilmHeader, PLAN_NOTE, list};
+use super::header::{FilmHeader, list};
 use super::stored::Stored;
 use crate::cameras::Camera;
 use crate::imaging::TextEntries;
@@ -86,9 +86,8 @@ impl Asked {
         Ok(())
     }
 
-    /// Notes, which may differ between parts; some are needed to resume. `plan` is the text of the settings chosen by
-    /// measurements.
-    pub(in crate::render) fn notes(&self, plan: Option<String>, camera: &Camera) -> TextEntries {
+    /// Notes, which may differ between parts; some are needed to resume.
+    pub(in crate::render) fn notes(&self, camera: &Camera) -> TextEntries {
         // One note per option that is given
         let LoadOptions { resolution, crop, environment, scene, camera: camera_name, camera_auto, light_units, time } =
             &self.load;
@@ -107,7 +106,6 @@ impl Asked {
             ("light_units", light_units.map(|units| <&str>::from(units).to_owned())),
             ("time_in_scene", time.map(|time| time.to_string())),
             ("box_filter", self.box_filter.then(|| "true".to_owned())),
-            (PLAN_NOTE, plan),
             (AOV, self.aovs.as_ref().map(names)),
         ];
 

@@ -2,7 +2,7 @@
 
 use super::denoise_args::DenoiseArgs;
 use super::exr::ExrArgs;
-use super::frame_list::{FrameList, FrameOf, parse_frames};
+use super::frame_list::{FrameList, parse_frames};
 use super::look::LookArgs;
 use super::memory::{MemoryLimit, parse_limit};
 use super::named::named;
@@ -38,9 +38,6 @@ pub(super) struct SceneArgs {
     pub scene: PathBuf,
     #[command(flatten)]
     pub settings: SettingsArgs,
-    /// Choices of a plan that `lumiris plan` has stored; options override them
-    #[arg(long, value_name = "FILE")]
-    pub plan: Option<PathBuf>,
     /// Size of the image, such as 640x480 [default: the file's]
     #[arg(long, value_name = "WxH", value_parser = parse_resolution)]
     pub resolution: Option<[u32; 2]>,
@@ -66,9 +63,9 @@ pub(super) struct SceneArgs {
     /// Time (s) of a glTF scene's animations [default: animations are ignored]
     #[arg(long, value_name = "SECONDS", value_parser = parse_time_in_scene)]
     pub time_in_scene: Option<f32>,
-    /// Sequence data, if the scene is a frame of an animation.
+    /// Number of the frame, if the seed depends on it.
     #[arg(skip)]
-    pub frame: Option<FrameOf>,
+    pub seed_by_frame: Option<u32>,
     /// Memory for the textures of the scene, such as 2GB, or `off`. The rest is read by tiles from a temporary file (in
     /// TMPDIR). Images are bit-identical [default: off, unless only this way the scene fits --memory-limit]
     #[arg(long, value_name = "SIZE", value_parser = parse_limit)]
@@ -149,10 +146,6 @@ pub(super) struct RenderArgs {
     /// pilots included. With --spp, stop earlier if that is reached
     #[arg(long, value_name = "SECONDS", value_parser = parse_seconds)]
     pub time: Option<f64>,
-    /// Test settings first, and use the best if it is at least a tenth more efficient than the default rule's. For long
-    /// renders. `lumiris plan` stores the result
-    #[arg(long, hide_short_help = true, conflicts_with_all = ["plan", "part", "samples_from", "samples_to"])]
-    pub tune: bool,
     /// AOVs: additional channels of EXR files. `none` saves their time [default: all, and ratio with --proposals
     /// optimal]
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = aov())]

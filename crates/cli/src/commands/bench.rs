@@ -3,7 +3,7 @@
 use super::args::SceneArgs;
 use super::bench_efficiency::{EfficiencyArgs, efficiency};
 use super::progress;
-use super::settings::{Setup, load_job, plan};
+use super::settings::{Setup, complete, load_job};
 use anyhow::{Context, bail};
 use clap::{Args, ValueEnum};
 use lumiris::planning::Preparation;
@@ -69,7 +69,7 @@ pub(super) fn run(args: &BenchArgs) -> anyhow::Result<ExitCode> {
     }
     args.json.as_deref().map_or(Ok(()), check_writable)?;
     let Setup { mut job, times, given, .. } = load_job(&args.scene)?;
-    plan(&args.scene, &mut job, &given, &Preparation::default(), false)?;
+    complete(&args.scene, &mut job, &given, &Preparation::default(), false)?;
 
     // Measure
     let asked = |subject| args.subject == subject || args.subject == Subject::All;

@@ -2,7 +2,7 @@
 
 use super::usage_error::UsageError;
 use super::{
-    args, bench, compare, crosscheck, denoise, farm, frames, generate, info, interrupt, maketx, merge, plan, progress,
+    args, bench, compare, crosscheck, denoise, farm, frames, generate, info, interrupt, maketx, merge, progress,
     render, reproduce, shell, short_help,
 };
 use clap::{CommandFactory, Parser, Subcommand};
@@ -23,8 +23,6 @@ enum Command {
     /// Render a scene
     #[command(mut_args(short_help::with_example))]
     Render(Box<args::RenderArgs>),
-    /// Measure the settings that a scene leaves open, and store the choices for render --plan
-    Plan(plan::PlanArgs),
     /// Merge the parts of an image that were rendered with render --part
     Merge(merge::MergeArgs),
     /// Render the parts of an image on the nodes of a cluster
@@ -67,7 +65,6 @@ pub(crate) fn run() -> ExitCode {
             Some(list) => frames::run(args, list),
             None => render::run(args, start),
         },
-        Command::Plan(args) => plan::run(args),
         Command::Merge(args) => merge::run(args),
         Command::Denoise(args) => denoise::run(args),
         Command::Farm(args) => farm::run(args),

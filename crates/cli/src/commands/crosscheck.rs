@@ -2,7 +2,7 @@
 
 use super::args::SceneArgs;
 use super::progress;
-use super::settings::{Setup, load_job, plan, render_settings};
+use super::settings::{Setup, complete, load_job, render_settings};
 use anyhow::{Context, bail};
 use clap::Args;
 use lumiris::accel::Accel;
@@ -69,7 +69,7 @@ pub(super) fn run(args: &CrosscheckArgs) -> anyhow::Result<ExitCode> {
 
     // Rays
     let Setup { mut job, given, .. } = load_job(&args.scene)?;
-    plan(&args.scene, &mut job, &given, &Preparation::default(), true)?;
+    complete(&args.scene, &mut job, &given, &Preparation::default(), true)?;
     let bvh: Box<dyn Accel> =
         Box::new(Bvh::new(Arc::clone(&job.world.scene.geometry), Some(Arc::clone(&job.world.scene.textures) as _)));
     let report = crosscheck(&job, &*bvh, args.rays);

@@ -111,7 +111,7 @@ pub(super) fn run(args: &FarmArgs) -> anyhow::Result<ExitCode> {
     }
     check_look(&args.look.args, &args.exr.args)?;
     args.denoise.args.check(&args.output)?;
-    let first = check(args)?;
+    check(args)?;
 
     // Choose the folder
     let folder = args.dir.clone().unwrap_or_else(|| default_folder(&args.output[0]));
@@ -122,8 +122,8 @@ pub(super) fn run(args: &FarmArgs) -> anyhow::Result<ExitCode> {
     }
 
     // Write the scripts, and submit or print them
-    let job = job(args, &folder, &first)?;
-    write_folder(args, &folder, &job)?;
+    let job = job(args, &folder)?;
+    write_folder(&folder, &job)?;
     if args.submit {
         submit(&folder)?;
     } else {
@@ -158,17 +158,10 @@ fn default_folder(output: &Path) -> PathBuf {
     output.with_file_name(name).with_extension("farm")
 }
 
-/// The first image.
-struct First {
-    args: RenderArgs,
-    /// True if a plan must be made.
-    needs_plan: bool,
-}
-
 /// Rejects options that cannot be rendered in parts, before anything is written.
-fn check(args: &SlurmArgs) -> anyhow::Result<First> {
+fn check(args: &SlurmArgs) -> anyhow::Result<()> {
     // Parse the options as `lumiris render` will
-    let mut words = part_options(args, None);
+    let mut words = part_options(args);
     words.extend(["--part".to_owned(), format!("1/{}", args.count())]);
     words.extend(["-o".to_owned(), (if args.frames.is_some() { "####.part" } else { "1.part" }).to_owned()]);
     words.extend(args.frames.iter().map(|list| format!("--frames={}", list.text())));
@@ -176,7 +169,6 @@ fn check(args: &SlurmArgs) -> anyhow::Result<First> {
     let command = RenderArgs::augment_args(clap::Command::new("render").no_binary_name(true));
     let matches = command.try_get_matches_from(words).map_err(|e| UsageError(e.to_string()))?;
     let mut render = RenderArgs::from_arg_matches(&matches).map_err(|e| UsageError(e.to_string()))?;
-    render.scene.plan.clone_from(&args.scene.args.plan);
     if let Some(frames) = &args.frames {
         check_numbers(args.output.iter())?;
         let first = first_of(&render, frames)?;
@@ -188,14 +180,11 @@ fn check(args: &SlurmArgs) -> anyhow::Result<First> {
         return Err(UsageError("the tasks of a farm read the scene each: it must be a file".to_owned()).into());
     }
     let Loaded { settings, .. } = load_scene(&render.scene, &FileCache::default(), None, None)?;
-    // Pilots pay off where many machines render
-    let is_auto = settings.integrator.estimator == EstimatorKind::Auto;
-    let needs_plan = is_auto && render.scene.plan.is_none();
     parts::check_division(&render, &settings)?;
     // With other estimators and allocations, the pilot decides the sample count
     let is_uniform = match settings.sampling.allocation {
         Allocation::Uniform => true,
-        Allocation::Auto => !is_auto,
+        Allocation::Auto => settings.integrator.estimator != EstimatorKind::Auto,
         Allocation::Adaptive => false,
     };
     let (spp, count) = (settings.sampling.spp, args.count());
@@ -205,7 +194,7 @@ fn check(args: &SlurmArgs) -> anyhow::Result<First> {
         );
         return Err(UsageError(message).into());
     }
-    Ok(First { args: render, needs_plan })
+    Ok(())
 }
 
 /// Fails if the scene of a frame is missing. Only the first frame's scene is loaded.
@@ -220,9 +209,8 @@ fn check_scenes(scene: &Path, frames: &FrameList) -> anyhow::Result<()> {
 }
 
 /// Options of `lumiris render` for all parts.
-fn part_options(args: &SlurmArgs, plan: Option<String>) -> Vec<String> {
-    let mut words = args.scene.words_without(&["plan"]);
-    words.extend(plan.map(|path| format!("--plan={path}")));
+fn part_options(args: &SlurmArgs) -> Vec<String> {
+    let mut words = args.scene.words_without(&[]);
     let names = args.aov.iter().map(|list| {
         let names: Vec<&str> = list.iter().map(|aov| aov.map_or("none", <&str>::from)).collect();
         format!("--aov={}", names.join(","))
@@ -234,16 +222,13 @@ fn part_options(args: &SlurmArgs, plan: Option<String>) -> Vec<String> {
     words
 }
 
-fn job(args: &SlurmArgs, folder: &Path, first: &First) -> anyhow::Result<Job> {
-    let &First { args: ref first, needs_plan } = first;
+fn job(args: &SlurmArgs, folder: &Path) -> anyhow::Result<Job> {
     // Paths
     let from = std::env::current_dir().context("there is no current folder")?;
     let program = match &args.program {
         Some(path) => path.clone(),
         None => std::env::current_exe().context("this program has no path: give --program")?,
     };
-    let has_plan = needs_plan || args.scene.args.plan.is_some();
-    let plan = if has_plan { Some(text(&folder.join("plan.json"))?) } else { None };
 
     // Options of the merge
     let mut merge =
@@ -252,21 +237,16 @@ fn job(args: &SlurmArgs, folder: &Path, first: &First) -> anyhow::Result<Job> {
         // Scripts change to the current folder, whose name may itself contain #
         merge.push(format!("--output={}", text(path)?));
     }
-    // All frames use the plan of the first frame
-    let mut planned = args.scene.words_without(&["plan", "time-in-scene"]);
-    planned.extend(first.scene.time_in_scene.map(|time| format!("--time-in-scene={time}")));
     Ok(Job {
         lumiris: text(&program)?,
         from: text(&from)?,
         folder: text(folder)?,
         scene: text(&args.scene.args.scene)?,
-        first_scene: text(&first.scene.scene)?,
         frames: args.frames.as_ref().map_or(Vec::new(), |list| list.0.clone()),
         parts: args.count(),
         seconds: f64::from(args.checkpoint_seconds),
-        needs_plan,
         has_threads: args.scene.args.threads.is_some(),
-        options: [planned, part_options(args, plan), merge, args.sbatch.clone()],
+        options: [part_options(args), merge, args.sbatch.clone()],
     })
 }
 
@@ -275,8 +255,8 @@ fn text(path: &Path) -> anyhow::Result<String> {
     Ok(path.to_str().with_context(|| format!("{}: the name is not in UTF-8", path.display()))?.to_owned())
 }
 
-/// Writes scripts and plan. An existing folder must be empty or belong to the same rendering, which is then continued.
-fn write_folder(args: &SlurmArgs, folder: &Path, job: &Job) -> anyhow::Result<()> {
+/// Writes the scripts. An existing folder must be empty or belong to the same rendering, which is then continued.
+fn write_folder(folder: &Path, job: &Job) -> anyhow::Result<()> {
     // Create the folder, or check the existing one
     let shown = folder.display();
     let scripts = job.scripts();
@@ -291,16 +271,6 @@ fn write_folder(args: &SlurmArgs, folder: &Path, job: &Job) -> anyhow::Result<()
             }
         }
         Err(e) => return Err(e).with_context(|| format!("cannot make the folder {shown}")),
-    }
-
-    // Copy the plan
-    if let Some(path) = &args.scene.args.plan {
-        let text = fs::read_to_string(path).with_context(|| format!("cannot read {}", path.display()))?;
-        let copy = folder.join("plan.json");
-        if fs::read_to_string(&copy).is_ok_and(|before| before != text) {
-            bail!("{} is of another plan: remove {shown}, or give another --dir", copy.display());
-        }
-        write_text(&copy, &text).with_context(|| format!("cannot write {}", copy.display()))?;
     }
 
     // Write the scripts

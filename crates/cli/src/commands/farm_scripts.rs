@@ -1,8 +1,7 @@
 //! The scripts of a farm: assignments of values, followed by a text that is the same for all renderings.
 
 /// Names and texts of the scripts.
-const SCRIPTS: [(&str, &str); 4] = [
-    ("plan.sh", include_str!("farm/plan.sh")),
+const SCRIPTS: [(&str, &str); 3] = [
     ("part.sh", include_str!("farm/part.sh")),
     ("merge.sh", include_str!("farm/merge.sh")),
     ("submit.sh", include_str!("farm/submit.sh")),
@@ -21,20 +20,16 @@ pub(super) struct Job {
     /// The folder of scripts, parts and logs.
     pub(super) folder: String,
     pub(super) scene: String,
-    /// Scene for the plan: the first frame's.
-    pub(super) first_scene: String,
     /// Frame numbers; empty for a single image.
     pub(super) frames: Vec<u32>,
     /// Number of parts per image.
     pub(super) parts: u32,
     /// Time between checkpoints (s).
     pub(super) seconds: f64,
-    /// True if a job makes a plan.
-    pub(super) needs_plan: bool,
     /// True if the number of threads is given.
     pub(super) has_threads: bool,
-    /// Options of `lumiris plan`, `lumiris render`, `lumiris merge` and `sbatch`.
-    pub(super) options: [Vec<String>; 4],
+    /// Options of `lumiris render`, `lumiris merge` and `sbatch`.
+    pub(super) options: [Vec<String>; 3],
 }
 
 impl Job {
@@ -42,21 +37,15 @@ impl Job {
     pub(super) fn scripts(&self) -> Vec<(&'static str, String)> {
         // Assignments
         let flag = |is: bool| if is { "yes" } else { "" };
-        let words = [
-            ("lumiris", &self.lumiris),
-            ("from", &self.from),
-            ("folder", &self.folder),
-            ("scene", &self.scene),
-            ("first_scene", &self.first_scene),
-        ];
+        let words =
+            [("lumiris", &self.lumiris), ("from", &self.from), ("folder", &self.folder), ("scene", &self.scene)];
         let words: String = words.iter().map(|(name, value)| format!("{name}={}\n", quoted(value))).collect();
         let frames: Vec<String> = self.frames.iter().map(u32::to_string).collect();
         let numbers = format!(
-            "frames=({})\nparts={}\nseconds={}\nneeds_plan={}\nhas_threads={}\n",
+            "frames=({})\nparts={}\nseconds={}\nhas_threads={}\n",
             frames.join(" "),
             self.parts,
             self.seconds,
-            flag(self.needs_plan),
             flag(self.has_threads)
         );
 

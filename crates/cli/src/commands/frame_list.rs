@@ -1,6 +1,5 @@
 //! Frame numbers, and file names with a frame number.
 
-use super::plan_file::PlanFile;
 use lumiris_numbers::math::hash::pcg4d;
 use std::iter::StepBy;
 use std::ops::RangeInclusive;
@@ -12,20 +11,9 @@ const MAX_FRAMES: usize = 1_000_000;
 /// Constant that is hashed with the seed and the frame number to give the frame's seed.
 const FRAME_SEED: u32 = 0x66_72_61_6d;
 
-/// Sequence data of a frame.
-#[derive(Clone, Debug)]
-pub(super) struct FrameOf {
-    /// Frame number, if the seed depends on it.
-    pub seed_by: Option<u32>,
-    /// Choices made for the first frame; they apply to all frames.
-    pub plan: Option<PlanFile>,
-}
-
-impl FrameOf {
-    /// The frame's seed, given the seed of the sequence.
-    pub(super) fn seed(&self, seed: u32) -> u32 {
-        self.seed_by.map_or(seed, |number| pcg4d([seed, number, FRAME_SEED, 0])[0])
-    }
+/// The seed of a frame, given the seed of the sequence.
+pub(super) fn seed_of_frame(seed: u32, number: u32) -> u32 {
+    pcg4d([seed, number, FRAME_SEED, 0])[0]
 }
 
 /// Frame numbers in rendering order, without duplicates.

@@ -1,16 +1,14 @@
 //! `lumiris render --frames`: the frames of an animation, one after the other.
 //!
-//! Choices made for the first frame apply to all frames, so that the animation does not flicker. Files shared by
-//! several frames are read once (see [`FileCache`]). A frame that fails does not stop the others; a table at the end
-//! lists the results.
+//! Files shared by several frames are read once (see [`FileCache`]). A frame that fails does not stop the others; a
+//! table at the end lists the results.
 
 use super::UsageError;
 use super::args::RenderArgs;
-use super::frame_list::{FrameList, FrameOf, has_number, numbered};
+use super::frame_list::{FrameList, has_number, numbered};
 use super::interrupt::is_stopped;
 use super::interrupt::{self, INTERRUPTED};
 use super::pictures::are_complete;
-use super::plan_file::PlanFile;
 use super::progress;
 use super::render::{Rendered, Session, check, is_stop, render_one, write_stats};
 use lumiris::import::cache::{FileCache, FileCounts};
@@ -43,7 +41,7 @@ pub(super) fn run(args: &RenderArgs, list: &FrameList) -> anyhow::Result<ExitCod
     check(args)?;
     let _orderly = interrupt::orderly();
     let session = Session::start(args, FileCache::keeping())?;
-    let (mut frames, mut plan) = (Vec::with_capacity(list.0.len()), None);
+    let mut frames = Vec::with_capacity(list.0.len());
     for (index, &number) in list.0.iter().enumerate() {
         let outcome = if is_stopped() {
             Outcome::NotRendered
@@ -51,12 +49,7 @@ pub(super) fn run(args: &RenderArgs, list: &FrameList) -> anyhow::Result<ExitCod
             if !args.quiet {
                 progress::say(&format!("frame {number} ({} of {})", index + 1, list.0.len()));
             }
-            let mut args = of_frame(args, number);
-            let frame = args.scene.frame.as_mut();
-            frame.into_iter().for_each(|frame| frame.plan.clone_from(&plan));
-            let outcome = render_frame(&args, &session);
-            plan = plan.or_else(|| plan_of(&outcome, &args));
-            outcome
+            render_frame(&of_frame(args, number), &session)
         };
         let files = session.files.end_scene();
         frames.push(Frame { number, outcome, files });
@@ -115,19 +108,9 @@ fn of_frame(args: &RenderArgs, frame: u32) -> RenderArgs {
     let checkpoint = args.parts.checkpoint.as_mut().map(|checkpoint| &mut checkpoint.path);
     let names = [&mut args.scene.scene].into_iter().chain(&mut args.output);
     names.chain(checkpoint).chain(&mut args.parts.resume).for_each(|path| *path = numbered(path, frame));
-    args.scene.frame = Some(FrameOf { seed_by: Some(frame).filter(|_| args.seed_per_frame), plan: None });
+    args.scene.seed_by_frame = Some(frame).filter(|_| args.seed_per_frame);
     (args.frames, args.stats) = (None, None);
     args
-}
-
-/// The choices made for a frame; `None` if its settings left nothing open.
-fn plan_of(outcome: &Outcome, args: &RenderArgs) -> Option<PlanFile> {
-    let plan = match outcome {
-        Outcome::Done(rendered) | Outcome::Failed(_, Some(rendered)) => Some(rendered.plan.clone()),
-        Outcome::Skipped => args.output.iter().find_map(|path| PlanFile::of_image(path)),
-        Outcome::Failed(_, None) | Outcome::NotRendered => None,
-    };
-    plan.filter(|plan| !plan.settings.is_empty())
 }
 
 fn render_frame(args: &RenderArgs, session: &Session) -> Outcome {

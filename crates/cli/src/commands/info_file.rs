@@ -78,13 +78,11 @@ struct Divided {
     others: Map<String, Value>,
 }
 
-/// Splits metadata into the renderer's settings and everything else. A plan is parsed as JSON.
+/// Splits metadata into the renderer's settings and everything else.
 fn divided(entries: impl IntoIterator<Item = (String, String)>) -> Divided {
     let (mut settings, mut others) = (Map::new(), Map::new());
     for (key, text) in entries {
-        let is_plan = key.trim_start_matches(PREFIX) == "plan";
-        let value = if is_plan { serde_json::from_str(&text).ok() } else { None };
-        let value = value.unwrap_or(Value::String(text));
+        let value = Value::String(text);
         match key.strip_prefix(PREFIX) {
             Some(name) => settings.insert(name.to_owned(), value),
             None => others.insert(key, value),

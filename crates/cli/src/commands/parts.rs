@@ -3,7 +3,6 @@
 use super::UsageError;
 use super::args::RenderArgs;
 use super::part_args::{PartArgs, is_part};
-use super::plan_file::PlanFile;
 use super::progress;
 use lumiris::import::fingerprint::SceneFiles;
 use lumiris::render::RenderSettings;
@@ -96,7 +95,6 @@ fn asked(args: &RenderArgs) -> Asked {
 pub(super) fn film_file(
     args: &RenderArgs,
     job: &RenderJob,
-    plan: &PlanFile,
     files: &SceneFiles,
     settings: &mut RenderSettings,
     stored: Option<Stored>,
@@ -110,8 +108,7 @@ pub(super) fn film_file(
     }
     let checkpoint = args.parts.checkpoint.as_ref();
     let checkpoint = checkpoint.map(|c| (c.path.clone(), Duration::from_secs_f64(c.seconds)));
-    let plan = if plan.settings.is_empty() { None } else { Some(plan.text()?) };
-    let storage = Storage { checkpoint, keeps_sums, stored, plan };
+    let storage = Storage { checkpoint, keeps_sums, stored };
     Ok(Some(FilmFile::new(&asked(args), job, files, settings, spp, storage, progress::say)?))
 }
 

@@ -6,7 +6,6 @@ use super::denoise_args::{self, DENOISED, Denoised};
 use super::exr::{ExrArgs, ExrImage, ExrLayer};
 use super::look::{Displayed, LookArgs};
 use super::part_args::{extension, is_part};
-use super::plan_file::{PLAN_KEY, PlanFile};
 use super::progress;
 use super::rescue::write_or_rescue;
 use lumiris::film::Film;
@@ -35,8 +34,6 @@ pub(super) struct Made<'a> {
     pub args: &'a RenderArgs,
     /// The rendered scene.
     pub job: &'a RenderJob,
-    /// The choices that its settings left to measurements.
-    pub plan: &'a PlanFile,
     /// The film.
     pub rendering: &'a Rendering,
     /// Requested AOVs; `None` for the default.
@@ -272,7 +269,7 @@ impl Made<'_> {
             denoised: self.denoised.as_ref(),
             camera: CameraMatrices::of(&self.job.world.scene.camera),
             seconds: self.rendering.elapsed.as_secs_f64(),
-            metadata: self.metadata()?,
+            metadata: self.metadata(),
         })
     }
 
@@ -286,19 +283,16 @@ impl Made<'_> {
     }
 
     /// Settings and provenance of the image.
-    fn metadata(&self) -> anyhow::Result<TextEntries> {
+    fn metadata(&self) -> TextEntries {
         let Made { args, job, rendering, .. } = self;
         let mut metadata = output::metadata(&job.world.scene.film, job.settings());
         let mut add = |key: &str, value: String| metadata.push((key.to_owned(), value));
         add("lumiris:scene", args.scene.scene.display().to_string());
         add("lumiris:accel", <&str>::from(args.scene.accel).to_owned());
-        if !self.plan.settings.is_empty() {
-            add(PLAN_KEY, self.plan.text()?);
-        }
         if self.is_interrupted {
             add(INTERRUPTED_KEY, "true".to_owned());
         }
         metadata.extend(output::progress_metadata(rendering));
-        Ok(metadata)
+        metadata
     }
 }

@@ -10,12 +10,10 @@ use super::memory;
 use super::part_args::is_part;
 use super::parts;
 use super::pictures::{Made, Written, check_outputs, is_exr, is_output, write_pictures};
-use super::plan_file::PlanFile;
 use super::progress::{self, Bar, Clock};
 use super::report::{Times, report};
 use super::rescue::write_or_rescue;
-use super::settings::{Setup, SetupTimes, load_job_of, plan, render_settings};
-use super::trials::expect_trials;
+use super::settings::{Setup, SetupTimes, complete, load_job_of, render_settings};
 use crate::watch::{self, Canvas, Watch};
 use anyhow::{Context, bail};
 use lumiris::film::Film;
@@ -30,7 +28,7 @@ use lumiris::render::FilmFile;
 use lumiris::render::cryptomatte::cryptomattes;
 use lumiris::render::memory::{Wanted, predict};
 use lumiris::render::output::{self, Aov};
-use lumiris::render::parts::{PLAN_NOTE, Stored};
+use lumiris::render::parts::Stored;
 use lumiris::render::{CacheReport, Continuation, Progress, RenderError, RenderSettings, Rendering, TileShare, resume};
 use lumiris::scene::RenderJob;
 use lumiris::settings::{Given, IntegratorKind, IntegratorSettings};
@@ -59,8 +57,6 @@ pub(super) struct Rendered {
     pub seconds: f64,
     /// Mean relative standard error of the pixels.
     pub noise: f64,
-    /// The choices made by measurements.
-    pub plan: PlanFile,
     /// True if every pixel has all of its samples.
     pub complete: bool,
     /// Errors of files that could not be written to their destinations, with the paths of rescued copies.
@@ -149,7 +145,7 @@ pub(super) fn render_one(args: &RenderArgs, session: &Session, start: Instant) -
         watch::preview(canvas, &job, &settings, interrupt::stop())?;
     }
     let begin = Instant::now();
-    let plan = choose(args, &mut job, &given, stored.as_ref(), &kept, &clock)?;
+    choose(args, &mut job, &given, stored.as_ref(), &kept, &clock)?;
     if let Some(canvas) = &canvas {
         let _ = canvas.summary.set(job.settings().summary());
     }
@@ -163,7 +159,7 @@ pub(super) fn render_one(args: &RenderArgs, session: &Session, start: Instant) -
     if !settings.with_light_layers && kept.needs(LIGHT_GROUPS) && light_layers::count(&job) > 0 && !args.quiet {
         progress::say_once("note: only EXR files have the layers of light groups: -o image.exr");
     }
-    let mut film_file = parts::film_file(args, &job, &plan, &files, &mut settings, stored)?;
+    let mut film_file = parts::film_file(args, &job, &files, &mut settings, stored)?;
     settings.time_limit = clock.left();
     let continuation = film_file.as_mut().map_or_else(Continuation::default, FilmFile::continuation);
     laps::end("prepare", &[]);
@@ -185,7 +181,6 @@ pub(super) fn render_one(args: &RenderArgs, session: &Session, start: Instant) -
     let made = Made {
         args,
         job: &job,
-        plan: &plan,
         rendering: &rendering,
         asked: asked.as_deref(),
         cryptomattes,
@@ -205,7 +200,6 @@ pub(super) fn render_one(args: &RenderArgs, session: &Session, start: Instant) -
         stats,
         seconds: times.all.as_secs_f64(),
         noise: rendering.film.summary().noise.median,
-        plan,
         complete: rendering.complete,
         misplaced: written.misplaced,
     })
@@ -219,23 +213,13 @@ fn choose(
     stored: Option<&Stored>,
     kept: &Kept<'_>,
     clock: &Clock,
-) -> anyhow::Result<PlanFile> {
+) -> anyhow::Result<()> {
     // A continued rendering uses the stored pilots
     let limit = clock.limit.filter(|_| stored.is_none());
     let deadline = limit.and_then(|limit| pilot_deadline(clock.start, limit));
     let ratio_map = kept.asked.is_some_and(|list| list.contains(&Aov::Ratio));
-    let expect = |time| expect_trials(time, args.quiet);
-    let is_planned = args.scene.frame.as_ref().is_some_and(|frame| frame.plan.is_some());
-    let tunes = args.tune && stored.is_none() && !is_planned;
-    let how =
-        Preparation { ratio_map, tunes, deadline, expect: &expect, stop: interrupt::stop(), ..Preparation::default() };
-    let plan = plan(&args.scene, job, given, &how, args.quiet)?;
-    if plan.settings.is_empty() {
-        // A rendering continued from a checkpoint keeps the choices of its beginning
-        let text = stored.and_then(|stored| stored.header.note(PLAN_NOTE));
-        return Ok(text.and_then(|text| serde_json::from_str(text).ok()).unwrap_or(plan));
-    }
-    Ok(plan)
+    let how = Preparation { ratio_map, deadline, stop: interrupt::stop(), ..Preparation::default() };
+    complete(&args.scene, job, given, &how, args.quiet)
 }
 
 /// True for the layers of light groups.

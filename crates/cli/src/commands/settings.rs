@@ -2,13 +2,12 @@
 
 use super::UsageError;
 use super::args::{SceneArgs, is_standard_input};
+use super::frame_list::seed_of_frame;
 use super::interrupt;
 use super::laps;
 use super::memory::MemoryLimit;
 use super::pictures::is_picture;
-use super::plan_file::PlanFile;
 use super::progress;
-use super::trials::outcome;
 use anyhow::{Context, bail};
 use lumiris::film::filter::PixelFilter;
 use lumiris::import::cache::FileCache;
@@ -79,9 +78,6 @@ pub(super) fn load_scene(
     if let Some(stored) = stored {
         stored.apply(&mut loaded.settings)?;
     }
-    if let Some(path) = &args.plan {
-        PlanFile::read(path)?.apply(&path.display().to_string(), &mut loaded.settings)?;
-    }
     args.settings.apply(&mut loaded.settings);
     loaded.given.extend(args.settings.given());
     let has_spp = args.settings.has("spp");
@@ -94,13 +90,8 @@ pub(super) fn load_scene(
         loaded.settings.sampling.spp = stored.spp()?;
     }
     // The stored settings already contain the frame's
-    if let Some(frame) = &args.frame {
-        if stored.is_none() {
-            frame.plan.iter().try_for_each(|plan| plan.apply("the plan of the first frame", &mut loaded.settings))?;
-        }
-        if stored.is_none() || args.settings.has("seed") {
-            loaded.settings.sampling.seed = frame.seed(loaded.settings.sampling.seed);
-        }
+    if let Some(frame) = args.seed_by_frame.filter(|_| stored.is_none() || args.settings.has("seed")) {
+        loaded.settings.sampling.seed = seed_of_frame(loaded.settings.sampling.seed, frame);
     }
     if args.box_filter {
         loaded.scene.film.filter = PixelFilter::Box { rx: 0.5, ry: 0.5 };
@@ -204,13 +195,13 @@ pub(super) fn load_job_of(
 
 /// Makes the choices that the settings leave open, with `--threads` threads. Prints them unless `quiet`. Warns of given
 /// settings that have no effect.
-pub(super) fn plan(
+pub(super) fn complete(
     args: &SceneArgs,
     job: &mut RenderJob,
     given: &Given,
     how: &Preparation<'_>,
     quiet: bool,
-) -> anyhow::Result<PlanFile> {
+) -> anyhow::Result<()> {
     // Choose
     let _preparing = interrupt::during(format!("completing the settings of {}", args.name()));
     let asked = *job.settings();
@@ -219,25 +210,13 @@ pub(super) fn plan(
 
     // Print the choices and warnings
     if !quiet {
-        plan.tuning.iter().for_each(|tuning| progress::say(&outcome(tuning)));
         progress::say_once(&job.settings().summary());
     }
     plan.warnings.iter().for_each(|warning| progress::say(&format!("warning: {warning}")));
     for line in given.without_effect(&asked, job.settings()) {
         progress::say_once(&format!("warning: {line}"));
     }
-    if let Some(path) = &args.plan
-        && let Some(other) = PlanFile::read(path)?.other_image(&args.scene, job)
-    {
-        progress::say(&format!(
-            "warning: {} was made for {other}: its choices may not suit this image",
-            path.display()
-        ));
-    }
-    let made = PlanFile::new(&args.scene, job, &plan)?;
-    // A frame without choices of its own keeps the first frame's plan
-    let of_sequence = args.frame.as_ref().and_then(|frame| frame.plan.clone());
-    Ok(of_sequence.filter(|_| made.settings.is_empty()).unwrap_or(made))
+    Ok(())
 }
 
 /// Render settings from the options.

@@ -3,11 +3,10 @@
 use clap::Arg;
 
 /// Names and examples of the options, in addition to `-h` itself.
-const OPTIONS: [(&str, &str); 24] = [
+const OPTIONS: [(&str, &str); 23] = [
     ("output", "-o picture.png -o picture.exr"),
     ("quiet", "-q"),
     ("threads", "--threads 8"),
-    ("plan", "--plan kitchen.plan.json"),
     ("resolution", "--resolution 1920x1080"),
     ("crop", "--crop 0.25,0.75,0,0.5"),
     ("camera", "--camera 1"),

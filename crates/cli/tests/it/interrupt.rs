@@ -13,7 +13,6 @@ fn signals_end_the_loading_of_a_scene_within_a_second() {
         ("render - -o a.exr", "-INT"),
         ("render - -o a.exr", "-TERM"),
         ("render - -o a.exr --estimator mis --view=0", "-INT"),
-        ("plan - -o a.json", "-TERM"),
         ("info -", "-INT"),
         ("crosscheck -", "-INT"),
         ("bench -", "-INT"),

@@ -182,7 +182,7 @@ fn more_samples_than_first_asked_for_are_one_more_part() {
 }
 
 #[test]
-fn parts_by_the_rule_need_no_plan() {
+fn parts_by_the_rule_are_merged_to_the_image() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
     let auto = "render GALLERY --integrator path --resolution 32x24 --spp 4 --estimator auto -q";
@@ -194,30 +194,6 @@ fn parts_by_the_rule_need_no_plan() {
     assert_same("single.exr", "merged.exr", folder, "by the rule");
     let said = stderr(&lumiris("merge 1.part --allow-missing -o some.exr", folder));
     assert!(said.contains("from 1 part,"), "{said}");
-}
-
-#[test]
-fn what_a_plan_has_chosen_is_the_same_for_all_parts() {
-    let folder = tempfile::tempdir().unwrap();
-    let folder = folder.path();
-    let auto = "GALLERY --integrator direct --resolution 64x48 --spp 8";
-    run(&format!("plan {auto} -o plan.json"), folder);
-    let planned = format!("render {auto} --plan plan.json -q");
-    run(&format!("{planned} -o single.exr"), folder);
-    (1..3).for_each(|i| run(&format!("{planned} --part {i}/2 -o {i}.part"), folder));
-    run("merge 2.part 1.part -o merged.exr", folder);
-    assert_same("single.exr", "merged.exr", folder, "by a plan");
-
-    // The same command starts and resumes; another plan makes another image
-    for _ in 0..2 {
-        run(&format!("{planned} --checkpoint c.film --resume c.film -o resumed.exr"), folder);
-        assert_same("single.exr", "resumed.exr", folder, "by a plan, resumed");
-    }
-    let plan = std::fs::read_to_string(folder.join("plan.json")).unwrap();
-    let (at, rest) = plan.split_once("\"samples\": \"").unwrap();
-    let (_, rest) = rest.split_once('"').unwrap();
-    std::fs::write(folder.join("plan.json"), format!("{at}\"samples\": \"640\"{rest}")).unwrap();
-    refuse(&format!("{planned} --resume c.film -o other.exr"), folder, 3, &["c.film", "samples: 640, not"]);
 }
 
 #[test]

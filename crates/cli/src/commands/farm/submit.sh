@@ -1,6 +1,5 @@
-# Submits the jobs: a plan, where one is needed; an array job with a task for every part; and a job that merges. The last two
-# for every frame that is not merged yet, if there are frames. Parts that are complete are not rendered again, so this may be
-# run again after a failure.
+# Submits the jobs: an array job with a task for every part, and a job that merges, for every frame that is not merged yet if
+# there are frames. Parts that are complete are not rendered again, so this may be run again after a failure.
 
 set -Eeu
 for program in sbatch squeue scancel; do
@@ -38,15 +37,10 @@ submit() {
 
 # image FRAME PREFIX: the parts of an image, and their merge; the prefix is that of the names of its files
 image() {
-  submit part "$1" --output="$2%a.log" --array="1-$parts" --signal=B:USR1@60 "${after[@]}" "${options[@]}"
+  submit part "$1" --output="$2%a.log" --array="1-$parts" --signal=B:USR1@60 "${options[@]}"
   submit merge "$1" --output="$2merge.log" --dependency="afterok:$id" --kill-on-invalid-dep=yes "${options[@]}"
 }
 
-after=()
-if [ -n "$needs_plan" ] && ! [ -e "$folder/plan.json" ]; then
-  submit plan '' --output=plan.log "${options[@]}"
-  after=(--dependency="afterok:$id" --kill-on-invalid-dep=yes)
-fi
 [ "${#frames[@]}" -gt 0 ] || image '' ''
 for frame in "${frames[@]}"; do
   printf -v prefix '%04d.' "$frame"

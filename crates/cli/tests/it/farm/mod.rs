@@ -58,26 +58,14 @@ fn jobs_render_the_bits_of_the_image_at_once_in_any_folder_and_do_nothing_again(
     let args = format!("{FARM} --integrator path --submit --sbatch --time=1:00:00");
     let output = farm(&args, &folder).output().unwrap();
     assert_success(&output);
-    assert_eq!(String::from_utf8_lossy(&output.stdout), "plan: job 1\npart: job 2\nmerge: job 3\n");
-    run(
-        "render GALLERY --resolution 40x36 --spp 7 -q --integrator path --plan image.farm/plan.json -o whole.exr",
-        &folder,
-    );
+    assert_eq!(String::from_utf8_lossy(&output.stdout), "part: job 1\nmerge: job 2\n");
+    run("render GALLERY --resolution 40x36 --spp 7 -q --integrator path -o whole.exr", &folder);
     assert_same("image.exr", "whole.exr", &folder, "merged by a queue");
     let calls = fs::read_to_string(root.path().join("calls")).unwrap();
     let calls: Vec<&str> = calls.lines().collect();
     assert!(calls.iter().all(|call| call.contains("--time=1:00:00") && call.contains("--requeue")), "{calls:?}");
-    assert!(calls[1].contains("--array=1-3") && calls[1].contains("--dependency=afterok:1 "), "{}", calls[1]);
-    assert!(calls[2].contains("--dependency=afterok:2 "), "{}", calls[2]);
-
-    // A named estimator needs no plan
-    let output = farm(&FARM.replace("image.exr", "small.exr --integrator path --estimator mis --submit"), &folder)
-        .output()
-        .unwrap();
-    assert_success(&output);
-    assert!(!folder.join("small.farm/plan.json").exists(), "{}", String::from_utf8_lossy(&output.stdout));
-    run("render GALLERY --resolution 40x36 --spp 7 -q --integrator path --estimator mis -o whole.exr", &folder);
-    assert_same("small.exr", "whole.exr", &folder, "without a plan");
+    assert!(calls[0].contains("--array=1-3"), "{}", calls[0]);
+    assert!(calls[1].contains("--dependency=afterok:1 "), "{}", calls[1]);
 
     // Again: finished parts are not rendered again
     let modified = |name: &str| fs::metadata(folder.join("image.farm").join(name)).unwrap().modified().unwrap();
@@ -101,9 +89,9 @@ fn write_frames(folder: &Path) {
 }
 
 /// Fails unless the frames have the pixels of images rendered at once.
-fn assert_frames(folder: &Path, plan: &str) {
+fn assert_frames(folder: &Path, options: &str) {
     for number in 1..=2 {
-        run(&format!("render shot.####.pbrt --frames {number} -q {plan} -o whole.####.exr"), folder);
+        run(&format!("render shot.####.pbrt --frames {number} -q {options} -o whole.####.exr"), folder);
         assert_same(
             &format!("out.000{number}.exr"),
             &format!("whole.000{number}.exr"),
@@ -120,12 +108,12 @@ fn frames_have_jobs_of_their_own_and_those_that_are_merged_are_left_alone() {
     let args = "farm slurm shot.####.pbrt --frames 1-2 --parts 2 -o out.####.exr";
     let output = farm(&format!("{args} --submit"), &folder).output().unwrap();
     assert_success(&output);
-    let told = "plan: job 1\npart of frame 1: job 2\nmerge of frame 1: job 3\npart of frame 2: job 4\nmerge of frame 2: job 5\n";
+    let told = "part of frame 1: job 1\nmerge of frame 1: job 2\npart of frame 2: job 3\nmerge of frame 2: job 4\n";
     assert_eq!(String::from_utf8_lossy(&output.stdout), told);
-    assert_frames(&folder, "--plan out.farm/plan.json");
+    assert_frames(&folder, "");
     let calls = fs::read_to_string(root.path().join("calls")).unwrap();
     let calls: Vec<&str> = calls.lines().collect();
-    for (i, words) in [(1, "--output=0001.%a.log --array=1-2 "), (3, "--dependency=afterok:1 "), (4, "afterok:4 ")] {
+    for (i, words) in [(0, "--output=0001.%a.log --array=1-2 "), (1, "--dependency=afterok:1 "), (3, "afterok:3 ")] {
         assert!(calls[i].contains(words), "{}", calls[i]);
     }
 
@@ -135,9 +123,9 @@ fn frames_have_jobs_of_their_own_and_those_that_are_merged_are_left_alone() {
     fs::remove_file(folder.join("out.0002.exr")).unwrap();
     let output = farm(&format!("{args} --submit"), &folder).output().unwrap();
     assert_success(&output);
-    let told = "frame 1 is merged\npart of frame 2: job 6\nmerge of frame 2: job 7\n";
+    let told = "frame 1 is merged\npart of frame 2: job 5\nmerge of frame 2: job 6\n";
     assert_eq!(String::from_utf8_lossy(&output.stdout), told);
-    assert_frames(&folder, "--plan out.farm/plan.json");
+    assert_frames(&folder, "");
     let log = fs::read_to_string(folder.join("out.farm/log")).unwrap();
     assert!(log.contains("part 2 of 2 of frame 2 is complete"), "{log}");
 
@@ -171,7 +159,6 @@ fn values_with_dashes_and_bare_options_reach_the_parts() {
     );
     assert_same("image.exr", "w.exr", &folder, "with options");
     assert_eq!(read(&folder, "image.exr").metadata["compression"], "piz");
-    assert!(!folder.join("d/plan.json").exists());
 }
 
 #[test]
