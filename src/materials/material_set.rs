@@ -13,6 +13,7 @@ use crate::textures::{FloatTextureId, ImageTexture, RgbTextureId, TextureContext
 use lumiris_numbers::math::hash::{hash_floats, unit_f32};
 use lumiris_numbers::math::{Rgb, Vec2, Vec3};
 use rayon::prelude::*;
+use std::collections::HashSet;
 use std::sync::Arc;
 
 /// All materials of a scene, with the tables of their coats.
@@ -254,6 +255,10 @@ fn images_of(entry: &MaterialEntry, textures: &TextureSet) -> Vec<ImageTexture> 
     let mut images = Vec::new();
     rgbs.into_iter().for_each(|id| textures.images_of_rgb(id, &mut images));
     floats.into_iter().chain(entry.displacement).for_each(|id| textures.images_of_float(id, &mut images));
+
+    // Channels of an image have the same texels
+    let mut seen = HashSet::new();
+    images.retain(|image| seen.insert(image.image));
     images
 }
 
