@@ -1,8 +1,8 @@
 //! Requests of memory: the cache misses of many lookups overlap if all of them are requested before the first is read.
 #![allow(unsafe_code)]
 
-/// Requests the cache line of `items[index]`, which is read soon. Does nothing for an index beyond the end, and on
-/// processors without such an instruction.
+/// Requests the cache line of `items[index]`, which is read soon. An index beyond the end is harmless. Does nothing on
+/// processors other than x86-64.
 #[inline(always)]
 pub fn prefetch<T>(items: &[T], index: usize) {
     #[cfg(target_arch = "x86_64")]
