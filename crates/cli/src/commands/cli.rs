@@ -42,7 +42,7 @@ enum Command {
     Info(info::InfoArgs),
     /// Reproduce the figures of a paper by rendering and measuring, as an HTML page
     Reproduce(reproduce::ReproduceArgs),
-    /// Generate a statue, a sky, or the scenes of talbot, fan and keller-wald
+    /// Generate a statue, a sky, an island, or the scenes of talbot, fan and keller-wald
     Generate(generate::GenerateArgs),
     /// Print the completions of a shell
     Completions(shell::CompletionsArgs),

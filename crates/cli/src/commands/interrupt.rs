@@ -2,7 +2,8 @@
 //!
 //! The first signal sets [`stop`], which ends a rendering in an orderly way: the image so far is written. Activities
 //! that do not poll `stop` and have nothing to lose, such as reading a scene, are ended within half a second together
-//! with the program, with a message that names the activity. The second signal ends the program at once.
+//! with the program, with a message that names the activity. The second signal ends the program at once, unless it comes
+//! together with the first: `timeout` and job schedulers signal a process, and then its group.
 
 use super::progress;
 use anyhow::Context;
@@ -18,6 +19,9 @@ use std::time::{Duration, Instant};
 pub(super) const INTERRUPTED: u8 = 130;
 /// Time for an activity that polls [`stop`] to end in an orderly way.
 const GRACE: Duration = Duration::from_millis(500);
+
+/// Signals within this time are one.
+const TOGETHER: Duration = Duration::from_millis(100);
 
 static STOP: AtomicBool = AtomicBool::new(false);
 static ACTIVITY: Mutex<Activity> = Mutex::new(Activity::Abandoned(String::new()));
@@ -62,11 +66,17 @@ pub(super) fn stop() -> &'static AtomicBool {
 pub(super) fn watch() -> anyhow::Result<()> {
     let mut signals = Signals::new([SIGINT, SIGTERM, SIGHUP]).context("cannot watch for Ctrl-C")?;
     std::thread::spawn(move || {
+        let mut first: Option<Instant> = None;
         for _ in signals.forever() {
-            if STOP.swap(true, Ordering::Relaxed) {
-                end(&activity());
+            match first {
+                None => {
+                    first = Some(Instant::now());
+                    STOP.store(true, Ordering::Relaxed);
+                    std::thread::spawn(abandon);
+                }
+                Some(first) if first.elapsed() >= TOGETHER => end(&activity()),
+                Some(_) => {}
             }
-            std::thread::spawn(abandon);
         }
     });
     Ok(())

@@ -49,3 +49,17 @@ fn a_second_signal_ends_the_program_at_once() {
     let output = child.wait_with_output().unwrap();
     assert_eq!((output.status.code(), stderr(&output).as_str()), (Some(130), ""));
 }
+
+/// `timeout` signals the program, and then its group.
+#[test]
+fn two_signals_together_are_one() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut child = command(folder.path(), "info -").stdin(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    let mut scene = child.stdin.take().unwrap();
+    scene.write_all(&b"# still going on\n".repeat(1 << 15)).unwrap();
+    let twice = format!("kill -TERM {0}; sleep 0.02; kill -TERM {0}", child.id());
+    assert!(Command::new("sh").args(["-c", &twice]).status().unwrap().success());
+    let output = child.wait_with_output().unwrap();
+    assert!(stderr(&output).contains("stopped while loading <stdin>"), "{}", stderr(&output));
+    assert_eq!(output.status.code(), Some(130));
+}

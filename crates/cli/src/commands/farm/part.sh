@@ -2,6 +2,8 @@
 
 set -u
 # FRAME
+# The only part needs no number
+[ "$parts" -ne 1 ] || : "${SLURM_ARRAY_TASK_ID:=1}"
 i=${1:-${SLURM_ARRAY_TASK_ID:?which part? Give its number}}
 cd "$from" || exit 3
 if ! [ "$i" -ge 1 ] 2>/dev/null || ! [ "$i" -le "$parts" ]; then

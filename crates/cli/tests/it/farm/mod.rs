@@ -135,7 +135,7 @@ fn frames_have_jobs_of_their_own_and_those_that_are_merged_are_left_alone() {
     let args = "farm slurm shot.####.pbrt --frames 1-2 --estimator mis -o out.####.exr";
     assert_success(&farm(args, &folder).output().unwrap());
     let script = |args: &str| Command::new("bash").args(args.split(' ')).current_dir(folder.join("out.farm")).output();
-    for line in ["part.sh 1 1", "part.sh 2 1", "merge.sh 1", "merge.sh 2"] {
+    for line in ["part.sh 1 1", "part.sh 2", "merge.sh 1", "merge.sh 2"] {
         assert_success(&script(line).unwrap());
     }
     assert_frames(&folder, "--estimator mis");
