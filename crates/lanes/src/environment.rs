@@ -7,7 +7,7 @@
 
 use super::lane::{Columns3, F, I, LANES, Vec3s, begin, load, or_zero, safe_sqrt, store};
 use super::light::LightLanes;
-use super::prefetch::prefetch;
+use super::prefetch::{prefetch, prefetch_square};
 use super::wide::{sin_cos_quadrant, sin_cos_turns};
 use fearless_simd::{Level, Simd, dispatch, f32x4, f32x16, prelude::*};
 use lumiris_numbers::math::distribution::{Running, STEP, clamped};
@@ -315,11 +315,7 @@ impl Environment<'_> {
         let (red, green) = (&mut red[start..start + count], &mut green[start..start + count]);
         let blue = &mut blue[start..start + count];
         for i in 0..count {
-            let first = lookups.first[i] as usize;
-            for row in [first, first + stride] {
-                prefetch(self.texels, row);
-                prefetch(self.texels, row + 1);
-            }
+            prefetch_square(self.texels, lookups.first[i] as usize, stride);
         }
         for i in 0..count {
             let cell = self.texel(simd, lookups.cell[i] as usize);

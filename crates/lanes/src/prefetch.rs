@@ -14,3 +14,13 @@ pub fn prefetch<T>(items: &[T], index: usize) {
     #[cfg(not(target_arch = "x86_64"))]
     let _ = (items, index);
 }
+
+/// Requests the items around a point of an image for bilinear interpolation: two from `first` on, and two in the next
+/// row, `stride` items later.
+#[inline(always)]
+pub fn prefetch_square<T>(items: &[T], first: usize, stride: usize) {
+    for row in [first, first + stride] {
+        prefetch(items, row);
+        prefetch(items, row + 1);
+    }
+}

@@ -11,7 +11,7 @@
 use crate::lights::{LeAndPdf, LightSample};
 use lumiris_lanes::environment::{Environment, equal_area_squares};
 use lumiris_lanes::level;
-use lumiris_lanes::prefetch::prefetch;
+use lumiris_lanes::prefetch::prefetch_square;
 use lumiris_numbers::math::sphere_map::{
     equal_area_sphere_to_square, equal_area_square_to_sphere, lat_long_to_sphere, pdf_equal_area_square_to_sphere,
     pdf_lat_long_to_sphere, sphere_to_lat_long, wrap_equal_area_texel,
@@ -237,10 +237,7 @@ impl EnvironmentMap {
             // Lookups, all of whose texels are requested first
             for (&x, &y) in points[0].iter().zip(&points[1]).take(count) {
                 let first = self.bilinear_corner(Vec2::new(x, y)).first;
-                for row in [first, first + self.width + 2] {
-                    prefetch(&self.texels, row);
-                    prefetch(&self.texels, row + 1);
-                }
+                prefetch_square(&self.texels, first, self.width + 2);
             }
             for (i, value) in values[..count].iter_mut().enumerate() {
                 let p = Vec2::new(points[0][i], points[1][i]);

@@ -2,8 +2,19 @@
 
 use super::program::{command, stderr};
 use std::io::Write;
-use std::process::{Command, Stdio};
+use std::path::Path;
+use std::process::{Child, ChildStdin, Command, Stdio};
 use std::time::{Duration, Instant};
+
+/// A program that loads a scene from its standard input, which does not end.
+fn loading(folder: &Path, args: &str) -> (Child, ChildStdin) {
+    let mut command = command(folder, args);
+    let mut child = command.stdin(Stdio::piped()).stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
+    // More than a pipe holds, so part of it has been read once it is written
+    let mut scene = child.stdin.take().unwrap();
+    scene.write_all(&b"# still going on\n".repeat(1 << 15)).unwrap();
+    (child, scene)
+}
 
 /// Every subcommand that loads a scene can be ended while it does. A scene that never ends keeps it loading.
 #[test]
@@ -17,11 +28,7 @@ fn signals_end_the_loading_of_a_scene_within_a_second() {
         ("crosscheck -", "-INT"),
         ("bench -", "-INT"),
     ] {
-        let mut command = command(folder.path(), args);
-        let mut child = command.stdin(Stdio::piped()).stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
-        // More than a pipe holds, so part of it has been read once it is written
-        let mut scene = child.stdin.take().unwrap();
-        scene.write_all(&b"# still going on\n".repeat(1 << 15)).unwrap();
+        let (child, scene) = loading(folder.path(), args);
         let start = Instant::now();
         assert!(Command::new("kill").args([signal, &child.id().to_string()]).status().unwrap().success());
         let output = child.wait_with_output().unwrap();
@@ -37,9 +44,7 @@ fn signals_end_the_loading_of_a_scene_within_a_second() {
 #[test]
 fn a_second_signal_ends_the_program_at_once() {
     let folder = tempfile::tempdir().unwrap();
-    let mut child = command(folder.path(), "info -").stdin(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
-    let mut scene = child.stdin.take().unwrap();
-    scene.write_all(&b"# still going on\n".repeat(1 << 15)).unwrap();
+    let (mut child, _scene) = loading(folder.path(), "info -");
     // A signal can be lost if another one follows before it is handled
     let id = child.id().to_string();
     while child.try_wait().unwrap().is_none() {
@@ -54,9 +59,7 @@ fn a_second_signal_ends_the_program_at_once() {
 #[test]
 fn two_signals_together_are_one() {
     let folder = tempfile::tempdir().unwrap();
-    let mut child = command(folder.path(), "info -").stdin(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
-    let mut scene = child.stdin.take().unwrap();
-    scene.write_all(&b"# still going on\n".repeat(1 << 15)).unwrap();
+    let (child, _scene) = loading(folder.path(), "info -");
     let twice = format!("kill -TERM {0}; sleep 0.02; kill -TERM {0}", child.id());
     assert!(Command::new("sh").args(["-c", &twice]).status().unwrap().success());
     let output = child.wait_with_output().unwrap();
