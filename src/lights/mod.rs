@@ -43,8 +43,6 @@ pub use light::Light;
 pub use light_sample::{
     EmissionSample, EmittingPoint, LeAndPdf, LightCtx, LightHit, LightId, LightSample, SampleOfLight, SurfacePoint,
 };
-pub use tree::branch_table::BranchTable;
-pub use tree::branches::Branches;
 pub use tree::light_tree::{CutNode, LightTree, RunPositions};
 pub use tree::sampled_light::{LightRun, SampledLight};
 pub use tree::tree_choice::TreeChoice;

@@ -6,7 +6,7 @@
 //! closures and no `map` over arrays: these would be compiled without vector instructions.
 //!
 //! Reading order: [`lane`], [`wide`], [`columns`], [`hilbert`], [`sampler`], [`light`], [`area`], [`environment`],
-//! [`kernels`], [`ris_weights`], [`camera`], [`hits`], [`triangles`], [`vertex`], [`connections`], [`light_tree`],
+//! [`kernels`], [`ris_weights`], [`camera`], [`hits`], [`triangles`], [`vertex`], [`connections`], [`light_descent`], [`light_tree`],
 //! [`sums`], [`prefetch`].
 
 pub mod area;
@@ -19,6 +19,7 @@ pub mod hits;
 pub mod kernels;
 pub mod lane;
 pub mod light;
+pub mod light_descent;
 pub mod light_tree;
 pub mod prefetch;
 pub mod ris_weights;

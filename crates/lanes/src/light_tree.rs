@@ -6,7 +6,8 @@ use super::lane::{F, LANES, Vec3s, load, store};
 use super::vertex::Columns3;
 use super::wide::Wide;
 use fearless_simd::{Level, Simd, dispatch, prelude::*};
-use lumiris_numbers::math::light_bound::{GlossyLobe, LightBound, Receiver, first_probability};
+use lumiris_numbers::math::light_bound::{GlossyLobe, LightBound, Receiver};
+use std::ops::Range;
 
 /// Receivers, in columns of a multiple of [`LANES`].
 #[derive(Clone, Copy, Debug)]
@@ -17,6 +18,21 @@ pub struct Receivers<'a> {
     pub ns: Columns3<'a>,
     /// Glossy lobes; `None` if all receivers are diffuse.
     pub lobes: Option<GlossyLobes<'a>>,
+}
+
+impl<'a> Receivers<'a> {
+    /// A range of rows.
+    pub fn rows(&self, rows: Range<usize>) -> Receivers<'a> {
+        let of = |column: &'a [f32]| &column[rows.clone()];
+        let lobes = self.lobes.as_ref().map(|lobes| GlossyLobes {
+            wo: lobes.wo.map(of),
+            cos_o: of(lobes.cos_o),
+            alpha_squared: of(lobes.alpha_squared),
+            scale: of(lobes.scale),
+            diffuse: of(lobes.diffuse),
+        });
+        Receivers { p: self.p.map(of), ns: self.ns.map(of), lobes }
+    }
 }
 
 /// [`GlossyLobe`] in columns.
@@ -34,20 +50,6 @@ pub struct GlossyLobes<'a> {
     pub diffuse: &'a [f32],
 }
 
-/// For each receiver, the probability of the first of two bounds.
-pub fn first_probabilities(level: Level, bounds: [&LightBound; 2], at: &Receivers<'_>, out: &mut [f32]) {
-    dispatch!(level, simd => first_lanes(simd, bounds, at, out));
-}
-
-#[inline(always)]
-fn first_lanes<S: Simd>(simd: S, bounds: [&LightBound; 2], at: &Receivers<'_>, out: &mut [f32]) {
-    for i in (0..out.len()).step_by(LANES) {
-        let receiver = receiver(simd, at, i);
-        let importances = [bounds[0].importance(&receiver), bounds[1].importance(&receiver)];
-        store(first_probability(importances, bounds).0, out, i);
-    }
-}
-
 /// For each receiver, the importance of a bound.
 pub fn importances(level: Level, bound: &LightBound, at: &Receivers<'_>, out: &mut [f32]) {
     dispatch!(level, simd => importances_lanes(simd, bound, at, out));
@@ -56,7 +58,8 @@ pub fn importances(level: Level, bound: &LightBound, at: &Receivers<'_>, out: &m
 #[inline(always)]
 fn importances_lanes<S: Simd>(simd: S, bound: &LightBound, at: &Receivers<'_>, out: &mut [f32]) {
     for i in (0..out.len()).step_by(LANES) {
-        store(bound.importance(&receiver(simd, at, i)).0, out, i);
+        let receiver = receiver(simd, at, i);
+        store(bound.in_lanes(receiver.p[0]).importance(&receiver).0, out, i);
     }
 }
 

@@ -115,9 +115,9 @@ impl ColumnDirectLighting {
         stats.proposals += sum(light) + sum(bsdf);
 
         // Choice of lights
-        self.scratch.begin(&job.lights, n, vertices.surface.lit_points());
+        self.scratch.begin(vertices.surface.lit_points());
         if techniques.has_controls {
-            self.controls.begin(job, vertices, &mut self.scratch);
+            self.controls.begin(job, vertices);
             let is_unusual = |(i, a): (usize, &SampleAllocation)| (*a != usual).then_some(i);
             self.controls.leave_out(self.allocations.iter().enumerate().filter_map(is_unusual));
         }

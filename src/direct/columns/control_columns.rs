@@ -34,9 +34,8 @@ pub(super) struct ControlColumns {
 }
 
 impl ControlColumns {
-    /// Begins a batch: sets the columns of each vertex to the negative expectation. `scratch` must have begun the same
-    /// batch.
-    pub(super) fn begin(&mut self, job: &RenderJob, vertices: &Vertices<'_>, scratch: &mut Scratch) {
+    /// Begins a batch: sets the columns of each vertex to the negative expectation.
+    pub(super) fn begin(&mut self, job: &RenderJob, vertices: &Vertices<'_>) {
         self.sums.clear();
         self.sums.resize(vertices.len(), [0.0; MAX_COMPONENTS]);
         self.is_left_out.clear();
@@ -49,7 +48,7 @@ impl ControlColumns {
             self.sums.iter_mut().for_each(|sums| sums[group] = -1.0);
         } else {
             for (i, sums) in self.sums.iter_mut().enumerate() {
-                let pmfs = scratch.group_pmfs(lights, i, &at.get(i));
+                let pmfs = lights.groups.pmfs(&lights.sampler, &at.get(i));
                 sums.iter_mut().zip(pmfs).for_each(|(sum, pmf)| *sum = -pmf);
             }
         }

@@ -30,7 +30,7 @@ use crate::direct::domain;
 use crate::direct::light_samples::{self, unshadowed_candidate};
 use crate::direct::point::ShadingPoint;
 use crate::direct::t1::T1;
-use crate::lights::learned_visibility::{ExpectedContribution, NoncontributingLight};
+use crate::lights::learned_visibility::{ExpectedContribution, NoncontributingDraw, NoncontributingLight};
 use crate::lights::visibility_cache::ContributingLights;
 use crate::lights::{
     JobLights, LeAndPdf, LearnedVisibility, LightCtx, LightId, PhotonCount, SampleOfLight, SampledLight,
@@ -39,6 +39,7 @@ use crate::scene::RenderJob;
 use lumiris_numbers::estimators::heuristics::Heuristic;
 use lumiris_numbers::math::cumulative;
 use std::ops::Range;
+use std::time::Instant;
 
 /// Maximum number of contributing lights that are weighted at a point.
 pub const MAX_WEIGHTED: usize = 64;
@@ -86,6 +87,16 @@ impl Contributing {
         t1.draw_lights(allocate, |_, index, point, allocation, records| {
             samples.draw(index, point, allocation, records)
         });
+
+        // Samples of non-contributing lights, of all points together
+        let Candidates { records, stats, .. } = &mut *t1.candidates;
+        let start = Instant::now();
+        let drawn = samples.draw_noncontributing(t1.points, records);
+        stats.proposals += u64::from(drawn);
+        stats.light_proposals += u64::from(drawn);
+        stats.t1_light += start.elapsed();
+
+        // BSDF samples
         let BatchSamples { buffers, of_points, .. } = samples;
         let samples_at = |point: u32| of_points.get(point as usize).and_then(Option::as_ref);
         t1.draw_bsdf(allocate, &mut [], |point, ctx, light| {
@@ -105,7 +116,8 @@ impl Contributing {
 /// Buffers kept from batch to batch.
 #[derive(Debug, Default)]
 pub(super) struct ContributingBuffers {
-    /// Weights of the contributing lights of a point.
+    /// Expected contributions of the contributing lights of a point, and their weights.
+    expected: Vec<ExpectedContribution>,
     weights: Vec<f32>,
     /// Expected sample counts of contributing lights, point by point.
     rates: Vec<f32>,
@@ -118,7 +130,7 @@ struct BatchSamples<'a, 'b> {
     estimator: Contributing,
     job: &'a RenderJob,
     buffers: &'b mut ContributingBuffers,
-    /// The samples at each point with BSDF samples; empty if there is none.
+    /// The samples at each point that draws any.
     of_points: Vec<Option<PointSamples<'a>>>,
 }
 
@@ -134,6 +146,8 @@ struct PointSamples<'a> {
     /// Range in [`ContributingBuffers::singles`].
     singles: Range<usize>,
     others: Others,
+    /// Number of BSDF samples that are combined with them.
+    n_bsdf: f32,
 }
 
 /// Sampling of lights outside 𝓛_con.
@@ -189,7 +203,21 @@ fn survival(noncontributing: &NoncontributingLight, scale: f32) -> f32 {
     (importance * visibility.sqrt() / noncontributing.sampled.pmf * scale).min(1.0)
 }
 
+/// A sample of a light without photons, whose light is to be chosen.
+struct PendingSample<'s, 'a, 'p> {
+    at: At<'a, 'p>,
+    samples: &'s PointSamples<'a>,
+    /// Number of such samples at the point.
+    n: u32,
+    /// Survival probability per expected contribution.
+    scale: f32,
+    u_survival: f32,
+    /// Random numbers of the direction.
+    u: [f32; 2],
+}
+
 /// A point with its lights.
+#[derive(Clone)]
 struct At<'a, 'p> {
     lights: &'a JobLights,
     learned: &'a LearnedVisibility,
@@ -256,7 +284,7 @@ fn systematic(weights: &[f32], scale: f32, offset: f32) -> impl Iterator<Item = 
 }
 
 impl BatchSamples<'_, '_> {
-    /// Draws the light samples of a point. Returns the number of samples.
+    /// Draws the light samples of a point, without the non-contributing lights. Returns the number of samples.
     fn draw(
         &mut self,
         index: u32,
@@ -276,6 +304,7 @@ impl BatchSamples<'_, '_> {
             rates: rates.len()..rates.len(),
             singles: singles.len()..singles.len(),
             others: Others::BySampler { n: n + n_non },
+            n_bsdf,
         };
 
         // By the visibility cache, or else by the light sampler
@@ -290,19 +319,14 @@ impl BatchSamples<'_, '_> {
             light_samples::draw(self.job, index, point, &allocation, records)
         });
 
-        // BSDF samples need the expected sample counts of the lights
-        if n_bsdf > 0.0 {
-            self.of_points.resize(index as usize, None);
-            self.of_points.push(Some(samples));
-        } else {
-            self.buffers.rates.truncate(samples.rates.start);
-            self.buffers.singles.truncate(samples.singles.start);
-        }
+        // Samples of non-contributing lights follow. BSDF samples need the expected sample counts of the lights
+        self.of_points.resize(index as usize, None);
+        self.of_points.push(Some(samples));
         count
     }
 
-    /// Draws the light samples of a point by the visibility cache. Returns the number of samples. Returns `None`,
-    /// without samples, if the expected contribution is 0 or not finite.
+    /// Draws the samples of contributing lights at a point. Returns the number of samples. Returns `None`, without
+    /// samples, if the expected contribution is 0 or not finite.
     fn draw_by_cache(
         &mut self,
         at: &At<'_, '_>,
@@ -313,7 +337,7 @@ impl BatchSamples<'_, '_> {
         let contributing = samples.contributing.lights;
         if contributing.is_empty() {
             samples.others = Others::Noncontributing { n: n + n_non, scale: f32::INFINITY };
-            return Some(at.draw_noncontributing(samples, self.buffers, records));
+            return Some(0);
         }
 
         // Expected contribution Σ E·V̂
@@ -332,16 +356,17 @@ impl BatchSamples<'_, '_> {
         } else {
             self.draw_by_photons(at, samples, records);
         }
-        Some(n + at.draw_noncontributing(samples, self.buffers, records))
+        Some(n)
     }
 
     /// Weights the contributing lights by E·√V̂. Returns Σ E·V̂; `None` if the sums are 0 or not finite.
     fn weigh(&mut self, at: &At<'_, '_>, contributing: &ContributingLights<'_>) -> Option<f32> {
-        let weights = &mut self.buffers.weights;
+        let ContributingBuffers { weights, expected: of_lights, .. } = &mut *self.buffers;
         weights.clear();
+        of_lights.clear();
+        at.learned.expect_many(&at.ctx, contributing.lights, of_lights);
         let (mut sum, mut expected) = (0.0, 0.0);
-        for &PhotonCount { light, count } in contributing.lights {
-            let ExpectedContribution { importance, visibility } = at.learned.expect(&at.ctx, light, count);
+        for &ExpectedContribution { importance, visibility } in &*of_lights {
             let weight = importance * visibility.sqrt();
             sum += weight;
             expected += importance * visibility;
@@ -382,38 +407,44 @@ impl BatchSamples<'_, '_> {
             records.extend(at.sample(lights[k].light, rate, [u0, u1], samples, self.buffers));
         }
     }
-}
 
-impl At<'_, '_> {
-    /// Draws samples of the lights without photons, with roulette by their expected contribution. Returns the number of
-    /// surviving samples.
-    fn draw_noncontributing(
-        &self,
-        samples: &PointSamples<'_>,
-        buffers: &ContributingBuffers,
-        records: &mut Vec<Candidate>,
-    ) -> u32 {
-        let Others::Noncontributing { n, scale } = samples.others else { return 0 };
-        if samples.contributing.lights.len() == self.lights.lit.len() {
-            return 0;
-        }
-        let (contributing, singles) = (&samples.contributing, &buffers.singles[samples.singles.clone()]);
-        let mut count = 0;
-        for i in 0..n {
-            let [u_choice, u_survival, u0, u1] = self.point.stream.split(domain::NONCONTRIBUTING, n, i).draw::<4>();
-            let Some(noncontributing) = self.learned.sample_noncontributing(&self.ctx, contributing, singles, u_choice)
-            else {
-                continue;
-            };
-            let SampledLight { light, pmf, .. } = noncontributing.sampled;
-            // Contributing lights have their own samples
-            if contributing.index_of(light).is_some() || !(noncontributing.expected.importance > 0.0) {
+    /// Draws the samples of lights without photons at all points, with roulette by their expected contribution. Returns
+    /// the number of surviving samples.
+    fn draw_noncontributing(&self, points: &[ShadingPoint<'_>], records: &mut Vec<Candidate>) -> u32 {
+        let (lights, buffers) = (&self.job.lights, &*self.buffers);
+        let Some(learned) = lights.learned_visibility() else { return 0 };
+
+        // The draws of all points
+        let (mut draws, mut pending) = (Vec::new(), Vec::new());
+        for ((index, point), samples) in (0..).zip(points).zip(&self.of_points) {
+            let Some(samples) = samples else { continue };
+            let Others::Noncontributing { n, scale } = samples.others else { continue };
+            if samples.contributing.lights.len() == lights.lit.len() {
                 continue;
             }
-            let survival = survival(&noncontributing, scale);
-            if u_survival < survival {
+            let at = At { lights, learned, index, point, ctx: point.light_ctx(), n_bsdf: samples.n_bsdf };
+            let (contributing, singles) = (samples.contributing, &buffers.singles[samples.singles.clone()]);
+            for i in 0..n {
+                let [u, u_survival, u0, u1] = point.stream.split(domain::NONCONTRIBUTING, n, i).draw::<4>();
+                draws.push(NoncontributingDraw { ctx: at.ctx, contributing, singles, u });
+                pending.push(PendingSample { at: at.clone(), samples, n, scale, u_survival, u: [u0, u1] });
+            }
+        }
+
+        // Choose their lights, and sample those that survive
+        let mut count = 0;
+        for (chosen, pending) in learned.sample_noncontributing(&draws).iter().zip(&pending) {
+            let PendingSample { at, samples, n, scale, u_survival, u } = pending;
+            let Some(noncontributing) = chosen else { continue };
+            let SampledLight { light, pmf, .. } = noncontributing.sampled;
+            // Contributing lights have their own samples
+            if samples.contributing.index_of(light).is_some() || !(noncontributing.expected.importance > 0.0) {
+                continue;
+            }
+            let survival = survival(noncontributing, *scale);
+            if *u_survival < survival {
                 count += 1;
-                records.extend(self.sample(light, n as f32 * pmf * survival, [u0, u1], samples, buffers));
+                records.extend(at.sample(light, *n as f32 * pmf * survival, *u, samples, buffers));
             }
         }
         count

@@ -12,11 +12,10 @@
 use super::set::LightSet;
 use crate::lights::tree::sampled_light::UNIT;
 use crate::lights::{
-    Branches, Light, LightCtx, LightId, LightRun, LightTree, RunPositions, SampledLight, TreeChoice, VisibilityCache,
+    Light, LightCtx, LightId, LightRun, LightTree, RunPositions, SampledLight, TreeChoice, VisibilityCache,
     VisibilityCacheSampler,
 };
 use lumiris_numbers::math::{AliasTable, cumulative};
-use std::ops::Deref;
 use std::sync::Arc;
 use strum::{EnumIter, EnumString, IntoStaticStr, VariantNames};
 
@@ -184,20 +183,6 @@ impl LightSampler {
             }
             LightSampler::Tree(choice) => choice.sample(ctx, u),
             LightSampler::VisibilityCache(choice) => choice.sample(ctx, u),
-        }
-    }
-
-    /// [`Self::sample`] with precomputed branch probabilities at the point.
-    #[inline]
-    pub fn sample_with(
-        &self,
-        ctx: &impl Deref<Target = LightCtx>,
-        u: f32,
-        branches: Branches<'_>,
-    ) -> Option<SampledLight> {
-        match self {
-            LightSampler::Tree(choice) => choice.sample_with(ctx, u, branches),
-            _ => self.sample(ctx, u),
         }
     }
 

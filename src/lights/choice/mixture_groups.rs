@@ -9,7 +9,7 @@
 use super::light_sampler::LightSampler;
 use super::set::LightSet;
 use crate::lights::tree::tree_choice::one_of;
-use crate::lights::{Branches, CutNode, LightCtx, LightId, SampledLight};
+use crate::lights::{CutNode, LightCtx, LightId, SampledLight};
 use lumiris_numbers::math::AliasTable;
 
 /// Maximum number of groups.
@@ -107,22 +107,16 @@ impl MixtureGroups {
 
     /// Probabilities of the groups at a point. They sum to one unless no light can be chosen.
     pub fn pmfs(&self, sampler: &LightSampler, ctx: &LightCtx) -> [f32; MAX_GROUPS] {
-        self.pmfs_with(sampler, ctx, Branches::NONE)
-    }
-
-    /// [`Self::pmfs`] with precomputed branch probabilities at the point.
-    #[inline]
-    pub fn pmfs_with(&self, sampler: &LightSampler, ctx: &LightCtx, branches: Branches<'_>) -> [f32; MAX_GROUPS] {
         let mut pmfs = [0.0; MAX_GROUPS];
         match &self.choice {
             Choice::Tree { cut, above } => {
                 let Some(choice) = sampler.tree() else { return pmfs };
 
                 // Group 0 has the infinite lights
-                let p_infinite = branches.infinite_probability(|| choice.infinite_probability(ctx));
+                let p_infinite = choice.infinite_probability(ctx);
                 let of_tree = &mut pmfs[usize::from(self.has_infinite)..];
                 if !cut.is_empty() {
-                    choice.tree.cut_pmfs(ctx, above, branches, of_tree);
+                    choice.tree.cut_pmfs(ctx, above, of_tree);
                 }
                 of_tree.iter_mut().for_each(|p| *p *= 1.0 - p_infinite);
                 if self.has_infinite {

@@ -6,17 +6,13 @@
 
 use super::job_lights::JobLights;
 use super::light_sampler::LightSampler;
-use super::mixture_groups::MAX_GROUPS;
-use crate::lights::{
-    AreaLight, AreaShape, BranchTable, LeAndPdf, Light, LightCtx, LightId, LightLanes, LightSample, SampledLight,
-};
+use crate::lights::{AreaLight, AreaShape, LeAndPdf, Light, LightCtx, LightId, LightLanes, LightSample, SampledLight};
 use lumiris_lanes::area::{Rectangle, many};
 use lumiris_lanes::columns::{Column, Columns3, gather, padded, reserve, scatter};
 use lumiris_lanes::level;
 use lumiris_lanes::light_tree::{GlossyLobes, Receivers};
 use lumiris_numbers::math::light_bound::GlossyLobe;
 use lumiris_numbers::math::{Rgb, Vec3};
-use std::cell::LazyCell;
 use std::ops::Range;
 
 /// Maximum number of lights for which points are sorted by counting.
@@ -32,6 +28,12 @@ pub struct ChosenLight {
     pub light: LightId,
     /// Probability of the choice.
     pub pmf: f32,
+}
+
+impl From<SampledLight> for ChosenLight {
+    fn from(SampledLight { light, pmf, .. }: SampledLight) -> Self {
+        ChosenLight { light, pmf }
+    }
 }
 
 impl ChosenLight {
@@ -140,8 +142,9 @@ struct LobeColumns {
 }
 
 impl LobeColumns {
-    /// Columns of length `len` with these lobes; `None` if there are none.
-    fn set(&mut self, lobes: &[GlossyLobe], len: usize) -> Option<GlossyLobes<'_>> {
+    /// Sets the columns to these lobes, in whole vectors.
+    fn set(&mut self, lobes: &[GlossyLobe]) {
+        let len = padded(lobes.len());
         let LobeColumns { wo, rest } = self;
         wo.reserve(len);
         reserve(&mut rest.each_mut(), len);
@@ -151,8 +154,12 @@ impl LobeColumns {
                 column[i] = x;
             }
         }
-        let [cos_o, alpha_squared, scale, diffuse] = rest.each_ref().map(|column| &column[..len]);
-        (!lobes.is_empty()).then(|| GlossyLobes { wo: wo.get(len), cos_o, alpha_squared, scale, diffuse })
+    }
+
+    /// The first `len` lobes.
+    fn get(&self, len: usize) -> GlossyLobes<'_> {
+        let [cos_o, alpha_squared, scale, diffuse] = self.rest.each_ref().map(|column| &column[..len]);
+        GlossyLobes { wo: self.wo.get(len), cos_o, alpha_squared, scale, diffuse }
     }
 }
 
@@ -161,8 +168,7 @@ impl LobeColumns {
 pub struct Scratch {
     /// The light that each point chose.
     chosen: Vec<ChosenLight>,
-    /// Precomputed branch probabilities at the points.
-    branches: BranchTable,
+    /// Lobes at the points.
     lobes: LobeColumns,
     /// Points sorted by light.
     order: Vec<u32>,
@@ -173,23 +179,9 @@ pub struct Scratch {
 }
 
 impl Scratch {
-    /// Prepares for samples of `lights` at the `n` points `at`; each point may be sampled several times.
-    pub fn begin(&mut self, lights: &JobLights, n: usize, at: LitPoints<'_>) {
-        self.branches.clear();
-        if let LightSampler::Tree(choice) = &lights.sampler
-            && lights.sampler.only_light().is_none()
-        {
-            let len = padded(n);
-            let lobes = self.lobes.set(at.lobes, len);
-            self.branches.compute(choice, &Receivers { p: at.p.get(len), ns: at.ns.get(len), lobes });
-        }
-    }
-
-    /// [`MixtureGroups::pmfs`](super::mixture_groups::MixtureGroups::pmfs) of `lights` at point `i`, given as `at`.
-    /// There must be more than one light.
-    #[inline]
-    pub fn group_pmfs(&self, lights: &JobLights, i: usize, at: &LightCtx) -> [f32; MAX_GROUPS] {
-        lights.groups.pmfs_with(&lights.sampler, at, self.branches.at(i))
+    /// Prepares for samples at the points `at`; each point may be sampled several times.
+    pub fn begin(&mut self, at: LitPoints<'_>) {
+        self.lobes.set(at.lobes);
     }
 
     /// The light that point `i` chose in the last [`JobLights::sample_many`], if there is more than one light.
@@ -218,12 +210,15 @@ impl JobLights {
         } else {
             let mut chosen = std::mem::take(&mut scratch.chosen);
             chosen.clear();
-            let choose = |(i, &u): (usize, &f32)| {
-                let ctx = LazyCell::new(|| at.get(i));
-                let choice = self.sampler.sample_with(&ctx, u, scratch.branches.at(i));
-                choice.map_or(ChosenLight::NONE, |SampledLight { light, pmf, .. }| ChosenLight { light, pmf })
-            };
-            chosen.extend(u[0][..n].iter().enumerate().map(choose));
+            let take = |choice: Option<SampledLight>| chosen.push(choice.map_or(ChosenLight::NONE, ChosenLight::from));
+            if let LightSampler::Tree(choice) = &self.sampler {
+                let len = padded(n);
+                let lobes = if at.lobes.is_empty() { None } else { Some(scratch.lobes.get(len)) };
+                choice.sample_many(&Receivers { p: at.p.get(len), ns: at.ns.get(len), lobes }, &u[0][..len], take);
+                chosen.truncate(n);
+            } else {
+                u[0][..n].iter().enumerate().map(|(i, &u)| self.sampler.sample(&at.get(i), u)).for_each(take);
+            }
             self.sample_chosen(&chosen, at.p, [&u[1], &u[2]], scratch, out);
             scratch.chosen = chosen;
         }
@@ -477,8 +472,7 @@ mod tests {
         let at = LitPoints { p: &p, n: &n, ns: &ns, lobes: &lobes };
         let (mut scratch, mut out) = (Scratch::default(), LightSamples::default());
         out.reserve(len);
-        scratch.begin(&lights, N, at);
-        // Later choices reuse the probabilities of the first one
+        scratch.begin(at);
         for _ in 0..3 {
             u.iter_mut().for_each(|u| u[..N].fill_with(|| stream.random::<f32>()));
             lights.sample_many(N, at, &u, &mut scratch, &mut out);

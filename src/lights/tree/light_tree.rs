@@ -1,7 +1,6 @@
 //! A bounding volume hierarchy over lights, descended at random in proportion to an upper bound of each child's
 //! contribution, [`LightBound::importance`] [Conty Estévez and Kulla 2018; Pharr et al. 2023, §12.6.3].
 
-use super::branches::{Branches, COLUMNS};
 use super::build::{Item, build};
 use super::node::Node;
 use super::sampled_light::{LightRun, SampledLight, UNIT};
@@ -10,7 +9,6 @@ use lumiris_numbers::math::ONE_MINUS_EPSILON;
 use lumiris_numbers::math::light_bound::{LightBound, first_probability};
 use rayon::prelude::*;
 use std::hint::select_unpredictable;
-use std::ops::Deref;
 
 /// Maximum size of the stack of subtrees in [`LightTree::runs`]: one per level.
 const MAX_DEPTH: usize = 66;
@@ -20,39 +18,17 @@ const NO_TRAIL: u64 = u64::MAX;
 /// The hierarchy.
 #[derive(Clone, Debug, Default)]
 pub struct LightTree {
-    nodes: Vec<Node>,
+    pub(super) nodes: Vec<Node>,
     /// Per light, the path from the root to its leaf, first branch in the lowest bit; 1 is right.
     trails: Vec<u64>,
     /// Per light, its leaf.
     leaves: Vec<u32>,
-    /// The inner nodes with heap indices below [`COLUMNS`].
-    top: Vec<IndexedNode>,
-}
-
-/// A node by its index in the list of nodes, and by its heap index.
-#[derive(Clone, Copy, Debug)]
-struct IndexedNode {
-    index: u32,
-    heap_index: usize,
-}
-
-impl IndexedNode {
-    /// The root has the heap index 1, the children of node n have 2n and 2n + 1. Heap indices from [`COLUMNS`] on are
-    /// not distinguished.
-    const ROOT: IndexedNode = IndexedNode { index: 0, heap_index: 1 };
-
-    /// A child of this node, at the given index.
-    #[inline]
-    fn child(self, index: u32, is_right: bool) -> Self {
-        let n = self.heap_index;
-        IndexedNode { index, heap_index: if n < COLUMNS { 2 * n + usize::from(is_right) } else { n } }
-    }
 }
 
 /// An inner node above a cut of the tree.
 #[derive(Clone, Copy, Debug)]
 pub struct CutNode {
-    node: IndexedNode,
+    index: u32,
     /// The first subtrees below its children.
     left: usize,
     right: usize,
@@ -105,22 +81,8 @@ impl LightTree {
             tree.nodes = vec![Node::new(&LightBounds::EMPTY, true, 0); 2 * items.len() - 1];
             build(&mut tree.nodes, 0, &mut items, 0);
             tree.find_leaves();
-            tree.find_top();
         }
         tree
-    }
-
-    /// Sets `top`.
-    fn find_top(&mut self) {
-        let mut stack = vec![IndexedNode::ROOT];
-        while let Some(indexed) = stack.pop() {
-            let node = &self.nodes[indexed.index as usize];
-            if !node.is_leaf && indexed.heap_index < COLUMNS {
-                self.top.push(indexed);
-                let left = indexed.child(indexed.index + 1, false);
-                stack.extend([left, indexed.child(node.light_or_right_child, true)]);
-            }
-        }
     }
 
     /// Sets `leaves` and `trails`.
@@ -163,12 +125,6 @@ impl LightTree {
         self.nodes.first().map(|root| &root.bound)
     }
 
-    /// The heap indices of the inner nodes below [`COLUMNS`], with the bounds of their left and right children.
-    pub(super) fn top_branches(&self) -> impl Iterator<Item = (usize, [&LightBound; 2])> {
-        let bounds = |node: &IndexedNode| self.children(node.index as usize).map(|child| &child.bound);
-        self.top.iter().map(move |node| (node.heap_index, bounds(node)))
-    }
-
     #[inline]
     fn children(&self, index: usize) -> [&Node; 2] {
         [&self.nodes[index + 1], &self.nodes[self.nodes[index].light_or_right_child as usize]]
@@ -184,7 +140,13 @@ impl LightTree {
     /// Upper bound, up to the same factor, of the contribution of one light at a point; 0 if it is not in the tree.
     #[inline]
     pub fn light_importance(&self, ctx: &LightCtx, light: LightId) -> f32 {
-        self.leaf(light).map_or(0.0, |leaf| self.nodes[leaf as usize].importance(ctx))
+        self.bound(light).map_or(0.0, |bound| bound.importance(&ctx.receiver()))
+    }
+
+    /// The bound of a light; `None` if it is not in the tree.
+    #[inline]
+    pub fn bound(&self, light: LightId) -> Option<&LightBound> {
+        self.leaf(light).map(|leaf| &self.nodes[leaf as usize].bound)
     }
 
     /// Probability of the left child of an inner node. If neither child can contribute, the intensities decide. The
@@ -192,46 +154,32 @@ impl LightTree {
     #[inline]
     fn left_probability(&self, ctx: &LightCtx, index: u32) -> f32 {
         let [left, right] = self.children(index as usize);
-        first_probability([left.importance(ctx), right.importance(ctx)], [&left.bound, &right.bound])
+        first_probability(
+            [left.importance(ctx), right.importance(ctx)],
+            [left.bound.intensity(), right.bound.intensity()],
+        )
+    }
+
+    /// Chooses a light by `u` in [0, 1).
+    #[inline]
+    pub fn sample(&self, ctx: &LightCtx, u: f32) -> Option<SampledLight> {
+        if self.is_empty() { None } else { self.sample_below(ctx, 0, u) }
     }
 
     /// Chooses a light of the subtree below a node by `u` in [0, 1); `pmf` is the probability in the subtree.
     #[inline]
     pub fn sample_below(&self, ctx: &LightCtx, root: u32, u: f32) -> Option<SampledLight> {
-        self.descend(IndexedNode { index: root, heap_index: 1 }, u, |node| self.left_probability(ctx, node.index))
-    }
-
-    /// Chooses a light by `u` in [0, 1). `branches` are the precomputed probabilities at the point.
-    #[inline]
-    pub fn sample(&self, ctx: &impl Deref<Target = LightCtx>, u: f32, branches: Branches<'_>) -> Option<SampledLight> {
-        if self.is_empty() {
-            return None;
-        }
-        self.descend(IndexedNode::ROOT, u, |node| {
-            branches.probability(node.heap_index, || self.left_probability(ctx, node.index))
-        })
-    }
-
-    /// Descends from a node; `left` is the probability of the left child of a node.
-    #[inline]
-    fn descend(
-        &self,
-        mut indexed: IndexedNode,
-        mut u: f32,
-        mut left: impl FnMut(IndexedNode) -> f32,
-    ) -> Option<SampledLight> {
-        let mut pmf = 1.0;
-        let mut node = &self.nodes[indexed.index as usize];
+        let (mut index, mut u, mut pmf) = (root, u, 1.0);
+        let mut node = &self.nodes[index as usize];
         while !node.is_leaf {
             // Descend, and rescale the random number. Without branches, since half of them would be predicted wrongly
-            let p = left(indexed);
+            let p = self.left_probability(ctx, index);
             let is_left = u < p;
             let (offset, taken) = select_unpredictable(is_left, (u, p), (u - p, 1.0 - p));
             pmf *= taken;
             u = (offset / taken).min(ONE_MINUS_EPSILON);
-            let child = select_unpredictable(is_left, indexed.index + 1, node.light_or_right_child);
-            indexed = indexed.child(child, !is_left);
-            node = &self.nodes[indexed.index as usize];
+            index = select_unpredictable(is_left, index + 1, node.light_or_right_child);
+            node = &self.nodes[index as usize];
         }
         (pmf > 0.0).then_some(SampledLight { light: node.light_or_right_child, pmf, u })
     }
@@ -281,7 +229,7 @@ impl LightTree {
         while cut.len() < max {
             let spread = |&index: &u32| {
                 let node = &self.nodes[index as usize];
-                if node.is_leaf { -1.0 } else { node.bound.intensity * node.bound.radius_squared }
+                if node.is_leaf { -1.0 } else { node.bound.intensity() * node.bound.radius_squared() }
             };
             let widest = (0..cut.len()).max_by(|&a, &b| spread(&cut[a]).total_cmp(&spread(&cut[b])));
             let Some(widest) = widest.filter(|&i| !self.nodes[cut[i] as usize].is_leaf) else { break };
@@ -308,54 +256,40 @@ impl LightTree {
     pub fn above(&self, cut: &[u32]) -> Vec<CutNode> {
         let mut above = Vec::new();
         if !cut.is_empty() {
-            self.add_above(IndexedNode::ROOT, cut, 0, &mut above);
+            self.add_above(0, cut, 0, &mut above);
         }
         above
     }
 
     /// Appends the inner nodes from `node` on down; `first` is the index of the first subtree below it. Returns the
     /// index after its last subtree.
-    fn add_above(&self, node: IndexedNode, cut: &[u32], first: usize, above: &mut Vec<CutNode>) -> usize {
-        if cut.binary_search(&node.index).is_ok() {
+    fn add_above(&self, index: u32, cut: &[u32], first: usize, above: &mut Vec<CutNode>) -> usize {
+        if cut.binary_search(&index).is_ok() {
             return first + 1;
         }
         let i = above.len();
-        above.push(CutNode { node, left: first, right: first });
-        let right = self.add_above(node.child(node.index + 1, false), cut, first, above);
+        above.push(CutNode { index, left: first, right: first });
+        let right = self.add_above(index + 1, cut, first, above);
         above[i].right = right;
-        let right_child = self.nodes[node.index as usize].light_or_right_child;
-        self.add_above(node.child(right_child, true), cut, right, above)
+        self.add_above(self.nodes[index as usize].light_or_right_child, cut, right, above)
     }
 
     /// Probabilities with which [`sample`](Self::sample) enters each subtree of a non-empty cut, in its order. `above`
-    /// are the nodes [`above`](Self::above) the cut; `branches` are precomputed probabilities at the point.
+    /// are the nodes [`above`](Self::above) the cut.
     #[inline]
-    pub fn cut_pmfs(&self, ctx: &LightCtx, above: &[CutNode], branches: Branches<'_>, pmfs: &mut [f32]) {
+    pub fn cut_pmfs(&self, ctx: &LightCtx, above: &[CutNode], pmfs: &mut [f32]) {
         pmfs[0] = 1.0;
-        for &CutNode { node, left, right } in above {
-            let p = branches.probability(node.heap_index, || self.left_probability(ctx, node.index));
+        for &CutNode { index, left, right } in above {
+            let p = self.left_probability(ctx, index);
             let pmf = pmfs[left];
             pmfs[left] = pmf * p;
             pmfs[right] = pmf * (1.0 - p);
         }
     }
 
-    /// [`Self::sample`] with the importances `importance(index, node, count)`, which must be positive where the
-    /// importance of the node is. `count` is the number of `leaves` below the node; `leaves` are indices of leaves in
-    /// ascending order. These leaves are chosen only if no other light can contribute. Nodes are indexed as in
-    /// [`Self::sums`].
-    #[inline]
-    pub(in crate::lights) fn sample_by(
-        &self,
-        u: f32,
-        leaves: &[u32],
-        importance: impl Fn(usize, &Node, usize) -> f32,
-    ) -> Option<SampledLight> {
-        let mut left = self.left_by(leaves, importance);
-        if self.is_empty() { None } else { self.descend(IndexedNode::ROOT, u, |node| left(node.index)) }
-    }
-
-    /// The probability of the left child of each node on the way down, with the importances of [`Self::sample_by`].
+    /// The probability of the left child of each node on the way down, with the importances `importance(index, node,
+    /// count)`. `count` is the number of `leaves` below the node; `leaves` are indices of leaves in ascending order, which
+    /// are chosen only if no other light can contribute. Nodes are indexed as in [`Self::sums`].
     #[inline]
     fn left_by<'a>(
         &'a self,
@@ -379,7 +313,7 @@ impl LightTree {
             };
             let importances = [of(index + 1, left, middle), of(right_index, right, below.len() - middle)];
             (right_of, last) = (&below[middle..], Some((index, middle)));
-            first_probability(importances, [&left.bound, &right.bound])
+            first_probability(importances, [left.bound.intensity(), right.bound.intensity()])
         }
     }
 
@@ -414,7 +348,8 @@ impl LightTree {
         self.probability(light, |index| self.left_probability(ctx, index))
     }
 
-    /// Probability that [`sample_by`](Self::sample_by) chooses `light`.
+    /// Probability that [`sample_by_photons`](Self::sample_by_photons) chooses `light`, with the importances `importance(index, node,
+    /// count)` for the `count` of the `leaves` below a node.
     #[inline]
     pub(in crate::lights) fn pmf_by(
         &self,
@@ -528,7 +463,7 @@ mod tests {
             let count = 100_000;
             let mut observed = vec![0.0; lights.len() * 4];
             for _ in 0..count {
-                let SampledLight { light, pmf, u } = tree.sample(&&ctx, s.random::<f32>(), Branches::NONE).unwrap();
+                let SampledLight { light, pmf, u } = tree.sample(&ctx, s.random::<f32>()).unwrap();
                 assert_eq!(pmf, tree.pmf(&ctx, light));
                 observed[light as usize * 4 + (u * 4.0) as usize] += 1.0;
             }
@@ -602,20 +537,17 @@ mod tests {
     fn degenerate_sets_are_handled() {
         let ctx = LightCtx::on(Vec3::ZERO, Vec3::Y);
         // None, or none that shines.
-        assert!(tree_of(&[]).sample(&&ctx, 0.5, Branches::NONE).is_none());
+        assert!(tree_of(&[]).sample(&ctx, 0.5).is_none());
         let black = Light::Point(PointLight { p: Vec3::ONE, intensity: Rgb::BLACK });
         let mesh = TriangleMesh::new(vec![Vec3::ONE, Vec3::ONE, Vec3::X], vec![[0, 1, 2]]).unwrap();
         let flat = area_lights_of(&Shape::Mesh(mesh), &Emission::constant(Rgb::WHITE)).lights.remove(0);
         let dark = [black.clone(), Light::Area(flat), Light::InfiniteConstant { l: Rgb::WHITE }];
         let tree = tree_of(&dark);
-        assert!(tree.is_empty() && tree.sample(&&ctx, 0.5, Branches::NONE).is_none() && tree.pmf(&ctx, 0) == 0.0);
+        assert!(tree.is_empty() && tree.sample(&ctx, 0.5).is_none() && tree.pmf(&ctx, 0) == 0.0);
 
         // One light, the same light many times, lights on a line, and the point on a light.
         let one = Light::Point(PointLight { p: Vec3::ONE, intensity: Rgb::WHITE });
-        assert_eq!(
-            tree_of(&[black, one.clone()]).sample(&&ctx, 0.9, Branches::NONE).map(|s| (s.light, s.pmf)),
-            Some((1, 1.0))
-        );
+        assert_eq!(tree_of(&[black, one.clone()]).sample(&ctx, 0.9).map(|s| (s.light, s.pmf)), Some((1, 1.0)));
         let same = vec![one; 1000];
         let line: Vec<Light> = (0..1000)
             .map(|i| {
@@ -645,7 +577,7 @@ mod tests {
         let mut s = pcg32([8, 1, 1]);
         let ctx = random_ctx(&mut s, 1.0);
         for _ in 0..100_000 {
-            let SampledLight { light, pmf, .. } = tree.sample(&&ctx, s.random::<f32>(), Branches::NONE).unwrap();
+            let SampledLight { light, pmf, .. } = tree.sample(&ctx, s.random::<f32>()).unwrap();
             assert!(pmf > 0.0 && light < 100_000);
         }
     }

@@ -1,10 +1,8 @@
 //! The light tree: [`light_tree`] of nodes (`node`) made by `build`; [`tree_choice`] adds the infinite lights, and
-//! yields a [`sampled_light`]. [`branches`] are precomputed probabilities at
-//! the top of the tree, [`branch_table`] computes them for many points.
+//! yields a [`sampled_light`]. `descents` choose for many points at once.
 
-pub mod branch_table;
-pub mod branches;
 mod build;
+pub(super) mod descents;
 pub mod light_tree;
 pub(super) mod node;
 pub mod sampled_light;

@@ -1,11 +1,12 @@
 //! The choice of a light by a [`LightTree`] and, beside it, the infinite lights, which have no bounds.
 
-use super::branches::Branches;
 use super::light_tree::{LightTree, RunPositions};
 use super::sampled_light::{LightRun, SampledLight, UNIT};
 use crate::lights::{LightCtx, LightId};
+use lumiris_lanes::level;
+use lumiris_lanes::light_descent::{DESCENTS, Descents};
+use lumiris_lanes::light_tree::{Receivers, importances};
 use lumiris_numbers::math::ONE_MINUS_EPSILON;
-use std::ops::Deref;
 use std::sync::Arc;
 
 /// A light tree, with the infinite lights beside it.
@@ -66,24 +67,54 @@ impl TreeChoice {
     /// Chooses a light by `u` in [0, 1); `None` if there is none.
     #[inline]
     pub fn sample(&self, ctx: &LightCtx, u: f32) -> Option<SampledLight> {
-        self.sample_with(&ctx, u, Branches::NONE)
-    }
-
-    /// [`Self::sample`] with precomputed branch probabilities at the point.
-    #[inline]
-    pub fn sample_with(
-        &self,
-        ctx: &impl Deref<Target = LightCtx>,
-        u: f32,
-        branches: Branches<'_>,
-    ) -> Option<SampledLight> {
-        let p_infinite = branches.infinite_probability(|| self.infinite_probability(ctx));
+        let p_infinite = self.infinite_probability(ctx);
         if u < p_infinite {
             return Some(one_of(&self.infinite, u / p_infinite, p_infinite));
         }
         let u = ((u - p_infinite) / (1.0 - p_infinite)).min(ONE_MINUS_EPSILON);
-        let choice = self.tree.sample(ctx, u, branches)?;
+        let choice = self.tree.sample(ctx, u)?;
         Some(SampledLight { pmf: choice.pmf * (1.0 - p_infinite), ..choice })
+    }
+
+    /// Chooses a light for each of the points `at` by their random numbers `u` in [0, 1), as [`Self::sample`]. All columns
+    /// have the same length. `take` gets the lights in the order of the points.
+    pub(in crate::lights) fn sample_many(
+        &self,
+        at: &Receivers<'_>,
+        u: &[f32],
+        mut take: impl FnMut(Option<SampledLight>),
+    ) {
+        let (mut p_infinite, mut rest, mut descents) = ([0.0; DESCENTS], [0.0; DESCENTS], Descents::default());
+        for (block, u) in u.chunks(DESCENTS).enumerate() {
+            // Infinite lights
+            let rows = block * DESCENTS..block * DESCENTS + u.len();
+            if !self.infinite.is_empty() {
+                self.infinite_probabilities(&at.rows(rows.clone()), &mut p_infinite[..u.len()]);
+            }
+            for ((rest, &u), p) in rest.iter_mut().zip(u).zip(p_infinite) {
+                *rest = ((u - p) / (1.0 - p)).min(ONE_MINUS_EPSILON);
+            }
+
+            // Lights in the tree
+            let in_tree = self.tree.sample_rows(at, rows, &rest, &mut descents);
+            for ((&u, p), in_tree) in u.iter().zip(p_infinite).zip(in_tree) {
+                take(if u < p {
+                    Some(one_of(&self.infinite, u / p, p))
+                } else {
+                    in_tree.map(|choice| SampledLight { pmf: choice.pmf * (1.0 - p), ..choice })
+                });
+            }
+        }
+    }
+
+    /// [`Self::infinite_probability`] at each point.
+    fn infinite_probabilities(&self, at: &Receivers<'_>, out: &mut [f32]) {
+        let fraction = self.infinite_fraction();
+        out.fill(0.0);
+        if let Some(root) = self.tree.root() {
+            importances(level(), root, at, out);
+        }
+        out.iter_mut().for_each(|p| *p = if *p > 0.0 { fraction } else { 1.0 });
     }
 
     /// Appends runs for the positions.

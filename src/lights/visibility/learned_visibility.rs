@@ -21,18 +21,17 @@
 //! count c of a node. For example, if a distant room is visible through a door, single photons from a few of its lights
 //! indicate that the others are visible too.
 
-use super::visibility_cache::{ContributingLights, VisibilityCache};
+use super::visibility_cache::{ContributingLights, PhotonCount, VisibilityCache};
+use crate::lights::tree::descents::{Draw, Drawn};
 use crate::lights::tree::node::Node;
 use crate::lights::{Light, LightCtx, LightId, SampledLight, TreeChoice};
+use lumiris_lanes::level;
+use lumiris_lanes::light_descent::{self, DESCENTS, Expected, Photons};
 use lumiris_numbers::math::ONE_MINUS_EPSILON;
+use lumiris_numbers::math::expected_visibility::expected_visibility;
 use lumiris_numbers::math::light_bound::Receiver;
 use std::f32::consts::PI;
 
-/// v₀ and a of the prior of V.
-const PRIOR_MEAN: f32 = 0.5;
-const PRIOR_SHAPE: f32 = 1.0;
-/// Minimum of V̂, which bounds the weight of a sample.
-pub const MIN_VISIBILITY: f32 = 1e-4;
 /// Minimum number of photon paths per light, for lights that have none.
 const MIN_PATHS: f32 = 0.5;
 
@@ -57,6 +56,19 @@ pub struct NoncontributingLight {
     pub expected: ExpectedContribution,
 }
 
+/// The choice of a light without photons, to be made.
+#[derive(Clone, Copy, Debug)]
+pub struct NoncontributingDraw<'a> {
+    /// The point.
+    pub ctx: LightCtx,
+    /// The lights with photons there.
+    pub contributing: ContributingLights<'a>,
+    /// Their indices by [`LearnedVisibility::find_singles`].
+    pub singles: &'a [u32],
+    /// A random number in [0, 1).
+    pub u: f32,
+}
+
 /// The expected contribution of a light at a point.
 #[derive(Clone, Copy, Debug)]
 pub struct ExpectedContribution {
@@ -70,13 +82,6 @@ pub struct ExpectedContribution {
 #[inline]
 fn is_glossy(ctx: &LightCtx) -> bool {
     ctx.lobe.scale > 0.0
-}
-
-/// V̂ for a light of irradiance `importance` with `count` photons; `of_one_photon` is the irradiance per photon.
-#[inline]
-fn estimate(importance: f32, of_one_photon: f32, count: f32) -> f32 {
-    let v = (count + PRIOR_SHAPE) * of_one_photon / (importance + PRIOR_SHAPE / PRIOR_MEAN * of_one_photon);
-    v.clamp(MIN_VISIBILITY, 1.0)
 }
 
 /// Luminance of the irradiance on a surface that faces an infinite light; 0 for others.
@@ -124,17 +129,41 @@ impl LearnedVisibility {
 
     /// The expected contribution of a light with `count` photons.
     #[inline]
-    pub fn expect(&self, ctx: &LightCtx, light: LightId, count: u32) -> ExpectedContribution {
+    fn expect(&self, ctx: &LightCtx, light: LightId, count: u32) -> ExpectedContribution {
         let e = self.importance(ctx, light);
         let is_by_lobe = is_glossy(ctx) && self.tree_choice.tree.contains(light);
         let importance = if is_by_lobe { self.tree_choice.tree.light_importance(ctx, light) } else { e };
         ExpectedContribution { importance, visibility: self.visibility(light, e, count) }
     }
 
-    /// V̂ of a light for its E and its number of photons, from [`MIN_VISIBILITY`] to 1.
+    /// Appends the expected contributions of lights with photons.
+    pub fn expect_many(&self, ctx: &LightCtx, lights: &[PhotonCount], out: &mut Vec<ExpectedContribution>) {
+        let TreeChoice { tree, .. } = &self.tree_choice;
+        let Some(root) = tree.root() else {
+            return out.extend(lights.iter().map(|&PhotonCount { light, count }| self.expect(ctx, light, count)));
+        };
+        let at = ctx.receiver();
+        let (mut bounds, mut photons, mut expected) = ([root; DESCENTS], Photons::default(), Expected::default());
+        for lights in lights.chunks(DESCENTS) {
+            for (i, &PhotonCount { light, count }) in lights.iter().enumerate() {
+                bounds[i] = tree.bound(light).unwrap_or(root);
+                (photons.of_one[i], photons.count[i]) = (self.of_one_photon[light as usize], count as f32);
+            }
+            light_descent::expect(level(), &at, &bounds, &photons, lights.len(), &mut expected);
+            out.extend(lights.iter().enumerate().map(|(i, &PhotonCount { light, count })| {
+                if tree.contains(light) {
+                    ExpectedContribution { importance: expected.importance[i], visibility: expected.visibility[i] }
+                } else {
+                    self.expect(ctx, light, count)
+                }
+            }));
+        }
+    }
+
+    /// V̂ of a light for its E and its number of photons.
     #[inline]
     pub fn visibility(&self, light: LightId, importance: f32, count: u32) -> f32 {
-        estimate(importance, self.of_one_photon[light as usize], count as f32)
+        expected_visibility(importance, self.of_one_photon[light as usize], count as f32)
     }
 
     /// The irradiance that `count` photons of a light stand for.
@@ -151,34 +180,45 @@ impl LearnedVisibility {
         singles[first..].sort_unstable();
     }
 
-    /// Chooses a light by `u` in [0, 1), nearly in proportion to E·√V̂ for lights without photons. Every light that can
-    /// contribute and has no photons has a positive probability. `contributing` lights may be chosen too; those with a
-    /// single photon only if no other light below their node can contribute. `singles` are their tree indices. Returns
-    /// `None` if there is no light.
-    #[inline]
-    pub fn sample_noncontributing(
-        &self,
-        ctx: &LightCtx,
-        contributing: &ContributingLights<'_>,
-        singles: &[u32],
-        u: f32,
-    ) -> Option<NoncontributingLight> {
+    /// Chooses a light for each draw by its `u`, nearly in proportion to E·√V̂ for lights without photons. Every light that
+    /// can contribute and has no photons has a positive probability. `contributing` lights may be chosen too; those with
+    /// a single photon only if no other light below their node can contribute. The result is `None` if there is no light.
+    pub fn sample_noncontributing(&self, draws: &[NoncontributingDraw<'_>]) -> Vec<Option<NoncontributingLight>> {
+        let mut chosen = vec![None; draws.len()];
+
+        // Infinite lights
         let TreeChoice { tree, infinite, .. } = &self.tree_choice;
-        let others = || infinite.iter().filter(|&&light| contributing.index_of(light).is_none());
-        let count = others().count();
-        let p_infinite = self.tree_choice.probability_of_some(ctx, count);
-        if u < p_infinite {
-            let x = u / p_infinite * count as f32;
-            let i = (x as usize).min(count - 1);
-            let u = (x - i as f32).clamp(0.0, ONE_MINUS_EPSILON);
-            let light = *others().nth(i)?;
-            return Some(self.evaluated(ctx, SampledLight { light, pmf: p_infinite / count as f32, u }));
+        let (mut in_tree, mut indices) = (Vec::with_capacity(draws.len()), Vec::with_capacity(draws.len()));
+        for (i, draw) in draws.iter().enumerate() {
+            let &NoncontributingDraw { ctx, contributing, singles, u } = draw;
+            let others = || infinite.iter().filter(|&&light| contributing.index_of(light).is_none());
+            let count = others().count();
+            let p_infinite = self.tree_choice.probability_of_some(&ctx, count);
+            if u < p_infinite {
+                let x = u / p_infinite * count as f32;
+                let k = (x as usize).min(count - 1);
+                let u = (x - k as f32).clamp(0.0, ONE_MINUS_EPSILON);
+                let of_one = |&light| self.evaluated(&ctx, SampledLight { light, pmf: p_infinite / count as f32, u });
+                chosen[i] = others().nth(k).map(of_one);
+            } else {
+                let u = ((u - p_infinite) / (1.0 - p_infinite)).min(ONE_MINUS_EPSILON);
+                in_tree.push(Draw { at: ctx.receiver(), u, leaves: singles });
+                indices.push((i, p_infinite));
+            }
         }
 
         // Lights in the tree
-        let u = ((u - p_infinite) / (1.0 - p_infinite)).min(ONE_MINUS_EPSILON);
-        let sampled = tree.sample_by(u, singles, self.by_visibility(ctx))?;
-        Some(self.evaluated(ctx, SampledLight { pmf: sampled.pmf * (1.0 - p_infinite), ..sampled }))
+        tree.sample_by_photons(&in_tree, &self.of_nodes, |i, drawn| {
+            let (i, p_infinite) = indices[i];
+            chosen[i] = drawn.map(|Drawn { light: sampled, importance, diffuse_importance }| NoncontributingLight {
+                sampled: SampledLight { pmf: sampled.pmf * (1.0 - p_infinite), ..sampled },
+                expected: ExpectedContribution {
+                    importance,
+                    visibility: self.visibility(sampled.light, diffuse_importance, 0),
+                },
+            });
+        });
+        chosen
     }
 
     /// Evaluates a light without photons, with the probability that [`Self::sample_noncontributing`] chooses it.
@@ -212,7 +252,7 @@ impl LearnedVisibility {
         move |index, node, singles| {
             let e = node.bound.importance(&diffuse);
             let reflected = if receiver.lobe.is_some() { node.bound.importance(&receiver) } else { e };
-            reflected * estimate(e, self.of_nodes[index], singles as f32).sqrt()
+            reflected * expected_visibility(e, self.of_nodes[index], singles as f32).sqrt()
         }
     }
 
@@ -226,7 +266,8 @@ impl LearnedVisibility {
 mod tests {
     use super::super::visibility_cache::{PathCount, PrimaryPhoton};
     use super::*;
-    use crate::lights::{DistantLight, LightTree, PointLight, SurfacePoint};
+    use crate::lights::{DistantLight, GlossyLobe, LightTree, PointLight, SurfacePoint};
+    use lumiris_numbers::math::expected_visibility::{MIN_VISIBILITY, PRIOR_MEAN, PRIOR_SHAPE};
     use lumiris_numbers::math::{Rgb, Vec3};
     use lumiris_test_support::random::{RngExt, pcg32};
     use std::sync::Arc;
@@ -243,6 +284,17 @@ mod tests {
         lights.push(Light::InfiniteConstant { l: Rgb::splat(0.1) });
         lights.push(Light::Distant(DistantLight { wi: Vec3::Z, irradiance: Rgb::splat(0.2) }));
         lights
+    }
+
+    /// The choice of a single draw.
+    fn sample(
+        learned: &LearnedVisibility,
+        contributing: ContributingLights<'_>,
+        singles: &[u32],
+        u: f32,
+    ) -> NoncontributingLight {
+        let draw = NoncontributingDraw { ctx: LightCtx::on(AT, Vec3::Z), contributing, singles, u };
+        learned.sample_noncontributing(&[draw])[0].unwrap()
     }
 
     /// A cache with `count` photons of each light of `contributing` at the point, and `paths` photon paths of every
@@ -304,7 +356,7 @@ mod tests {
             let mut s = pcg32([3, 1, 4]);
             let (mut means, mut squares) = ([0.0_f64; 14], [0.0_f64; 14]);
             for _ in 0..draws {
-                let sampled = learned.sample_noncontributing(&ctx, &contributing, &singles, s.random::<f32>()).unwrap();
+                let sampled = sample(&learned, contributing, &singles, s.random::<f32>());
                 let SampledLight { light, pmf, u } = sampled.sampled;
                 assert!((0.0..1.0).contains(&u) && pmf > 0.0);
                 assert_eq!(sampled.expected.importance, learned.importance(&ctx, light));
@@ -323,14 +375,30 @@ mod tests {
     }
 
     #[test]
+    fn expectations_of_many_lights_are_those_of_each() {
+        // Few and many lights, a diffuse and a glossy surface, infinite lights among them
+        let learned = learned(&cache(&[0, 3, 12], 5, 1e3));
+        let diffuse = LightCtx::on(AT, Vec3::Z);
+        let lobe = GlossyLobe::new(Vec3::new(0.6, 0.0, 0.8), Vec3::Z, 0.3, 0.7);
+        for ctx in [diffuse, LightCtx { lobe, ..diffuse }] {
+            for n in [0, 1, 5, 14, 100] {
+                let lights: Vec<_> = (0..n).map(|i| PhotonCount { light: i % 14, count: i % 5 }).collect();
+                let mut found = Vec::new();
+                learned.expect_many(&ctx, &lights, &mut found);
+                let each = lights.iter().map(|&PhotonCount { light, count }| learned.expect(&ctx, light, count));
+                let values = |e: &ExpectedContribution| (e.importance, e.visibility);
+                assert!(found.iter().map(values).eq(each.map(|e| values(&e))));
+            }
+        }
+    }
+
+    #[test]
     fn lights_whose_photons_were_expected_and_did_not_come_are_chosen_less() {
-        let ctx = LightCtx::on(AT, Vec3::Z);
         let share_of_near = |paths: f32| {
             let cache = cache(&[5], 1, paths);
             let learned = learned(&cache);
             let contributing = cache.lookup(AT, Vec3::Z);
-            let near =
-                |i: u32| learned.sample_noncontributing(&ctx, &contributing, &[], (i as f32 + 0.5) / 4096.0).unwrap();
+            let near = |i: u32| sample(&learned, contributing, &[], (i as f32 + 0.5) / 4096.0);
             (0..4096).filter(|&i| near(i).sampled.light < 3).count()
         };
         let [few, many] = [1.0, 1e6].map(share_of_near);
@@ -339,7 +407,6 @@ mod tests {
 
     #[test]
     fn lights_beside_those_of_single_photons_are_chosen_more() {
-        let ctx = LightCtx::on(AT, Vec3::Z);
         let share_of_far = |seen: &[LightId], count: usize| {
             let cache = cache(seen, count, 1e5);
             let learned = learned(&cache);
@@ -347,9 +414,7 @@ mod tests {
             let mut singles = Vec::new();
             learned.find_singles(&contributing, &mut singles);
             assert_eq!(singles.len(), if count == 1 { seen.len() } else { 0 });
-            let chosen = |i: u32| {
-                learned.sample_noncontributing(&ctx, &contributing, &singles, (i as f32 + 0.5) / 4096.0).unwrap()
-            };
+            let chosen = |i: u32| sample(&learned, contributing, &singles, (i as f32 + 0.5) / 4096.0);
             (0..4096).filter(|&i| (8..12).contains(&chosen(i).sampled.light)).count()
         };
         let [none, many, single] = [share_of_far(&[], 0), share_of_far(&[9, 11], 50), share_of_far(&[9, 11], 1)];

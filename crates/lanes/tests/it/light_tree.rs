@@ -1,10 +1,11 @@
-//! Tests of `lumiris_lanes::light_tree`.
+//! Tests of `lumiris_lanes::light_tree` and `lumiris_lanes::light_descent`.
 
 use super::support::assert_same_bits;
 use lumiris_lanes::lane::LANES;
-use lumiris_lanes::level;
-use lumiris_lanes::light_tree::{GlossyLobes, Receivers, first_probabilities, importances};
+use lumiris_lanes::light_descent::{DESCENTS, Descents, Photons, descend};
+use lumiris_lanes::light_tree::{GlossyLobes, Receivers, importances};
 use lumiris_lanes::vertex::Columns3;
+use lumiris_numbers::math::expected_visibility::expected_visibility;
 use lumiris_numbers::math::light_bound::{GlossyLobe, LightBound, Receiver, first_probability};
 use lumiris_numbers::math::warp::sample_uniform_sphere;
 use lumiris_numbers::math::{Sphere, Vec3};
@@ -28,46 +29,126 @@ fn bound(stream: &mut Pcg32, two_sided: bool) -> LightBound {
     LightBound::new(sphere, axis, cosines, two_sided, 1.0 + stream.random::<f32>())
 }
 
+/// N receivers, some without a surface, the first two vectors and some others without lobes.
+struct Points {
+    p: [Vec<f32>; 3],
+    ns: [Vec<f32>; 3],
+    wo: [Vec<f32>; 3],
+    /// cos_o, alpha_squared, scale, diffuse.
+    rest: [Vec<f32>; 4],
+    singles: Vec<Receiver<f32>>,
+}
+
+impl Points {
+    fn new(stream: &mut Pcg32) -> Self {
+        let mut vectors =
+            || -> Vec<Vec3> { (0..N).map(|_| sample_uniform_sphere(stream.random::<[f32; 2]>())).collect() };
+        let (p, mut ns, wo) = (vectors(), vectors(), vectors());
+        ns.iter_mut().step_by(5).for_each(|n| *n = Vec3::ZERO);
+        let has_lobe = |i: usize| i >= 2 * LANES && !i.is_multiple_of(3);
+        let lobe = |i: usize| if has_lobe(i) { GlossyLobe::new(wo[i], ns[i], 0.2, 0.6) } else { GlossyLobe::NONE };
+        let lobes: Vec<GlossyLobe> = (0..N).map(lobe).collect();
+        let rest = [
+            |l: &GlossyLobe| l.cos_o,
+            |l: &GlossyLobe| l.alpha_squared,
+            |l: &GlossyLobe| l.scale,
+            |l: &GlossyLobe| l.diffuse,
+        ]
+        .map(|of| lobes.iter().map(of).collect::<Vec<f32>>());
+        let single = |i: usize| {
+            let lobe = Some(lobes[i]).filter(|l| l.scale > 0.0);
+            Receiver { p: p[i].to_array(), ns: ns[i].to_array(), lobe }
+        };
+        let singles = (0..N).map(single).collect();
+        let wo = columns(&lobes.iter().map(|l| Vec3::from_array(l.wo)).collect::<Vec<_>>());
+        Points { p: columns(&p), ns: columns(&ns), wo, rest, singles }
+    }
+
+    fn receivers(&self) -> Receivers<'_> {
+        let [cos_o, alpha_squared, scale, diffuse] = self.rest.each_ref().map(|column| &column[..]);
+        let lobes = GlossyLobes { wo: slices(&self.wo), cos_o, alpha_squared, scale, diffuse };
+        Receivers { p: slices(&self.p), ns: slices(&self.ns), lobes: Some(lobes) }
+    }
+}
+
 #[test]
-fn probabilities_are_those_of_single_points_at_all_levels() {
+fn importances_are_those_of_single_points_at_all_levels() {
     let stream = &mut pcg32([8, 2, 1]);
-    let mut vectors = || -> Vec<Vec3> { (0..N).map(|_| sample_uniform_sphere(stream.random::<[f32; 2]>())).collect() };
-    let (p, mut ns, wo) = (vectors(), vectors(), vectors());
-    // Some points have no surface, and the first vectors have no lobes
-    ns.iter_mut().step_by(5).for_each(|n| *n = Vec3::ZERO);
-    let has_lobe = |i: usize| i >= 2 * LANES && !i.is_multiple_of(3);
-    let lobe = |i: usize| if has_lobe(i) { GlossyLobe::new(wo[i], ns[i], 0.2, 0.6) } else { GlossyLobe::NONE };
-    let lobes: Vec<GlossyLobe> = (0..N).map(lobe).collect();
-    let [cos_o, alpha_squared, scale, diffuse] = [
-        |l: &GlossyLobe| l.cos_o,
-        |l: &GlossyLobe| l.alpha_squared,
-        |l: &GlossyLobe| l.scale,
-        |l: &GlossyLobe| l.diffuse,
-    ]
-    .map(|of| lobes.iter().map(of).collect::<Vec<f32>>());
-    let wo = columns(&lobes.iter().map(|l| Vec3::from_array(l.wo)).collect::<Vec<_>>());
-    let (p_columns, ns_columns) = (columns(&p), columns(&ns));
-    let lobe_columns =
-        GlossyLobes { wo: slices(&wo), cos_o: &cos_o, alpha_squared: &alpha_squared, scale: &scale, diffuse: &diffuse };
-    let at = Receivers { p: slices(&p_columns), ns: slices(&ns_columns), lobes: Some(lobe_columns) };
+    let points = Points::new(stream);
+    let at = points.receivers();
     let mut dark = 0;
     for round in 0..40 {
-        let (a, b) = (bound(stream, round % 2 == 0), bound(stream, round % 3 == 0));
-        assert_same_bits::<2>(N, |level, [first, importance]| {
-            first_probabilities(level, [&a, &b], &at, first);
-            importances(level, &a, &at, importance);
-        });
-        let [mut first, mut importance] = [vec![-7.0; N], vec![-7.0; N]];
-        first_probabilities(level(), [&a, &b], &at, &mut first);
-        importances(level(), &a, &at, &mut importance);
-        for i in 0..N {
-            let lobe = Some(lobes[i]).filter(|l| l.scale > 0.0);
-            let receiver = Receiver { p: p[i].to_array(), ns: ns[i].to_array(), lobe };
-            let both = [a.importance(&receiver), b.importance(&receiver)];
-            assert_eq!((importance[i], first[i]), (both[0], first_probability(both, [&a, &b])), "{i}");
-            assert!((0.0..=1.0).contains(&first[i]));
-            dark += usize::from(both[0] == 0.0);
+        let bound = bound(stream, round % 2 == 0);
+        let [found] = assert_same_bits::<1>(N, |level, [importance]| importances(level, &bound, &at, importance));
+        for (found, receiver) in found.iter().zip(&points.singles) {
+            assert_eq!(*found, bound.importance(receiver));
+            dark += usize::from(*found == 0.0);
         }
     }
     assert!((50..39 * N).contains(&dark), "{dark}");
+}
+
+#[test]
+fn steps_down_a_tree_are_those_of_single_points_at_all_levels() {
+    let stream = &mut pcg32([8, 2, 2]);
+    let points = Points::new(stream);
+    let at = points.receivers();
+    let mut counts = [0; 4];
+    for round in 0..80 {
+        // Another pair of nodes for each point; every seventh point is at a leaf, some nodes are closed
+        let bounds: [Vec<LightBound>; 2] =
+            [0, 1].map(|side| (0..DESCENTS).map(|i| bound(stream, (i + side) % 3 == 0)).collect());
+        let children = bounds.each_ref().map(|bounds| std::array::from_fn(|i| &bounds[i]));
+        let mut photons = [Photons::default(); 2];
+        for photons in &mut photons {
+            photons.of_one = std::array::from_fn(|_| 10_f32.powf(4.0 * stream.random::<f32>() - 2.0));
+            photons.count = std::array::from_fn(|_| f32::from(stream.random_range(0..5_u8)) - 1.0);
+        }
+        let photons = (round % 2 == 1).then_some(photons);
+        let u: Vec<f32> = (0..DESCENTS).map(|_| stream.random::<f32>()).collect();
+        let first = round % (N / DESCENTS) * DESCENTS;
+        let mut begun = Descents::default();
+        begun.begin_rows(&at, first..first + DESCENTS, &u);
+        begun.is_inner = std::array::from_fn(|i| if i % 7 == 3 { 0.0 } else { 1.0 });
+
+        // All levels
+        let outputs = |d: &Descents| [d.u, d.pmf, d.is_left, d.importance, d.diffuse_importance];
+        let [found_u, pmf, is_left, importance, diffuse] = assert_same_bits::<5>(DESCENTS, |level, out| {
+            let mut descents = begun;
+            descend(level, [&children[0], &children[1]], photons.as_ref(), &mut descents);
+            out.into_iter().zip(outputs(&descents)).for_each(|(out, row)| out.copy_from_slice(&row));
+        });
+
+        // Single points
+        for i in 0..DESCENTS {
+            if begun.is_inner[i] == 0.0 {
+                assert_eq!((found_u[i], pmf[i], importance[i]), (u[i], 1.0, 0.0));
+                continue;
+            }
+            let receiver = &points.singles[first + i];
+            let of_diffuse = Receiver { lobe: None, ..*receiver };
+            let nodes = [children[0][i], children[1][i]];
+            let reflected = nodes.map(|node| node.importance(receiver));
+            let e = nodes.map(|node| node.importance(&of_diffuse));
+            let weight = |side: usize| match &photons {
+                Some(photons) if photons[side].count[i] < 0.0 => 0.0,
+                Some(photons) => {
+                    let Photons { of_one, count } = &photons[side];
+                    reflected[side] * expected_visibility(e[side], of_one[i], count[i]).sqrt()
+                }
+                None => reflected[side],
+            };
+            let p = first_probability([weight(0), weight(1)], nodes.map(LightBound::intensity));
+            let side = usize::from(u[i] >= p);
+            let taken = [p, 1.0 - p][side];
+            assert_eq!((is_left[i] == 1.0, pmf[i]), (side == 0, taken), "{i}");
+            assert!((0.0..1.0).contains(&found_u[i]));
+            assert_eq!(importance[i], reflected[side]);
+            assert!(photons.is_none() || diffuse[i] == e[side]);
+            counts[side] += 1;
+            counts[2] += usize::from(taken == 1.0);
+            counts[3] += usize::from(reflected[side] != e[side]);
+        }
+    }
+    assert!(counts.iter().all(|&count| count > 100), "{counts:?}");
 }

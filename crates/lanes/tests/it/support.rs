@@ -14,17 +14,22 @@ pub(crate) fn levels() -> Vec<Level> {
 /// Lengths with and without full vectors.
 pub(crate) const LENGTHS: [usize; 12] = [0, 1, 3, 4, 7, 8, 9, 16, 23, 32, 77, 128];
 
-/// Asserts that `run` writes the same bits at all levels.
-pub(crate) fn assert_same_bits<const N: usize>(len: usize, mut run: impl FnMut(Level, [&mut [f32]; N])) {
-    let mut first: Option<[Vec<u32>; N]> = None;
+/// Asserts that `run` writes the same bits at all levels. Returns the numbers.
+pub(crate) fn assert_same_bits<const N: usize>(
+    len: usize,
+    mut run: impl FnMut(Level, [&mut [f32]; N]),
+) -> [Vec<f32>; N] {
+    let (mut first, mut last): (Option<[Vec<u32>; N]>, _) = (None, [const { Vec::new() }; N]);
     for level in levels() {
         let mut out: [Vec<f32>; N] = std::array::from_fn(|_| vec![-7.0; len]);
         run(level, out.each_mut().map(|v| &mut v[..]));
         // Payloads of NaN may differ
-        let bits = out.map(|v| v.iter().map(|x| if x.is_nan() { u32::MAX } else { x.to_bits() }).collect());
+        let bits = out.each_ref().map(|v| v.iter().map(|x| if x.is_nan() { u32::MAX } else { x.to_bits() }).collect());
         match &first {
             None => first = Some(bits),
             Some(first) => assert_eq!(*first, bits, "{level:?}, {len} lanes"),
         }
+        last = out;
     }
+    last
 }

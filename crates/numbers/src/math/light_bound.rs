@@ -28,22 +28,13 @@ const MAX_SHARE: f32 = 0.95;
 /// A vector, by component.
 type Three<N> = [N; 3];
 
-/// Lights within a sphere and a cone of normals.
+/// Number of the fields of a bound.
+pub const BOUND_FIELDS: usize = 12;
+
+/// Lights within a sphere and a cone of normals: centre of the sphere, its squared radius, axis of the cone (unit), cos
+/// and sin of its half-angle θo, cos θe, the intensity I, and 1 if both sides emit, else 0.
 #[derive(Clone, Copy, Debug)]
-pub struct LightBound {
-    /// Centre of the sphere.
-    pub center: Vec3,
-    /// Square of its radius.
-    pub radius_squared: f32,
-    /// Axis of the cone, unit.
-    pub axis: Vec3,
-    cos_theta_o: f32,
-    sin_theta_o: f32,
-    cos_theta_e: f32,
-    /// I, in the unit of intensities.
-    pub intensity: f32,
-    two_sided: bool,
-}
+pub struct LightBound<N = f32>([N; BOUND_FIELDS]);
 
 /// The data of a point for the choice of a light.
 #[derive(Clone, Copy, Debug)]
@@ -54,6 +45,25 @@ pub struct Receiver<N> {
     pub ns: Three<N>,
     /// The glossy lobe, if any.
     pub lobe: Option<GlossyLobe<N>>,
+}
+
+impl Receiver<f32> {
+    /// The point in all lanes of a number like `number`.
+    #[inline(always)]
+    pub fn in_lanes<N: Number>(&self, number: N) -> Receiver<N> {
+        let lobe = if let Some(GlossyLobe { wo, cos_o, alpha_squared, scale, diffuse }) = self.lobe {
+            Some(GlossyLobe {
+                wo: three(number, wo),
+                cos_o: number.constant(cos_o),
+                alpha_squared: number.constant(alpha_squared),
+                scale: number.constant(scale),
+                diffuse: number.constant(diffuse),
+            })
+        } else {
+            None
+        };
+        Receiver { p: three(number, self.p), ns: three(number, self.ns), lobe }
+    }
 }
 
 /// A lobe that reflects light to the viewer, beside a diffuse part.
@@ -74,8 +84,8 @@ pub struct GlossyLobe<N = f32> {
 // No closures: in kernels their code would be compiled without vector instructions
 
 #[inline(always)]
-fn three<N: Number>(number: N, v: Vec3) -> Three<N> {
-    [number.constant(v.x), number.constant(v.y), number.constant(v.z)]
+fn three<N: Number>(number: N, [x, y, z]: Three<f32>) -> Three<N> {
+    [number.constant(x), number.constant(y), number.constant(z)]
 }
 
 #[inline(always)]
@@ -112,19 +122,66 @@ impl LightBound {
         intensity: f32,
     ) -> Self {
         let (radius_squared, sin_theta_o) = (sqr(radius), safe_sqrt(1.0 - sqr(cos_theta_o)));
-        LightBound { center, radius_squared, axis, cos_theta_o, sin_theta_o, cos_theta_e, intensity, two_sided }
+        let ([x, y, z], [ax, ay, az]) = (center.to_array(), axis.to_array());
+        let sides = if two_sided { 1.0 } else { 0.0 };
+        let cosines = [cos_theta_o, sin_theta_o, cos_theta_e];
+        LightBound([x, y, z, radius_squared, ax, ay, az, cosines[0], cosines[1], cosines[2], intensity, sides])
+    }
+
+    /// The bound in all lanes of a number like `number`.
+    #[inline(always)]
+    pub fn in_lanes<N: Number>(&self, number: N) -> LightBound<N> {
+        let [x, y, z, r2, ax, ay, az, cos_o, sin_o, cos_e, intensity, two_sided] = self.0;
+        LightBound([
+            number.constant(x),
+            number.constant(y),
+            number.constant(z),
+            number.constant(r2),
+            number.constant(ax),
+            number.constant(ay),
+            number.constant(az),
+            number.constant(cos_o),
+            number.constant(sin_o),
+            number.constant(cos_e),
+            number.constant(intensity),
+            number.constant(two_sided),
+        ])
+    }
+
+    /// Square of the sphere's radius.
+    pub fn radius_squared(&self) -> f32 {
+        self.0[3]
+    }
+
+    /// The fields, for [`Self::of_fields`].
+    #[inline(always)]
+    pub fn fields(&self) -> &[f32; BOUND_FIELDS] {
+        &self.0
+    }
+}
+
+impl<N: Number> LightBound<N> {
+    /// The bound with these fields.
+    #[inline(always)]
+    pub fn of_fields(fields: [N; BOUND_FIELDS]) -> Self {
+        LightBound(fields)
+    }
+
+    /// I, in the unit of intensities.
+    #[inline(always)]
+    pub fn intensity(&self) -> N {
+        self.0[10]
     }
 
     /// Upper bound, up to a common factor, of the contribution of the lights; 0 if none can contribute.
     #[inline(always)]
-    pub fn importance<N: Number>(&self, at: &Receiver<N>) -> N {
+    pub fn importance(&self, at: &Receiver<N>) -> N {
         let number = at.p[0];
         let (zero, one, slack) = (number.constant(0.0), number.constant(1.0), number.constant(COSINE_SLACK));
-        let (center, axis) = (three(number, self.center), three(number, self.axis));
-        let radius_squared = number.constant(self.radius_squared);
-        let near = number.constant(if self.radius_squared > 0.0 { self.intensity / self.radius_squared } else { 0.0 });
+        let [x, y, z, radius_squared, ax, ay, az, cos_theta_o, sin_theta_o, cos_theta_e, intensity, two_sided] = self.0;
+        let near = radius_squared.if_above(zero, intensity / radius_squared, zero);
 
-        let d = [center[0] - at.p[0], center[1] - at.p[1], center[2] - at.p[2]];
+        let d = [x - at.p[0], y - at.p[1], z - at.p[2]];
         let d2 = dot(d, d);
         if radius_squared.is_above(d2) {
             return near;
@@ -135,17 +192,17 @@ impl LightBound {
         let b = [sin2_b.root(), (one - sin2_b).greater(zero).root()];
 
         // Angle between the axis and the direction to p, minus the cone of normals, minus the angular extent
-        let cos_axis = zero - dot(wi, axis);
-        let cos_w = if self.two_sided { cos_axis.magnitude() } else { cos_axis };
+        let cos_axis = zero - dot(wi, [ax, ay, az]);
+        let cos_w = two_sided.if_above(zero, cos_axis.magnitude(), cos_axis);
         let w = [other(cos_w), cos_w];
-        let o = [number.constant(self.sin_theta_o), number.constant(self.cos_theta_o)];
+        let o = [sin_theta_o, cos_theta_o];
         let x = [sin_of_difference(w, o), cos_of_difference(w, o)];
         let cos_light = cos_of_difference(x, b);
-        let is_seen = number.constant(self.cos_theta_e - COSINE_SLACK);
+        let is_seen = cos_theta_e - slack;
         if is_seen.is_above(cos_light) {
             return radius_squared.if_at_least(d2, near, zero);
         }
-        let importance = number.constant(self.intensity) * cos_light.greater(slack) / d2;
+        let importance = intensity * cos_light.greater(slack) / d2;
         let importance = cos_light.if_at_least(is_seen, importance, zero);
 
         // The surface may transmit, so light from behind counts too
@@ -160,9 +217,9 @@ impl LightBound {
 
 /// Probability of the first of two bounds, by their importances. If neither can contribute, the intensities decide.
 #[inline(always)]
-pub fn first_probability<N: Number>([a, b]: [N; 2], [first, second]: [&LightBound; 2]) -> N {
+pub fn first_probability<N: Number>([a, b]: [N; 2], intensities: [N; 2]) -> N {
     let (zero, least, most) = (a.constant(0.0), a.constant(MIN_PROBABILITY), a.constant(1.0 - MIN_PROBABILITY));
-    let p = (a / (a + b)).finite_or(a.constant(first.intensity / (first.intensity + second.intensity)));
+    let p = (a / (a + b)).finite_or(intensities[0] / (intensities[0] + intensities[1]));
     a.if_above(zero, b.if_above(zero, p.greater(least).lesser(most), p), p)
 }
 

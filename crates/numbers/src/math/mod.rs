@@ -14,6 +14,7 @@ pub mod bounds;
 pub mod cumulative;
 pub mod distribution;
 pub mod elementary;
+pub mod expected_visibility;
 pub mod frame;
 pub mod hash;
 pub mod light_bound;
