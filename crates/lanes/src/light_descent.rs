@@ -1,5 +1,5 @@
 //! Descents of a light tree from several points at once, level by level: the choice between the children of a node, which
-//! is another node for each point. Also the expected contributions of several lights at one point.
+//! is another node for each point. Also several nodes or lights at one point.
 //!
 //! The formulas are in [`lumiris_numbers::math::light_bound`] and [`lumiris_numbers::math::expected_visibility`].
 
@@ -282,5 +282,32 @@ fn expect_lanes<S: Simd>(
         let (of_one, photons) = (Wide(load(simd, &photons.of_one, i)), Wide(load(simd, &photons.count, i)));
         store(importance.0, &mut out.importance, i);
         store(expected_visibility(e, of_one, photons).0, &mut out.visibility, i);
+    }
+}
+
+/// For each of the first `count` nodes, the probability of its left child at a point.
+pub fn left_probabilities(
+    level: Level,
+    at: &Receiver<f32>,
+    children: [&Bounds<'_>; 2],
+    count: usize,
+    out: &mut [f32; DESCENTS],
+) {
+    dispatch!(level, simd => left_lanes(simd, at, children, count, out));
+}
+
+#[inline(always)]
+fn left_lanes<S: Simd>(
+    simd: S,
+    at: &Receiver<f32>,
+    children: [&Bounds<'_>; 2],
+    count: usize,
+    out: &mut [f32; DESCENTS],
+) {
+    let at = at.in_lanes(Wide(F::splat(simd, 0.0)));
+    for i in (0..count.min(DESCENTS)).step_by(LANES) {
+        let [left, right] = [gathered(simd, &children[0][i..i + LANES]), gathered(simd, &children[1][i..i + LANES])];
+        let importances = [left.importance(&at), right.importance(&at)];
+        store(first_probability(importances, [left.intensity(), right.intensity()]).0, out, i);
     }
 }

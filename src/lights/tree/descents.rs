@@ -102,7 +102,7 @@ impl LightTree {
         (pmf > 0.0).then_some(SampledLight { light, pmf, u: descents.u[lane] })
     }
 
-    /// Follows the first `count` descents from the root to leaves. The others end at the last leaf, which they never left.
+    /// Follows the first `count` descents from the root to leaves. The others stay at a leaf.
     #[inline]
     fn descend_lanes(
         &self,

@@ -5,13 +5,14 @@ use super::build::{Item, build};
 use super::node::Node;
 use super::sampled_light::{LightRun, SampledLight, UNIT};
 use crate::lights::{Light, LightBounds, LightCtx, LightId};
+use lumiris_lanes::level;
+use lumiris_lanes::light_descent::{DESCENTS, left_probabilities};
 use lumiris_numbers::math::ONE_MINUS_EPSILON;
 use lumiris_numbers::math::light_bound::{LightBound, first_probability};
 use rayon::prelude::*;
+use smallvec::SmallVec;
 use std::hint::select_unpredictable;
 
-/// Maximum size of the stack of subtrees in [`LightTree::runs`]: one per level.
-const MAX_DEPTH: usize = 66;
 /// Trail of lights that are not in the tree.
 const NO_TRAIL: u64 = u64::MAX;
 
@@ -35,7 +36,7 @@ pub struct CutNode {
 }
 
 /// A subtree, and the positions that chose it.
-#[derive(Clone, Copy, Default)]
+#[derive(Clone, Copy)]
 struct SubtreeRun {
     root: u32,
     pmf: f32,
@@ -186,40 +187,61 @@ impl LightTree {
 
     /// Appends runs for the positions. They descend the tree together, so that each node is evaluated once.
     pub fn runs(&self, ctx: &LightCtx, at: RunPositions<'_>, out: &mut Vec<LightRun>) {
-        let mut stack = [SubtreeRun::default(); MAX_DEPTH];
+        let first_run = out.len();
         let range = [at.first as u32, at.positions.len() as u32];
-        stack[0] = SubtreeRun { root: 0, pmf: 1.0, range, interval: [at.start, 1.0] };
-        let mut size = 1;
-        while size > 0 {
-            size -= 1;
-            let SubtreeRun { root, pmf, range: [first, end], interval } = stack[size];
-            if first == end {
-                continue;
-            }
-            let node = &self.nodes[root as usize];
-            if node.is_leaf {
-                if pmf > 0.0 {
-                    let pmf = pmf * at.fraction;
-                    out.push(LightRun { light: node.light_or_right_child, pmf, range: [first, end], interval });
+        let mut queue = SmallVec::<[SubtreeRun; DESCENTS]>::new();
+        queue.push(SubtreeRun { root: 0, pmf: 1.0, range, interval: [at.start, 1.0] });
+        let mut done = 0;
+        while done < queue.len() {
+            let batch = done..queue.len().min(done + DESCENTS);
+            done = batch.end;
+            let p = self.left_probabilities(ctx, &queue[batch.clone()]);
+            for (i, p) in batch.zip(p) {
+                let SubtreeRun { root, pmf, range: [first, end], interval } = queue[i];
+                let node = &self.nodes[root as usize];
+                if node.is_leaf {
+                    if pmf > 0.0 && first < end {
+                        let pmf = pmf * at.fraction;
+                        out.push(LightRun { light: node.light_or_right_child, pmf, range: [first, end], interval });
+                    }
+                    continue;
                 }
-                continue;
-            }
 
-            // Split the positions at the boundary between the children
-            let p = self.left_probability(ctx, root);
-            let middle = interval[0] + (interval[1] - interval[0]) * f64::from(p);
-            let is_left = |&x: &u32| f64::from(x) * UNIT < middle;
-            let split = first + at.positions[first as usize..end as usize].partition_point(is_left) as u32;
-            stack[size] = SubtreeRun {
-                root: node.light_or_right_child,
-                pmf: pmf * (1.0 - p),
-                range: [split, end],
-                interval: [middle, interval[1]],
-            };
-            stack[size + 1] =
-                SubtreeRun { root: root + 1, pmf: pmf * p, range: [first, split], interval: [interval[0], middle] };
-            size += 2;
+                // Split the positions at the boundary between the children
+                let middle = interval[0] + (interval[1] - interval[0]) * f64::from(p);
+                let is_left = |&x: &u32| f64::from(x) * UNIT < middle;
+                let split = first + at.positions[first as usize..end as usize].partition_point(is_left) as u32;
+                if first < split {
+                    let interval = [interval[0], middle];
+                    queue.push(SubtreeRun { root: root + 1, pmf: pmf * p, range: [first, split], interval });
+                }
+                if split < end {
+                    let (root, pmf) = (node.light_or_right_child, pmf * (1.0 - p));
+                    queue.push(SubtreeRun { root, pmf, range: [split, end], interval: [middle, interval[1]] });
+                }
+            }
         }
+        out[first_run..].sort_unstable_by_key(|run| run.range[0]);
+    }
+
+    /// The probabilities of the left children of at most [`DESCENTS`] subtrees; undefined for leaves.
+    fn left_probabilities(&self, ctx: &LightCtx, subtrees: &[SubtreeRun]) -> [f32; DESCENTS] {
+        let is_inner = |subtree: &SubtreeRun| !self.nodes[subtree.root as usize].is_leaf;
+        let mut p = [0.0; DESCENTS];
+        match subtrees {
+            // A vector would be slower
+            [subtree] if is_inner(subtree) => p[0] = self.left_probability(ctx, subtree.root),
+            _ if subtrees.iter().any(is_inner) => {
+                let mut children = [[&self.nodes[0].bound; DESCENTS]; 2];
+                for (i, subtree) in subtrees.iter().enumerate().filter(|(_, subtree)| is_inner(subtree)) {
+                    [children[0][i], children[1][i]] = self.children(subtree.root as usize).map(|child| &child.bound);
+                }
+                let [left, right] = &children;
+                left_probabilities(level(), &ctx.receiver(), [left, right], subtrees.len(), &mut p);
+            }
+            _ => {}
+        }
+        p
     }
 
     /// At most `max` disjoint subtrees that together hold all lights, by their root nodes. Repeatedly splits the

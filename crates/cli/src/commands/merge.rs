@@ -84,6 +84,10 @@ fn merge_one(args: &MergeArgs, denoiser: Option<&Denoiser>) -> anyhow::Result<()
         return Err(UsageError(format!("{} is given twice", path.display())).into());
     }
     args.output_options.check(&args.output);
+    let mut absent = args.parts.iter().filter(|path| !path.exists());
+    if let (Some(first), more @ 1..) = (absent.next(), absent.count()) {
+        bail!("{} and {more} more of {} parts do not exist", first.display(), args.parts.len());
+    }
 
     // Merge and denoise
     let merged = merge(&args.parts, args.allow_missing)?;

@@ -2,7 +2,7 @@
 
 use super::support::assert_same_bits;
 use lumiris_lanes::lane::LANES;
-use lumiris_lanes::light_descent::{DESCENTS, Descents, Photons, descend};
+use lumiris_lanes::light_descent::{DESCENTS, Descents, Expected, Photons, descend, expect, left_probabilities};
 use lumiris_lanes::light_tree::{GlossyLobes, Receivers, importances};
 use lumiris_lanes::vertex::Columns3;
 use lumiris_numbers::math::expected_visibility::expected_visibility;
@@ -151,4 +151,35 @@ fn steps_down_a_tree_are_those_of_single_points_at_all_levels() {
         }
     }
     assert!(counts.iter().all(|&count| count > 100), "{counts:?}");
+}
+
+#[test]
+fn nodes_and_lights_at_a_point_are_those_of_single_ones_at_all_levels() {
+    let stream = &mut pcg32([8, 2, 3]);
+    let points = Points::new(stream);
+    for (round, at) in points.singles.iter().enumerate() {
+        let bounds: [Vec<LightBound>; 2] =
+            [0, 1].map(|side| (0..DESCENTS).map(|i| bound(stream, (i + side) % 3 == 0)).collect());
+        let [left, right] = bounds.each_ref().map(|bounds| std::array::from_fn(|i| &bounds[i]));
+        let photons = Photons {
+            of_one: std::array::from_fn(|_| 10_f32.powf(4.0 * stream.random::<f32>() - 2.0)),
+            count: std::array::from_fn(|i| (i % 5) as f32),
+        };
+        let count = 1 + round % DESCENTS;
+        let [importance, visibility, p] = assert_same_bits::<3>(count, |level, [importance, visibility, p]| {
+            let (mut expected, mut of_left) = (Expected::default(), [0.0; DESCENTS]);
+            expect(level, at, &left, &photons, count, &mut expected);
+            left_probabilities(level, at, [&left, &right], count, &mut of_left);
+            importance.copy_from_slice(&expected.importance[..count]);
+            visibility.copy_from_slice(&expected.visibility[..count]);
+            p.copy_from_slice(&of_left[..count]);
+        });
+        for i in 0..count {
+            let e = left[i].importance(&Receiver { lobe: None, ..*at });
+            let both = [left[i].importance(at), right[i].importance(at)];
+            assert_eq!(importance[i], both[0]);
+            assert_eq!(visibility[i], expected_visibility(e, photons.of_one[i], photons.count[i]));
+            assert_eq!(p[i], first_probability(both, [left[i].intensity(), right[i].intensity()]));
+        }
+    }
 }
