@@ -47,6 +47,10 @@ impl Photons {
 /// The bounds of descents.
 #[inline(always)]
 fn gathered<S: Simd>(simd: S, bounds: &[&LightBound]) -> LightBound<Wide<S>> {
+    // At the root all are the same
+    if bounds.iter().fold(true, |all, bound| all & std::ptr::eq(*bound, bounds[0])) {
+        return bounds[0].in_lanes(Wide(F::splat(simd, 0.0)));
+    }
     let [x, y, z, r2, ax, ay, az, cos_o] = fields_from(simd, bounds, 0);
     let [_, _, _, _, sin_o, cos_e, intensity, two_sided] = fields_from(simd, bounds, BOUND_FIELDS - LANES);
     LightBound::of_fields([x, y, z, r2, ax, ay, az, cos_o, sin_o, cos_e, intensity, two_sided])

@@ -112,10 +112,12 @@ impl LightTree {
     ) -> [u32; DESCENTS] {
         let mut nodes = [self.nodes.len() as u32 - 1; DESCENTS];
         nodes[..count].fill(0);
-        let (mut children, mut of_children) = ([[&self.nodes[0].bound; DESCENTS]; 2], [Photons::default(); 2]);
-        loop {
+        let mut children = [[&self.nodes[0].bound; DESCENTS]; 2];
+        let mut of_children = photons.map(|_| [Photons::default(); 2]);
+        let mut is_any_inner = self.has_choice();
+        while is_any_inner {
             // The children. Descents at a leaf stay there, without branches, which would be predicted wrongly
-            let (mut pairs, mut are_done) = ([[0; 2]; DESCENTS], true);
+            let mut pairs = [[0; 2]; DESCENTS];
             for lane in 0..DESCENTS {
                 let index = nodes[lane];
                 let node = &self.nodes[index as usize];
@@ -123,16 +125,12 @@ impl LightTree {
                 children[0][lane] = &self.nodes[pair[0] as usize].bound;
                 children[1][lane] = &self.nodes[pair[1] as usize].bound;
                 descents.is_inner[lane] = f32::from(u8::from(!node.is_leaf));
-                are_done &= node.is_leaf;
                 pairs[lane] = pair;
-            }
-            if are_done {
-                return nodes;
             }
 
             // The photons below them, and the choice
             let mut middles = [0; DESCENTS];
-            if let Some(TreePhotons { of_one, leaves }) = &photons {
+            if let (Some(TreePhotons { of_one, leaves }), Some(of_children)) = (&photons, &mut of_children) {
                 for (lane, (pair, leaves)) in pairs.iter().zip(leaves).enumerate() {
                     middles[lane] = leaves.partition_point(|&leaf| leaf < pair[1]);
                     let counts = [middles[lane], leaves.len() - middles[lane]];
@@ -143,17 +141,20 @@ impl LightTree {
                     }
                 }
             }
-            descend(level(), [&children[0], &children[1]], photons.map(|_| &of_children), descents);
+            descend(level(), [&children[0], &children[1]], of_children.as_ref(), descents);
 
             // The chosen children
+            is_any_inner = false;
             for (lane, pair) in pairs.iter().enumerate() {
                 let is_left = descents.is_left[lane] > 0.0;
                 nodes[lane] = select_unpredictable(is_left, pair[0], pair[1]);
+                is_any_inner |= !self.nodes[nodes[lane] as usize].is_leaf;
                 if let Some(TreePhotons { leaves, .. }) = &mut photons {
                     let (left, right) = leaves[lane].split_at(middles[lane]);
                     leaves[lane] = if is_left { left } else { right };
                 }
             }
         }
+        nodes
     }
 }
