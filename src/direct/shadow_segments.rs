@@ -58,8 +58,8 @@ impl Segments {
         self.lights.push(light);
     }
 
-    /// Collects the segments of all candidates with a finite, non-zero contribution, in candidate order. The segments
-    /// of a shading point, which share their origin, stay together.
+    /// Collects the segments of all candidates with a finite, non-zero contribution, in candidate order: the segments
+    /// of a shading point and technique, which share their origin, are neighbours.
     pub fn gather(&mut self, candidates: &Candidates) {
         self.clear();
         for (candidate, &contribution) in candidates.records.iter().zip(&candidates.contributions) {

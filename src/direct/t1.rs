@@ -46,7 +46,7 @@ impl T1<'_> {
     }
 
     /// Draws the light samples of all points. `draw` adds the candidates of a point and returns its number of samples.
-    /// Counts the samples of both techniques.
+    /// Counts the samples of both techniques, without those that `contributing` draws later.
     pub(super) fn draw_lights(
         &mut self,
         allocate: impl Fn(&ShadingPoint<'_>) -> SampleAllocation,

@@ -1,10 +1,10 @@
-//! Descents of a light tree from several points at once, level by level: the choice between the children of a node, which
-//! is another node for each point. Also several nodes or lights at one point.
+//! Descents of a light tree from several points at once: each step chooses between the children of a node, a different
+//! node in each lane. Also evaluates several nodes or lights at one point.
 //!
 //! The formulas are in [`lumiris_numbers::math::light_bound`] and [`lumiris_numbers::math::expected_visibility`].
 
 use super::lane::{F, LANES, load, or_zero, store};
-use super::light_tree::Receivers;
+use super::light_tree::{GlossyLobes, Receivers, receiver};
 use super::wide::Wide;
 use fearless_simd::{Level, Simd, dispatch, prelude::*};
 use lumiris_numbers::math::ONE_MINUS_EPSILON;
@@ -24,7 +24,7 @@ pub type Bounds<'a> = [&'a LightBound; DESCENTS];
 pub struct Photons {
     /// Irradiance at which one photon is expected.
     pub of_one: [f32; DESCENTS],
-    /// Number of photons; −1 for a node that is not chosen if the other child of its parent can contribute.
+    /// Number of photons. −1: the node has weight 0, so that it is chosen only if its sibling has weight 0 too.
     pub count: [f32; DESCENTS],
 }
 
@@ -56,8 +56,8 @@ fn gathered<S: Simd>(simd: S, bounds: &[&LightBound]) -> LightBound<Wide<S>> {
     LightBound::of_fields([x, y, z, r2, ax, ay, az, cos_o, sin_o, cos_e, intensity, two_sided])
 }
 
-/// [`LANES`] fields of the bounds, from field `first` on: the transpose of their rows. Each of three steps moves the
-/// highest bit of the index of the row to the lowest bit of the index in the row, and that bit up into the other.
+/// [`LANES`] fields of the bounds, from field `first` on. A transpose in three steps; each interleaves the first and
+/// the second half of the rows.
 #[inline(always)]
 fn fields_from<S: Simd>(simd: S, bounds: &[&LightBound], first: usize) -> [Wide<S>; LANES] {
     let mut rows = [F::splat(simd, 0.0); LANES];
@@ -95,27 +95,17 @@ struct ReceiverLanes {
 
 impl ReceiverLanes {
     #[inline(always)]
-    fn load<S: Simd>(&self, simd: S, i: usize) -> Receiver<Wide<S>> {
-        let scale = load(simd, &self.scale, i);
-        let has_lobes = scale.simd_gt(F::splat(simd, 0.0)).any_true();
-        let lobe = GlossyLobe {
-            wo: three(simd, &self.wo, i),
-            cos_o: Wide(load(simd, &self.cos_o, i)),
-            alpha_squared: Wide(load(simd, &self.alpha_squared, i)),
-            scale: Wide(scale),
-            diffuse: Wide(load(simd, &self.diffuse, i)),
+    fn columns(&self) -> Receivers<'_> {
+        let ReceiverLanes { p: [px, py, pz], ns: [nx, ny, nz], wo: [wx, wy, wz], .. } = self;
+        let lobes = GlossyLobes {
+            wo: [wx, wy, wz],
+            cos_o: &self.cos_o,
+            alpha_squared: &self.alpha_squared,
+            scale: &self.scale,
+            diffuse: &self.diffuse,
         };
-        Receiver {
-            p: three(simd, &self.p, i),
-            ns: three(simd, &self.ns, i),
-            lobe: if has_lobes { Some(lobe) } else { None },
-        }
+        Receivers { p: [px, py, pz], ns: [nx, ny, nz], lobes: Some(lobes) }
     }
-}
-
-#[inline(always)]
-fn three<S: Simd>(simd: S, rows: &[[f32; DESCENTS]; 3], i: usize) -> [Wide<S>; 3] {
-    [Wide(load(simd, &rows[0], i)), Wide(load(simd, &rows[1], i)), Wide(load(simd, &rows[2], i))]
 }
 
 /// Descents from several points.
@@ -211,7 +201,7 @@ fn descend_lanes<S: Simd>(
         if !is_inner.any_true() {
             continue;
         }
-        let at = descents.at.load(simd, i);
+        let at = receiver(simd, &descents.at.columns(), i);
         let [left, right] = [gathered(simd, &children[0][i..i + LANES]), gathered(simd, &children[1][i..i + LANES])];
         let reflected = [left.importance(&at), right.importance(&at)];
         let (mut weights, mut e) = (reflected, reflected);

@@ -1,4 +1,4 @@
-//! Probabilities in a light tree for many points at once: the choice between the branches near the root.
+//! Importance of a bound of lights at many points at once.
 //!
 //! The formulas are in [`lumiris_numbers::math::light_bound`].
 
@@ -64,7 +64,7 @@ fn importances_lanes<S: Simd>(simd: S, bound: &LightBound, at: &Receivers<'_>, o
 }
 
 #[inline(always)]
-fn receiver<S: Simd>(simd: S, at: &Receivers<'_>, i: usize) -> Receiver<Wide<S>> {
+pub(crate) fn receiver<S: Simd>(simd: S, at: &Receivers<'_>, i: usize) -> Receiver<Wide<S>> {
     let (p, ns) = (three(simd, at.p, i), three(simd, at.ns, i));
     let mut lobe = None;
     if let Some(lobes) = &at.lobes {

@@ -115,7 +115,7 @@ impl ColumnDirectLighting {
         stats.proposals += sum(light) + sum(bsdf);
 
         // Choice of lights
-        self.scratch.begin(vertices.surface.lit_points());
+        self.scratch.begin(&job.lights, vertices.surface.lit_points());
         if techniques.has_controls {
             self.controls.begin(job, vertices);
             let is_unusual = |(i, a): (usize, &SampleAllocation)| (*a != usual).then_some(i);

@@ -130,7 +130,7 @@ struct BatchSamples<'a, 'b> {
     estimator: Contributing,
     job: &'a RenderJob,
     buffers: &'b mut ContributingBuffers,
-    /// The samples at each point that draws any.
+    /// The light samples of each point; `None` if it draws none. May be shorter than the points.
     of_points: Vec<Option<PointSamples<'a>>>,
 }
 
@@ -207,10 +207,6 @@ fn survival(noncontributing: &NoncontributingLight, scale: f32) -> f32 {
 struct PendingSample<'s, 'a, 'p> {
     at: At<'a, 'p>,
     samples: &'s PointSamples<'a>,
-    /// Number of such samples at the point.
-    n: u32,
-    /// Survival probability per expected contribution.
-    scale: f32,
     u_survival: f32,
     /// Random numbers of the direction.
     u: [f32; 2],
@@ -418,7 +414,7 @@ impl BatchSamples<'_, '_> {
         let (mut draws, mut pending) = (Vec::new(), Vec::new());
         for ((index, point), samples) in (0..).zip(points).zip(&self.of_points) {
             let Some(samples) = samples else { continue };
-            let Others::Noncontributing { n, scale } = samples.others else { continue };
+            let Others::Noncontributing { n, .. } = samples.others else { continue };
             if samples.contributing.lights.len() == lights.lit.len() {
                 continue;
             }
@@ -427,24 +423,26 @@ impl BatchSamples<'_, '_> {
             for i in 0..n {
                 let [u, u_survival, u0, u1] = point.stream.split(domain::NONCONTRIBUTING, n, i).draw::<4>();
                 draws.push(NoncontributingDraw { ctx: at.ctx, contributing, singles, u });
-                pending.push(PendingSample { at: at.clone(), samples, n, scale, u_survival, u: [u0, u1] });
+                pending.push(PendingSample { at: at.clone(), samples, u_survival, u: [u0, u1] });
             }
         }
 
         // Choose their lights, and sample those that survive
         let mut count = 0;
         for (chosen, pending) in learned.sample_noncontributing(&draws).iter().zip(&pending) {
-            let PendingSample { at, samples, n, scale, u_survival, u } = pending;
-            let Some(noncontributing) = chosen else { continue };
+            let PendingSample { at, samples, u_survival, u } = pending;
+            let (Some(noncontributing), Others::Noncontributing { n, scale }) = (chosen, samples.others) else {
+                continue;
+            };
             let SampledLight { light, pmf, .. } = noncontributing.sampled;
             // Contributing lights have their own samples
             if samples.contributing.index_of(light).is_some() || !(noncontributing.expected.importance > 0.0) {
                 continue;
             }
-            let survival = survival(noncontributing, *scale);
+            let survival = survival(noncontributing, scale);
             if *u_survival < survival {
                 count += 1;
-                records.extend(at.sample(light, *n as f32 * pmf * survival, *u, samples, buffers));
+                records.extend(at.sample(light, n as f32 * pmf * survival, *u, samples, buffers));
             }
         }
         count

@@ -179,9 +179,11 @@ pub struct Scratch {
 }
 
 impl Scratch {
-    /// Prepares for samples at the points `at`; each point may be sampled several times.
-    pub fn begin(&mut self, at: LitPoints<'_>) {
-        self.lobes.set(at.lobes);
+    /// Prepares for samples of `lights` at the points `at`; each point may be sampled several times.
+    pub fn begin(&mut self, lights: &JobLights, at: LitPoints<'_>) {
+        if matches!(lights.sampler, LightSampler::Tree(_)) && lights.sampler.only_light().is_none() {
+            self.lobes.set(at.lobes);
+        }
     }
 
     /// The light that point `i` chose in the last [`JobLights::sample_many`], if there is more than one light.
@@ -472,7 +474,7 @@ mod tests {
         let at = LitPoints { p: &p, n: &n, ns: &ns, lobes: &lobes };
         let (mut scratch, mut out) = (Scratch::default(), LightSamples::default());
         out.reserve(len);
-        scratch.begin(at);
+        scratch.begin(&lights, at);
         for _ in 0..3 {
             u.iter_mut().for_each(|u| u[..N].fill_with(|| stream.random::<f32>()));
             lights.sample_many(N, at, &u, &mut scratch, &mut out);

@@ -41,7 +41,7 @@ struct TreePhotons<'a> {
 
 impl LightTree {
     /// Chooses a light by each of `u` at the points `rows`, at most [`DESCENTS`], as [`Self::sample`]. `None` if there is
-    /// none. `descents` are memory.
+    /// none. `descents` is scratch memory.
     pub(in crate::lights) fn sample_rows(
         &self,
         at: &Receivers<'_>,
@@ -128,7 +128,7 @@ impl LightTree {
                 pairs[lane] = pair;
             }
 
-            // The photons below them, and the choice
+            // The photons below them, as in `left_by`, and the choice
             let mut middles = [0; DESCENTS];
             if let (Some(TreePhotons { of_one, leaves }), Some(of_children)) = (&photons, &mut of_children) {
                 for (lane, (pair, leaves)) in pairs.iter().zip(leaves).enumerate() {

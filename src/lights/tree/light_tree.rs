@@ -187,6 +187,9 @@ impl LightTree {
 
     /// Appends runs for the positions. They descend the tree together, so that each node is evaluated once.
     pub fn runs(&self, ctx: &LightCtx, at: RunPositions<'_>, out: &mut Vec<LightRun>) {
+        if self.is_empty() || at.first == at.positions.len() {
+            return;
+        }
         let first_run = out.len();
         let range = [at.first as u32, at.positions.len() as u32];
         let mut queue = SmallVec::<[SubtreeRun; DESCENTS]>::new();
@@ -200,7 +203,7 @@ impl LightTree {
                 let SubtreeRun { root, pmf, range: [first, end], interval } = queue[i];
                 let node = &self.nodes[root as usize];
                 if node.is_leaf {
-                    if pmf > 0.0 && first < end {
+                    if pmf > 0.0 {
                         let pmf = pmf * at.fraction;
                         out.push(LightRun { light: node.light_or_right_child, pmf, range: [first, end], interval });
                     }
@@ -224,7 +227,7 @@ impl LightTree {
         out[first_run..].sort_unstable_by_key(|run| run.range[0]);
     }
 
-    /// The probabilities of the left children of at most [`DESCENTS`] subtrees; undefined for leaves.
+    /// The probabilities of the left children of at most [`DESCENTS`] subtrees; meaningless for leaves.
     fn left_probabilities(&self, ctx: &LightCtx, subtrees: &[SubtreeRun]) -> [f32; DESCENTS] {
         let is_inner = |subtree: &SubtreeRun| !self.nodes[subtree.root as usize].is_leaf;
         let mut p = [0.0; DESCENTS];
@@ -310,8 +313,8 @@ impl LightTree {
     }
 
     /// The probability of the left child of each node on the way down, with the importances `importance(index, node,
-    /// count)`. `count` is the number of `leaves` below the node; `leaves` are indices of leaves in ascending order, which
-    /// are chosen only if no other light can contribute. Nodes are indexed as in [`Self::sums`].
+    /// count)`. `count` is the number of `leaves` below the node; `leaves` are indices of leaves in ascending order,
+    /// which are chosen only if no other light can contribute. Nodes are indexed as in [`Self::sums`].
     #[inline]
     fn left_by<'a>(
         &'a self,
@@ -370,8 +373,7 @@ impl LightTree {
         self.probability(light, |index| self.left_probability(ctx, index))
     }
 
-    /// Probability that [`sample_by_photons`](Self::sample_by_photons) chooses `light`, with the importances `importance(index, node,
-    /// count)` for the `count` of the `leaves` below a node.
+    /// Probability that [`sample_by_photons`](Self::sample_by_photons) chooses `light`; `importance` as in `left_by`.
     #[inline]
     pub(in crate::lights) fn pmf_by(
         &self,

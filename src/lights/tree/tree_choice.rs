@@ -76,8 +76,8 @@ impl TreeChoice {
         Some(SampledLight { pmf: choice.pmf * (1.0 - p_infinite), ..choice })
     }
 
-    /// Chooses a light for each of the points `at` by their random numbers `u` in [0, 1), as [`Self::sample`]. All columns
-    /// have the same length. `take` gets the lights in the order of the points.
+    /// Chooses a light for each of the points `at` by their random numbers `u` in [0, 1), as [`Self::sample`]. All
+    /// columns have the same length. `take` gets the lights in the order of the points.
     pub(in crate::lights) fn sample_many(
         &self,
         at: &Receivers<'_>,
@@ -110,9 +110,9 @@ impl TreeChoice {
     /// [`Self::infinite_probability`] at each point.
     fn infinite_probabilities(&self, at: &Receivers<'_>, out: &mut [f32]) {
         let fraction = self.infinite_fraction();
-        out.fill(0.0);
-        if let Some(root) = self.tree.root() {
-            importances(level(), root, at, out);
+        match self.tree.root() {
+            Some(root) => importances(level(), root, at, out),
+            None => out.fill(0.0),
         }
         out.iter_mut().for_each(|p| *p = if *p > 0.0 { fraction } else { 1.0 });
     }

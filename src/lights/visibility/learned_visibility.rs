@@ -63,7 +63,7 @@ pub struct NoncontributingDraw<'a> {
     pub ctx: LightCtx,
     /// The lights with photons there.
     pub contributing: ContributingLights<'a>,
-    /// Their indices by [`LearnedVisibility::find_singles`].
+    /// Tree indices of those with one photon, by [`LearnedVisibility::find_singles`].
     pub singles: &'a [u32],
     /// A random number in [0, 1).
     pub u: f32,
@@ -180,9 +180,10 @@ impl LearnedVisibility {
         singles[first..].sort_unstable();
     }
 
-    /// Chooses a light for each draw by its `u`, nearly in proportion to E·√V̂ for lights without photons. Every light that
-    /// can contribute and has no photons has a positive probability. `contributing` lights may be chosen too; those with
-    /// a single photon only if no other light below their node can contribute. The result is `None` if there is no light.
+    /// Chooses a light for each draw by its `u`, nearly in proportion to E·√V̂ for lights without photons. Every light
+    /// that can contribute and has no photons has a positive probability. `contributing` lights may be chosen too, but
+    /// those with a single photon only if no other light below their node can contribute. The result is `None` if there
+    /// is no light.
     pub fn sample_noncontributing(&self, draws: &[NoncontributingDraw<'_>]) -> Vec<Option<NoncontributingLight>> {
         let mut chosen = vec![None; draws.len()];
 

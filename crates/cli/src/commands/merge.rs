@@ -33,7 +33,7 @@ pub(super) struct MergeArgs {
     /// Frames of an animation, such as 1-48: `####` in PARTs and FILEs becomes the frame number
     #[arg(long, value_name = "LIST", value_parser = parse_frames)]
     frames: Option<FrameList>,
-    /// Merge the existing parts if some are missing, and note it in the metadata
+    /// Merge although parts are missing, and note it in the metadata; all listed files must exist
     #[arg(long)]
     allow_missing: bool,
     #[command(flatten)]
@@ -84,9 +84,9 @@ fn merge_one(args: &MergeArgs, denoiser: Option<&Denoiser>) -> anyhow::Result<()
         return Err(UsageError(format!("{} is given twice", path.display())).into());
     }
     args.output_options.check(&args.output);
-    let mut absent = args.parts.iter().filter(|path| !path.exists());
-    if let (Some(first), more @ 1..) = (absent.next(), absent.count()) {
-        bail!("{} and {more} more of {} parts do not exist", first.display(), args.parts.len());
+    let absent: Vec<_> = args.parts.iter().filter(|path| matches!(path.try_exists(), Ok(false))).collect();
+    if let [first, _, ..] = absent[..] {
+        bail!("{} of {} parts do not exist, the first is {}", absent.len(), args.parts.len(), first.display());
     }
 
     // Merge and denoise

@@ -231,7 +231,12 @@ fn what_cannot_be_divided_is_refused_with_the_reason() {
     refuse(&format!("{render} --resume no -o a.exr"), folder, 3, &["no: ", "No such file"]);
 
     // Missing parts are counted
-    refuse("merge a.part no.1.part no.2.part -o a.exr", folder, 3, &["no.1.part and 1 more of 3 parts do not exist"]);
+    refuse(
+        "merge a.part no.1.part no.2.part -o a.exr",
+        folder,
+        3,
+        &["2 of 3 parts do not exist, the first is no.1.part"],
+    );
 }
 
 #[test]

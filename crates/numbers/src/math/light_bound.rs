@@ -203,7 +203,6 @@ impl<N: Number> LightBound<N> {
             return radius_squared.if_at_least(d2, near, zero);
         }
         let importance = intensity * cos_light.greater(slack) / d2;
-        let importance = cos_light.if_at_least(is_seen, importance, zero);
 
         // The surface may transmit, so light from behind counts too
         let cos = dot(wi, at.ns);
@@ -211,7 +210,7 @@ impl<N: Number> LightBound<N> {
         let cos_max = cos_of_difference([other(cos_i), cos_i], b).greater(slack);
         let reflected = if let Some(lobe) = &at.lobe { lobe.reflected(wi, cos, sin2_b, cos_max) } else { cos_max };
         let far = dot(at.ns, at.ns).if_above(zero, importance * reflected, importance);
-        radius_squared.if_at_least(d2, near, far)
+        radius_squared.if_at_least(d2, near, cos_light.if_at_least(is_seen, far, zero))
     }
 }
 
