@@ -20,18 +20,12 @@ pub const DESCENTS: usize = 4 * LANES;
 pub type Bounds<'a> = [&'a LightBound; DESCENTS];
 
 /// The photons of the lights below a node, for each descent.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub struct Photons {
     /// Irradiance at which one photon is expected.
     pub of_one: [f32; DESCENTS],
     /// Number of photons. −1: the node has weight 0, so that it is chosen only if its sibling has weight 0 too.
     pub count: [f32; DESCENTS],
-}
-
-impl Default for Photons {
-    fn default() -> Self {
-        Photons { of_one: [0.0; DESCENTS], count: [0.0; DESCENTS] }
-    }
 }
 
 impl Photons {
@@ -82,7 +76,7 @@ fn fields_from<S: Simd>(simd: S, bounds: &[&LightBound], first: usize) -> [Wide<
 }
 
 /// The points of descents.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 struct ReceiverLanes {
     p: [[f32; DESCENTS]; 3],
     ns: [[f32; DESCENTS]; 3],
@@ -109,7 +103,7 @@ impl ReceiverLanes {
 }
 
 /// Descents from several points.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub struct Descents {
     at: ReceiverLanes,
     /// Random numbers in [0, 1).
@@ -124,24 +118,6 @@ pub struct Descents {
     pub diffuse_importance: [f32; DESCENTS],
     /// Importance of the node.
     pub importance: [f32; DESCENTS],
-}
-
-impl Default for Descents {
-    /// Descents that are at leaves.
-    fn default() -> Self {
-        const ZERO: [f32; DESCENTS] = [0.0; DESCENTS];
-        let three = [ZERO; 3];
-        let at = ReceiverLanes {
-            p: three,
-            ns: three,
-            wo: three,
-            cos_o: ZERO,
-            alpha_squared: ZERO,
-            scale: ZERO,
-            diffuse: ZERO,
-        };
-        Descents { at, u: ZERO, pmf: ZERO, is_inner: ZERO, is_left: ZERO, diffuse_importance: ZERO, importance: ZERO }
-    }
 }
 
 impl Descents {
@@ -233,18 +209,12 @@ fn descend_lanes<S: Simd>(
 }
 
 /// The expected contributions of the lights of [`Bounds`] at a point.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub struct Expected {
     /// Importances.
     pub importance: [f32; DESCENTS],
     /// V̂.
     pub visibility: [f32; DESCENTS],
-}
-
-impl Default for Expected {
-    fn default() -> Self {
-        Expected { importance: [0.0; DESCENTS], visibility: [0.0; DESCENTS] }
-    }
 }
 
 /// The expected contributions of the first `count` lights at a point.
