@@ -5,6 +5,7 @@
 
 use super::hit::{LocalHit, SurfaceHit, VertexValues, face_forward, round, spanning};
 use glam::DVec3;
+use lumiris_lanes::triangle_points::MIN_DETERMINANT;
 use lumiris_numbers::math::transform::{swaps_handedness, transform_normal};
 use lumiris_numbers::math::{Affine3A, Bounds3, Ray, Vec2, Vec3, gamma};
 
@@ -155,7 +156,7 @@ impl BilinearMesh {
         let st_u = (s10 - s00).lerp(s11 - s01, uv[1]).as_dvec2();
         let st_v = (s01 - s00).lerp(s11 - s10, uv[0]).as_dvec2();
         let det = st_u.x * st_v.y - st_u.y * st_v.x;
-        if det.is_nan() || det.abs() < 1e-9 {
+        if det.is_nan() || det.abs() < MIN_DETERMINANT {
             return [round(du), round(dv)];
         }
         [round((du * st_v.y - dv * st_u.y) / det), round((dv * st_u.x - du * st_v.x) / det)]

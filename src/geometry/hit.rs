@@ -126,6 +126,11 @@ pub(super) fn spanning(u: Vec3, v: Vec3, n: Vec3) -> [Vec3; 2] {
     if area_squared > 0.0 && u.is_finite() && v.is_finite() {
         return [u, v];
     }
+    tangents(n)
+}
+
+/// The tangents of some frame about `n`.
+pub(super) fn tangents(n: Vec3) -> [Vec3; 2] {
     let frame = Frame::from_z(n);
     [frame.x, frame.y]
 }

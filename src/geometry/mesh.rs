@@ -1,6 +1,9 @@
 //! Indexed triangle meshes.
 
-use super::hit::{SurfaceHit, VertexValues, face_forward, round, spanning};
+use super::hit::{SurfaceHit, VertexValues, face_forward, round, spanning, tangents};
+use lumiris_lanes::triangle_points::{
+    CornerCoordinates, MIN_DETERMINANT, TexturedPoints, TriangleHits, lane, set_lane,
+};
 use lumiris_numbers::math::transform::{swaps_handedness, transform_normal};
 use lumiris_numbers::math::{Affine3A, Bounds3, Vec2, Vec3, gamma};
 
@@ -128,6 +131,55 @@ impl TriangleMesh {
         SurfaceHit { p, p_error, n, ns, dpdu, dpdv, dpdus, dpdvs, uv, vertex }
     }
 
+    /// The same, from lane `k` of the computed `points`.
+    pub fn surface_hit_of_lane(&self, i: usize, uv: [f32; 2], points: &TexturedPoints, k: usize) -> SurfaceHit {
+        let ns = lane(&points.ns, k);
+        let derivatives = points.derivatives.each_ref().map(|rows| lane(rows, k));
+        let [dpdu, dpdv] = if derivatives == [Vec3::ZERO; 2] { tangents(ns) } else { derivatives };
+        let b = [1.0 - uv[0] - uv[1], uv[0], uv[1]];
+        let [dpdus, dpdvs] = self.shading_tangents(i, b, ns).unwrap_or([dpdu, dpdv]);
+        SurfaceHit {
+            p: lane(&points.p, k),
+            p_error: lane(&points.p_error, k),
+            n: lane(&points.n, k),
+            ns,
+            dpdu,
+            dpdv,
+            dpdus,
+            dpdvs,
+            uv: points.uv(k),
+            vertex: self.vertex_values_at(i, uv),
+        }
+    }
+
+    /// Sets lane `k` of `hits` to a hit of triangle `i`, at the weights `uv` of corners 1 and 2, by a ray of direction
+    /// `d`.
+    #[inline(always)]
+    pub fn gather_hit(&self, i: usize, uv: [f32; 2], d: Vec3, hits: &mut TriangleHits, k: usize) {
+        let vertices = self.indices[i];
+        for (rows, p) in hits.corners.iter_mut().zip(self.corners(vertices)) {
+            set_lane(rows, k, p);
+        }
+        if self.normals.is_empty() {
+            hits.normals.iter_mut().for_each(|rows| set_lane(rows, k, Vec3::ZERO));
+        } else {
+            for (rows, v) in hits.normals.iter_mut().zip(vertices) {
+                set_lane(rows, k, self.normals[v as usize]);
+            }
+        }
+        [hits.b[0][k], hits.b[1][k]] = uv;
+        hits.orientation[k] = if self.flip_normal { -1.0 } else { 1.0 };
+        set_lane(&mut hits.d, k, d);
+    }
+
+    /// Sets lane `k` of `coordinates` to the texture coordinates of triangle `i`'s corners.
+    #[inline]
+    pub fn gather_coordinates(&self, i: usize, coordinates: &mut CornerCoordinates, k: usize) {
+        for (rows, uv) in coordinates.iter_mut().zip(self.texture_coordinates(i)) {
+            (rows[0][k], rows[1][k]) = uv.into();
+        }
+    }
+
     /// The shading tangents at the weights `b` of triangle `i`; `None` if they follow the texture coordinates.
     fn shading_tangents(&self, i: usize, b: [f32; 3], ns: Vec3) -> Option<[Vec3; 2]> {
         let vertices = self.indices[i].map(|v| v as usize);
@@ -197,7 +249,7 @@ fn partial_derivatives([p0, p1, p2]: [Vec3; 3], [uv0, uv1, uv2]: [Vec2; 3]) -> [
     let (duv02, duv12) = ((uv0 - uv2).as_dvec2(), (uv1 - uv2).as_dvec2());
     let (dp02, dp12) = ((p0 - p2).as_dvec3(), (p1 - p2).as_dvec3());
     let det = duv02.x * duv12.y - duv02.y * duv12.x;
-    if det.is_nan() || det.abs() < 1e-9 {
+    if det.is_nan() || det.abs() < MIN_DETERMINANT {
         return [Vec3::ZERO; 2];
     }
     let dpdu = (duv12.y * dp02 - duv02.y * dp12) / det;
@@ -209,6 +261,9 @@ fn partial_derivatives([p0, p1, p2]: [Vec3; 3], [uv0, uv1, uv2]: [Vec2; 3]) -> [
 mod tests {
     use super::*;
     use crate::geometry::triangle::{RayPrecomputed, intersect_triangle};
+    use lumiris_lanes::lane::LANES;
+    use lumiris_lanes::level;
+    use lumiris_lanes::triangle_points::textured_points;
     use lumiris_numbers::math::Ray;
     use lumiris_numbers::math::ray::offset_origin;
     use lumiris_test_support::random::{RngExt, pcg32};
@@ -266,6 +321,38 @@ mod tests {
         mesh.tangents_along_second = true;
         let hit = mesh.surface_hit(0, [0.2, 0.3]);
         assert_eq!((hit.dpdus, hit.dpdvs), (Vec3::new(0.0, 2.0, 0.0), Vec3::new(-2.0, 0.0, 0.0)));
+    }
+
+    #[test]
+    fn points_of_lanes_are_points_of_single_hits() {
+        let mut s = pcg32([12, 0, 1]);
+        let mut random = || Vec3::new(s.random::<f32>(), s.random::<f32>(), s.random::<f32>()) * 2.0 - 1.0;
+        for k in 0..400 {
+            // With and without normals, texture coordinates (also degenerate ones), and tangents
+            let mut mesh = TriangleMesh::new(vec![random(), random(), random()], vec![[0, 1, 2]]).unwrap();
+            mesh.flip_normal = k % 2 == 0;
+            if k % 3 > 0 {
+                mesh.normals = [random(), random(), random()].map(Vec3::normalize).to_vec();
+            }
+            match k % 5 {
+                0 => {}
+                1 => mesh.uvs = vec![Vec2::splat(0.3); 3],
+                _ => mesh.uvs = [random(), random(), random()].map(Vec3::truncate).to_vec(),
+            }
+            if k % 7 == 0 {
+                mesh.tangents = vec![random(); 3];
+            }
+            let (uv, d) = ([random().x.abs() * 0.5, random().y.abs() * 0.5], random());
+
+            // Computed in one of the lanes
+            let (mut hits, mut coordinates) = (TriangleHits::default(), CornerCoordinates::default());
+            mesh.gather_hit(0, uv, d, &mut hits, k % LANES);
+            mesh.gather_coordinates(0, &mut coordinates, k % LANES);
+            let mut points = [TexturedPoints::default()];
+            textured_points(level(), &[hits], &[coordinates], &mut points);
+            let (lane, single) = (mesh.surface_hit_of_lane(0, uv, &points[0], k % LANES), mesh.surface_hit(0, uv));
+            assert_eq!(format!("{lane:?}"), format!("{single:?}"), "{k} {mesh:?}");
+        }
     }
 
     #[test]

@@ -110,6 +110,9 @@ impl Quadric {
         let local_from_group = self.local_from_group.as_daffine3();
         let o = local_from_group.transform_point3(ray.o.as_dvec3());
         let d = local_from_group.transform_vector3(ray.d.as_dvec3());
+        if self.kind.is_beyond(o, d, f64::from(ray.t_max)) {
+            return None;
+        }
         let roots = self.kind.roots(o, d)?;
 
         // Below this parameter a hit is rounding noise: o is the sum of terms of this size.
@@ -174,6 +177,16 @@ impl QuadricKind {
             QuadricKind::Disk { height, .. } => height.abs(),
         };
         DVec3::new(self.radius(), self.radius(), f64::from(z))
+    }
+
+    /// True if a segment from `o` to o + t_max d surely ends before it reaches a sphere, as shadow segments to the
+    /// sphere itself do. It then comes nearer to the centre all the way, and its end is outside, far beyond the effect
+    /// of rounding.
+    #[inline]
+    fn is_beyond(&self, o: DVec3, d: DVec3, t_max: f64) -> bool {
+        let QuadricKind::Sphere { radius, .. } = *self else { return false };
+        let approaches = -o.dot(d) >= d.length_squared() * t_max;
+        approaches && (o + d * t_max).length_squared() > f64::from(radius).powi(2) * OUTSIDE
     }
 
     /// Parameters of the intersections of the line o + t d with the full quadric, in ascending order.
@@ -280,6 +293,10 @@ impl QuadricKind {
     }
 }
 
+/// Squared distances from the centre of a sphere, relative to its squared radius, beyond which a point is outside
+/// whatever the rounding.
+const OUTSIDE: f64 = 1.0 + 1e-9;
+
 /// The azimuth of a point of a quadric.
 struct Azimuth {
     /// `None` if it was not needed to decide whether the point is cut off.
@@ -314,8 +331,7 @@ fn sphere_roots(o: DVec3, d: DVec3, radius: f64) -> Option<[f64; 2]> {
     let a = d.length_squared();
     let b = o.dot(d);
     let nearest = o - d * (b / a);
-    // Far beyond the effect of rounding
-    if nearest.length_squared() > radius * radius * (1.0 + 1e-9) {
+    if nearest.length_squared() > radius * radius * OUTSIDE {
         return None;
     }
     let nearest = nearest.length();

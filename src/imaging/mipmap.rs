@@ -294,10 +294,12 @@ impl MipMap {
         self.texel(level, saturated(floor(at.x)), saturated(floor(at.y)))
     }
 
-    /// Removes whole periods from `st` if the image repeats and they would leave few bits of an f32 for the fraction.
+    /// `st` without whole periods of the axes on which the image repeats: an f32 then resolves the fraction, and
+    /// lookups need no division.
     pub fn within_periods(&self, st: DVec2) -> Vec2 {
-        let is_far = st.abs().max_element() > 64.0;
-        if is_far && self.wrap == Wrap::Repeat { (st - st.floor()).as_vec2() } else { st.as_vec2() }
+        let within = |wrap: AxisWrap, x: f64| if wrap == AxisWrap::Repeat { fraction(x) } else { x };
+        let [s, t] = self.wrap.axes().unwrap_or([AxisWrap::Clamp; 2]);
+        Vec2::new(within(s, st.x) as f32, within(t, st.y) as f32)
     }
 
     /// Linear colour at `st`, filtered over `width` per axis, in units of the image. A width of 0 reads level 0.
@@ -390,6 +392,16 @@ fn floor(v: f32) -> f32 {
     if v.abs() < WHOLE { near - if near > v { 1.0 } else { 0.0 } } else { v }
 }
 
+/// v − ⌊v⌋; NaN if `v` is not finite. Rounds as [`floor`] does.
+#[inline]
+fn fraction(v: f64) -> f64 {
+    /// All floats from here on are integers.
+    const WHOLE: f64 = (1_u64 << 52) as f64;
+    let large = WHOLE.copysign(v);
+    let near = (v + large) - large;
+    if v.abs() < WHOLE { v - near + if near > v { 1.0 } else { 0.0 } } else { v - v }
+}
+
 /// The integer `v`, saturated to 32 bits, so that absurd or non-finite coordinates wrap somewhere instead of
 /// overflowing.
 #[inline]
@@ -434,6 +446,19 @@ mod tests {
 
     fn map(image: &Image, wrap: Wrap, filter: Filter) -> MipMap {
         MipMap::new(image, wrap, filter, ColorEncoding::Linear)
+    }
+
+    #[test]
+    fn coordinates_lose_whole_periods_of_axes_that_repeat() {
+        let map = |wrap| MipMap::new(&image(2, 2, |x, _| [x as f32; 3]), wrap, Filter::Bilinear, ColorEncoding::Linear);
+        let repeat = map(Wrap::Repeat);
+        for (st, expected) in [(-0.25, 0.75), (0.25, 0.25), (7.5, 0.5), (-3.0, 0.0), (1e9 + 0.125, 0.125), (1e300, 0.0)]
+        {
+            assert_eq!(repeat.within_periods(DVec2::new(st, -st)).x, expected, "{st}");
+        }
+        assert!(repeat.within_periods(DVec2::new(f64::NAN, f64::INFINITY)).is_nan());
+        let mixed = map(Wrap::Axes([AxisWrap::Mirror, AxisWrap::Repeat]));
+        assert_eq!(mixed.within_periods(DVec2::new(3.25, 3.25)), Vec2::new(3.25, 0.25));
     }
 
     #[test]

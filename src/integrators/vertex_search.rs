@@ -16,7 +16,7 @@ use crate::lights::LightCtx;
 use crate::materials::SurfaceBsdf;
 use crate::materials::dispersion::{WavelengthSample, sample_wavelength};
 use crate::media::{EmissionLookup, EmissionLookups, End, Flight, FlightSampler, Segment, Sides};
-use crate::scene::{RenderJob, SurfaceInteraction};
+use crate::scene::{Arrival, RenderJob, SurfaceInteraction, SurfaceInteractions};
 use lumiris_lanes::{level, sampler};
 use lumiris_numbers::math::{Rgb, Vec3};
 use lumiris_numbers::samplers::SampleStream;
@@ -25,9 +25,6 @@ use std::time::Instant;
 
 /// Maximum number of non-scattering surfaces between two vertices.
 const MAX_PASSED: u32 = 64;
-
-/// Hits whose texels are requested before the first of them is shaded.
-const GROUP: usize = 16;
 
 /// A batch of paths to be traced to the next vertices.
 pub(super) struct TraceStep<'a, 'w> {
@@ -63,8 +60,9 @@ pub(super) struct VertexSearch {
     traced: Vec<u32>,
     /// Indices of the paths that continue in the next trace, without a vertex.
     pub(super) passing: Vec<u32>,
-    /// Indices of paths of a group, and the surfaces that they hit.
-    reached: Vec<(u32, SurfaceInteraction)>,
+    /// Indices of paths of a group that hit surfaces, and these hits.
+    reached: Vec<u32>,
+    surfaces: SurfaceInteractions,
     /// Indices of the paths that hit nothing, and receive light from infinite lights.
     escaped: Vec<u32>,
     /// Rays of the paths that are traced, if these are not all.
@@ -133,7 +131,10 @@ impl VertexSearch {
             let (mut paths, hits, traced): (Paths, _, _) =
                 (std::mem::take(&mut self.active), std::mem::take(&mut self.hits), std::mem::take(&mut self.traced));
             let lengths = std::mem::take(&mut self.lengths);
-            for group in (0..traced.len()).step_by(GROUP).map(|first| first..traced.len().min(first + GROUP)) {
+            for group in (0..traced.len())
+                .step_by(SurfaceInteractions::GROUP)
+                .map(|first| first..traced.len().min(first + SurfaceInteractions::GROUP))
+            {
                 for i in group {
                     let (index, hit, length) = (traced[i], hits[i], lengths[i]);
                     let is_done =
@@ -186,9 +187,8 @@ impl VertexSearch {
         match hit {
             Some(hit) => {
                 let TracedPath { state: path, ray, .. } = paths.traced(index);
-                let interaction = SurfaceInteraction::new(at.job, &ray, path.width, path.spread, hit);
-                interaction.prefetch(at.job);
-                self.reached.push((index, interaction));
+                self.reached.push(index);
+                self.surfaces.push(Arrival { ray, hit: *hit, width: path.width, spread: path.spread });
             }
             None if self.adds_emission(at.vertex, &paths.states[index as usize]) => self.escaped.push(index),
             None => {}
@@ -197,15 +197,15 @@ impl VertexSearch {
 
     /// Processes the surfaces that paths have reached: emission, and vertex or continuation.
     fn process_surfaces(&mut self, at: &mut TraceStep<'_, '_>, paths: &mut Paths) {
-        let mut reached = std::mem::take(&mut self.reached);
-        for (index, interaction) in &reached {
-            let mut traced = paths.traced(*index);
+        let (mut reached, mut surfaces) = (std::mem::take(&mut self.reached), std::mem::take(&mut self.surfaces));
+        for (&index, interaction) in reached.iter().zip(surfaces.find(at.job)) {
+            let mut traced = paths.traced(index);
             self.process_surface(at, &mut traced, interaction);
             let ray = traced.ray;
-            paths.rays.replace(*index as usize, &ray);
+            paths.rays.replace(index as usize, &ray);
         }
         reached.clear();
-        self.reached = reached;
+        (self.reached, self.surfaces) = (reached, surfaces);
     }
 
     /// Sets times and random numbers of the vertices.

@@ -117,7 +117,23 @@ impl MaterialSet {
 
     /// Resolves mixtures at a hit, by a hash of the point, the direction and the mixed materials. A mixture that
     /// contains itself resolves to `None`.
+    #[inline]
     pub fn resolve(&self, id: MaterialId, textures: &TextureSet, ctx: &TextureContext, wo: Vec3) -> Option<MaterialId> {
+        if !self.is_mixture(id) {
+            return Some(id);
+        }
+        self.resolve_mixture(id, textures, ctx, wo)
+    }
+
+    /// See [`Self::resolve`]. Not inlined: the hash would be computed for other materials, too.
+    #[inline(never)]
+    fn resolve_mixture(
+        &self,
+        id: MaterialId,
+        textures: &TextureSet,
+        ctx: &TextureContext,
+        wo: Vec3,
+    ) -> Option<MaterialId> {
         let mut id = id;
         for _ in 0..=self.entries.len() {
             let Material::Mix { materials: [a, b], amount } = self.entries[id as usize].material else {

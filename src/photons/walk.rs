@@ -19,7 +19,7 @@ use crate::accel::{Coherence, Hit, RayBatch};
 use crate::bsdfs::dielectric::Transport;
 use crate::bsdfs::{Lambertian, Resampled};
 use crate::materials::SurfaceBsdf;
-use crate::scene::{RenderJob, SurfaceInteraction};
+use crate::scene::{RenderJob, SurfaceInteraction, SurfaceInteractions};
 use lumiris_numbers::math::sphere_map::equal_area_sphere_to_square;
 use lumiris_numbers::math::{Ray, Rgb, Vec3};
 use lumiris_numbers::samplers::SampleStream;
@@ -98,6 +98,7 @@ pub(super) struct Walker {
     passing: Vec<Particle>,
     rays: RayBatch,
     hits: Vec<Option<Hit>>,
+    surfaces: SurfaceInteractions,
     /// Rays traced so far.
     pub(super) traced: u64,
 }
@@ -149,41 +150,45 @@ impl Walker {
 
         // Particles that pass the surface continue without a scattering event
         self.passing.clear();
-        for (particle, hit) in self.active.iter().zip(&self.hits) {
-            let Some(hit) = hit else { continue };
-            let interaction = SurfaceInteraction::new(job, &particle.ray, 0.0, 0.0, hit);
-            let Some(bsdf) = interaction.scatter(job) else {
-                if particle.passed < MAX_PASSED {
-                    let ray = Ray { o: interaction.origin(particle.ray.d), ..particle.ray };
-                    self.passing.push(Particle { ray, passed: particle.passed + 1, ..*particle });
+        let Walker { active, next, passing, hits, surfaces, .. } = &mut *self;
+        surfaces.visit(
+            job,
+            active,
+            |particle| &particle.ray,
+            hits,
+            |particle, interaction| {
+                let Some(bsdf) = interaction.scatter(job) else {
+                    if particle.passed < MAX_PASSED {
+                        let ray = Ray { o: interaction.origin(particle.ray.d), ..particle.ray };
+                        passing.push(Particle { ray, passed: particle.passed + 1, ..*particle });
+                    }
+                    return;
+                };
+
+                // Report the hit
+                let stream = particle.stream.domain(domain::VERTEX + vertex);
+                let part = bsdf.lambertian(interaction.wo);
+                if let Some(part) = &part {
+                    let n = if bsdf.n.dot(interaction.wo) < 0.0 { -bsdf.n } else { bsdf.n };
+                    on_hit(&ParticleHit {
+                        particle,
+                        p: interaction.surface.p,
+                        wi: interaction.wo,
+                        n,
+                        part,
+                        scatterings: vertex,
+                        stream,
+                    });
                 }
-                continue;
-            };
 
-            // Report the hit
-            let stream = particle.stream.domain(domain::VERTEX + vertex);
-            let part = bsdf.lambertian(interaction.wo);
-            if let Some(part) = &part {
-                let n = if bsdf.n.dot(interaction.wo) < 0.0 { -bsdf.n } else { bsdf.n };
-                on_hit(&ParticleHit {
-                    particle,
-                    p: interaction.surface.p,
-                    wi: interaction.wo,
-                    n,
-                    part,
-                    scatterings: vertex,
-                    stream,
-                });
-            }
-
-            // Scatter
-            if vertex < settings.max_depth {
-                let proposals = job.settings().integrator.bsdf_proposals;
-                let scattering =
-                    Scattering { interaction: &interaction, bsdf: &bsdf, part: part.as_ref(), stream, proposals };
-                self.next.extend(scattering.scatter(particle, settings.transport));
-            }
-        }
+                // Scatter
+                if vertex < settings.max_depth {
+                    let proposals = job.settings().integrator.bsdf_proposals;
+                    let scattering = Scattering { interaction, bsdf: &bsdf, part: part.as_ref(), stream, proposals };
+                    next.extend(scattering.scatter(particle, settings.transport));
+                }
+            },
+        );
         std::mem::swap(&mut self.active, &mut self.passing);
     }
 }

@@ -8,7 +8,7 @@ use crate::accel::{Coherence, RayBatch};
 use crate::bsdfs::Bsdf;
 use crate::integrators::camera_sampler::CameraSampler;
 use crate::lights::{LightCtx, SampleOfLight};
-use crate::scene::{RenderJob, SurfaceInteraction};
+use crate::scene::{Arrival, RenderJob, SurfaceInteraction};
 use lumiris_numbers::math::hash::{pcg4d, unit_f32};
 use lumiris_numbers::math::ray::SEGMENT_END;
 use lumiris_numbers::math::warp::sample_cosine_hemisphere;
@@ -147,8 +147,8 @@ fn hits(job: &RenderJob, rays: &[Ray]) -> Vec<Option<SurfaceInteraction>> {
     let (mut batch, mut hits) = (RayBatch::default(), Vec::new());
     batch.set(rays.iter());
     job.world.accel.intersect(&batch, Coherence::Incoherent, &mut hits);
-    let at = |(ray, hit): (&Ray, &Option<_>)| hit.as_ref().map(|hit| SurfaceInteraction::new(job, ray, 0.0, 0.0, hit));
-    rays.iter().zip(&hits).map(at).collect()
+    let arrivals = rays.iter().zip(&hits).map(|(ray, hit)| Some(Arrival::of_ray(ray, hit.as_ref()?)));
+    arrivals.map(|arrival| Some(SurfaceInteraction::new(job, &arrival?))).collect()
 }
 
 /// True if the only lobe of a surface is diffuse.

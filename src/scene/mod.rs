@@ -8,11 +8,13 @@ mod job;
 mod pixel_samples;
 mod sample_count_map;
 mod surface_interaction;
+mod surface_interactions;
 mod world;
 
 pub use input::{Choices, FilmSettings, Scene, Surface};
 pub use job::RenderJob;
 pub use pixel_samples::PixelSamples;
 pub use sample_count_map::SampleCountMap;
-pub use surface_interaction::SurfaceInteraction;
+pub use surface_interaction::{Arrival, SurfaceInteraction};
+pub use surface_interactions::SurfaceInteractions;
 pub use world::{AccelKind, EmitterHit, EmitterScratch, World};

@@ -9,6 +9,27 @@ use crate::textures::TextureContext;
 use lumiris_numbers::math::ray::offset_origin;
 use lumiris_numbers::math::{Ray, Vec2, Vec3};
 
+/// A ray with its first hit.
+#[derive(Clone, Copy, Debug)]
+pub struct Arrival {
+    /// The ray.
+    pub ray: Ray,
+    /// The hit.
+    pub hit: Hit,
+    /// Width of a pixel at the origin of the ray, along the path (m).
+    pub width: f32,
+    /// Growth of the width per unit length.
+    pub spread: f32,
+}
+
+impl Arrival {
+    /// The first hit of a ray that is not part of a path from the camera.
+    #[inline]
+    pub fn of_ray(ray: &Ray, hit: &Hit) -> Self {
+        Arrival { ray: *ray, hit: *hit, width: 0.0, spread: 0.0 }
+    }
+}
+
 /// A ray's hit on a surface, with its differential geometry and texture footprint.
 #[derive(Clone, Copy, Debug)]
 pub struct SurfaceInteraction {
@@ -22,45 +43,51 @@ pub struct SurfaceInteraction {
     pub width: f32,
     /// Distance along the ray (m).
     pub distance: f32,
-    context: TextureContext,
+    /// Extent of the texture footprint in uv, per axis.
+    uv_width: Vec2,
 }
 
 impl SurfaceInteraction {
-    /// The interaction of the first hit of `ray`. A pixel is `width` wide at the ray's origin, and `spread` wider per
-    /// unit length.
+    /// The interaction of an arrival.
+    pub fn new(job: &RenderJob, arrival: &Arrival) -> Self {
+        let Arrival { ray, hit, .. } = arrival;
+        let set = &job.world.scene.geometry;
+        let surface = set.surface_hit_of_ray(hit.geometry, hit.primitive, hit.instance, hit.uv, ray);
+        Self::at(job, arrival, surface, -ray.d.normalize(), inverse_lengths(&surface))
+    }
+
+    /// The interaction at a surface point. `inverse_lengths` are 1/|∂p/∂u| and 1/|∂p/∂v|.
     ///
     /// The texture footprint is the pixel that sees the point directly, for every kind of path. Light paths, photons
     /// and shadow rays must evaluate the same surface as the camera paths that they are combined with.
-    pub fn new(job: &RenderJob, ray: &Ray, width: f32, spread: f32, hit: &Hit) -> Self {
-        let set = &job.world.scene.geometry;
-        let surface = set.surface_hit_of_ray(hit.geometry, hit.primitive, hit.instance, hit.uv, ray);
+    #[inline]
+    pub(super) fn at(job: &RenderJob, arrival: &Arrival, surface: SurfaceHit, wo: Vec3, inverse_lengths: Vec2) -> Self {
+        let Arrival { ray, hit, width, spread } = arrival;
         let distance = hit.t * ray.d.length();
-        let width = width + spread * distance;
         let seen = job.world.scene.camera.pixel_width(surface.p, ray.time);
-        let footprint = seen * job.settings().sampling.footprint();
-        let extent = |d: Vec3| {
-            let length = d.length();
-            if length > 0.0 { footprint / length } else { 0.0 }
-        };
-        let uv_width = Vec2::new(extent(surface.dpdu), extent(surface.dpdv));
-        let VertexValues { uv1, color, face } = surface.vertex;
-        let context =
-            TextureContext { uv: surface.uv, uv_width, uv1, color, face, p: surface.p.as_dvec3(), n: surface.n };
-        SurfaceInteraction { hit: *hit, surface, wo: -ray.d.normalize(), width, distance, context }
+        let uv_width = inverse_lengths * (seen * job.settings().sampling.footprint());
+        SurfaceInteraction { hit: *hit, surface, wo, width: width + spread * distance, distance, uv_width }
+    }
+
+    /// Inputs of texture lookups.
+    #[inline]
+    fn context(&self) -> TextureContext {
+        let SurfaceHit { p, n, uv, vertex: VertexValues { uv1, color, face }, .. } = self.surface;
+        TextureContext { uv, uv_width: self.uv_width, uv1, color, face, p: p.as_dvec3(), n }
     }
 
     /// Requests the texels of [`Self::scatter`], if it is called soon.
     pub fn prefetch(&self, job: &RenderJob) {
         let scene = &job.world.scene;
         let material = scene.surfaces[self.hit.geometry as usize].material;
-        scene.materials.prefetch(material, &scene.textures, &self.context);
+        scene.materials.prefetch(material, &scene.textures, &self.context());
     }
 
     /// The BSDF at the hit; `None` if rays pass the surface.
     pub fn scatter<'j>(&self, job: &'j RenderJob) -> Option<SurfaceBsdf<'j>> {
         let scene = &job.world.scene;
         let material = scene.surfaces[self.hit.geometry as usize].material;
-        let bsdf = scene.materials.bsdf(material, &scene.textures, &self.surface, &self.context, self.wo)?;
+        let bsdf = scene.materials.bsdf(material, &scene.textures, &self.surface, &self.context(), self.wo)?;
         Some(bsdf.proposed_by(job.settings().integrator.bsdf_density))
     }
 
@@ -74,7 +101,7 @@ impl SurfaceInteraction {
     pub fn dispersion<'j>(&self, job: &'j RenderJob) -> Option<&'j Dispersion> {
         let scene = &job.world.scene;
         let material = scene.surfaces[self.hit.geometry as usize].material;
-        let id = scene.materials.resolve(material, &scene.textures, &self.context, self.wo)?;
+        let id = scene.materials.resolve(material, &scene.textures, &self.context(), self.wo)?;
         scene.materials.entries()[id as usize].dispersion.as_deref()
     }
 
@@ -94,4 +121,13 @@ impl SurfaceInteraction {
     pub fn origin(&self, w: Vec3) -> Vec3 {
         offset_origin(self.surface.p, self.surface.p_error, self.surface.n, w)
     }
+}
+
+/// 1/|∂p/∂u| and 1/|∂p/∂v|; 0 where the derivative is.
+pub(super) fn inverse_lengths(surface: &SurfaceHit) -> Vec2 {
+    let inverse = |d: Vec3| {
+        let length = d.length();
+        if length > 0.0 { 1.0 / length } else { 0.0 }
+    };
+    Vec2::new(inverse(surface.dpdu), inverse(surface.dpdv))
 }

@@ -121,6 +121,18 @@ impl<S: Simd> Vec3s<S> {
         Vec3s { x: self.x * s, y: self.y * s, z: self.z * s }
     }
 
+    /// Absolute values of the components.
+    #[inline(always)]
+    pub fn abs(self) -> Self {
+        Vec3s { x: self.x.abs(), y: self.y.abs(), z: self.z.abs() }
+    }
+
+    /// `self` if `keep`, else `other`.
+    #[inline(always)]
+    pub fn or(self, keep: M<S>, other: Self) -> Self {
+        Vec3s { x: keep.select(self.x, other.x), y: keep.select(self.y, other.y), z: keep.select(self.z, other.z) }
+    }
+
     /// `x·self.x + y·self.y + z·self.z`.
     #[inline(always)]
     pub fn combine(self, x: Vec3, y: Vec3, z: Vec3) -> Self {

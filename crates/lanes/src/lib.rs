@@ -6,7 +6,8 @@
 //! closures and no `map` over arrays: these would be compiled without vector instructions.
 //!
 //! Reading order: [`lane`], [`wide`], [`columns`], [`hilbert`], [`sampler`], [`light`], [`area`], [`environment`],
-//! [`kernels`], [`ris_weights`], [`camera`], [`hits`], [`triangles`], [`vertex`], [`connections`], [`light_tree`],
+//! [`kernels`], [`ris_weights`], [`camera`], [`hits`], [`triangles`],
+//! [`triangle_points`], [`vertex`], [`connections`], [`light_tree`],
 //! [`light_descent`], [`sums`], [`prefetch`].
 
 pub mod area;
@@ -25,6 +26,7 @@ pub mod prefetch;
 pub mod ris_weights;
 pub mod sampler;
 pub mod sums;
+pub mod triangle_points;
 pub mod triangles;
 pub mod vertex;
 pub mod wide;

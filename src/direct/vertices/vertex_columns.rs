@@ -13,7 +13,7 @@ use lumiris_lanes::columns::{Column, Columns3, padded, reserve};
 use lumiris_lanes::kernels::{Kernel, MAX_PARAMS};
 use lumiris_lanes::lane::LANES;
 use lumiris_lanes::level;
-use lumiris_lanes::vertex::{self as kernels, Points, TriangleHits};
+use lumiris_lanes::triangle_points::{self as kernels, Points, TriangleHits};
 use lumiris_numbers::math::{Frame, Rgb, Vec3};
 use lumiris_numbers::samplers::StreamColumns;
 use std::ops::Range;
@@ -149,24 +149,7 @@ impl<'w> Vertices<'w> {
             self.plain_hits.push(TriangleHits::default());
         }
 
-        // Corners and vertex normals
-        let hits = &mut self.plain_hits[block];
-        let vertices = mesh.indices[triangle as usize];
-        for (rows, p) in hits.corners.iter_mut().zip(mesh.corners(vertices)) {
-            set_lane(rows, k, p);
-        }
-        if mesh.normals.is_empty() {
-            hits.normals.iter_mut().for_each(|rows| set_lane(rows, k, Vec3::ZERO));
-        } else {
-            for (rows, v) in hits.normals.iter_mut().zip(vertices) {
-                set_lane(rows, k, mesh.normals[v as usize]);
-            }
-        }
-
-        // Weights, orientation and ray direction
-        [hits.b[0][k], hits.b[1][k]] = uv;
-        hits.orientation[k] = if mesh.flip_normal { -1.0 } else { 1.0 };
-        set_lane(&mut hits.d, k, d);
+        mesh.gather_hit(triangle as usize, uv, d, &mut self.plain_hits[block], k);
         self.plain.push(PlainMeshVertex { path, rho });
     }
 
@@ -332,12 +315,6 @@ impl<'w> Vertices<'w> {
         streams.gather(&other.streams, &rows);
         direct.gather(&other.direct, &rows);
     }
-}
-
-/// Sets a vector of a lane.
-#[inline]
-fn set_lane(rows: &mut [[f32; LANES]; 3], k: usize, v: Vec3) {
-    (rows[0][k], rows[1][k], rows[2][k]) = v.into();
 }
 
 /// An empty vector in the memory of `old`, whose items have the same layout and may borrow from something else.

@@ -8,7 +8,7 @@ use crate::integrators::statistics::LightPathStats;
 use crate::lights::LightId;
 use crate::materials::SurfaceBsdf;
 use crate::photons::path_stream::{BATCH, domain, path_stream};
-use crate::scene::{RenderJob, SurfaceInteraction};
+use crate::scene::{Arrival, RenderJob, SurfaceInteraction, SurfaceInteractions};
 use lumiris_numbers::math::ray::{SEGMENT_END, offset_origin};
 use lumiris_numbers::math::{Ray, Rgb, Vec2, Vec3};
 use lumiris_numbers::samplers::SampleStream;
@@ -59,6 +59,7 @@ pub(super) struct LightPathWalker {
     next: Vec<LightPath>,
     rays: RayBatch,
     hits: Vec<Option<Hit>>,
+    surfaces: SurfaceInteractions,
     pub(super) connections: Vec<CameraConnection>,
     shadows: RayBatch,
     occluded: Vec<bool>,
@@ -93,23 +94,28 @@ impl LightPathWalker {
             job.world.accel.intersect(&self.rays, Coherence::Incoherent, &mut self.hits);
             self.traced += self.active.len() as u64;
             self.next.clear();
-            for (path, hit) in self.active.iter().zip(&self.hits) {
-                let Some(hit) = hit else { continue };
-                let interaction = SurfaceInteraction::new(job, &path.ray, 0.0, 0.0, hit);
-                let Some(bsdf) = interaction.scatter(job) else { continue };
-                if bsdf.makes_caustics {
-                    self.next.extend(path.scattered(&interaction, &bsdf, VERTEX + scattered));
-                }
-                // A mixture may be metal for the light and another surface for the camera
-                let may_connect = !bsdf.makes_caustics || interaction.is_mixture(job);
-                if scattered > 0
-                    && may_connect
-                    && let Some(Connected { connection, segment }) = path.connect(input, &interaction)
-                {
-                    self.connections.push(connection);
-                    self.shadows.push(&segment);
-                }
-            }
+            let LightPathWalker { active, next, hits, surfaces, connections, shadows, .. } = &mut *self;
+            surfaces.visit(
+                job,
+                active,
+                |path| &path.ray,
+                hits,
+                |path, interaction| {
+                    let Some(bsdf) = interaction.scatter(job) else { return };
+                    if bsdf.makes_caustics {
+                        next.extend(path.scattered(interaction, &bsdf, VERTEX + scattered));
+                    }
+                    // A mixture may be metal for the light and another surface for the camera
+                    let may_connect = !bsdf.makes_caustics || interaction.is_mixture(job);
+                    if scattered > 0
+                        && may_connect
+                        && let Some(Connected { connection, segment }) = path.connect(input, interaction)
+                    {
+                        connections.push(connection);
+                        shadows.push(&segment);
+                    }
+                },
+            );
             std::mem::swap(&mut self.active, &mut self.next);
         }
 
@@ -138,12 +144,19 @@ impl LightPathWalker {
         self.active.extend(paths.filter_map(|path| emit(input, path_stream(seed, path))));
         self.rays.set(self.active.iter().map(|path| &path.ray));
         job.world.accel.intersect(&self.rays, Coherence::Incoherent, &mut self.hits);
-        let met = |(path, hit): (&LightPath, &Option<Hit>)| {
-            let at = SurfaceInteraction::new(job, &path.ray, 0.0, 0.0, hit.as_ref()?);
-            let makes_caustics = at.scatter(job)?.makes_caustics;
-            makes_caustics.then_some(CausticHit { light: path.light, d: path.d, value: path.power })
-        };
-        self.active.iter().zip(&self.hits).filter_map(met).collect()
+        let mut found = Vec::new();
+        self.surfaces.visit(
+            job,
+            &self.active,
+            |path| &path.ray,
+            &self.hits,
+            |path, interaction| {
+                if interaction.scatter(job).is_some_and(|bsdf| bsdf.makes_caustics) {
+                    found.push(CausticHit { light: path.light, d: path.d, value: path.power });
+                }
+            },
+        );
+        found
     }
 }
 
@@ -186,7 +199,10 @@ impl LightPath {
         let d = p - projected.o;
         let distance = d.length();
         let ray = Ray { o: projected.o, d: d / distance, t_max: f32::INFINITY, time: self.ray.time };
-        let at_camera = SurfaceInteraction::new(job, &ray, from.width0, from.spread, &Hit { t: distance, ..at.hit });
+        let at_camera = SurfaceInteraction::new(
+            job,
+            &Arrival { ray, hit: Hit { t: distance, ..at.hit }, width: from.width0, spread: from.spread },
+        );
         let bsdf = at_camera.scatter(job)?;
         if bsdf.makes_caustics || !bsdf.bsdf.is_evaluated_exactly() {
             return None;

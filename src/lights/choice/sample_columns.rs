@@ -1,18 +1,20 @@
 //! One light sample for each of many points, in columns.
 //!
-//! Points that chose the same light are sampled together: rectangles, triangles and infinite lights by kernels, other
-//! lights one by one. A light that has a kernel always uses it, so the result is bit-identical for any number of
+//! Points that chose the same light are sampled together: rectangles, triangles, spheres and infinite lights by kernels,
+//! other lights one by one. A light that has a kernel always uses it, so the result is bit-identical for any number of
 //! points.
 
 use super::job_lights::JobLights;
 use super::light_sampler::LightSampler;
-use crate::lights::{AreaLight, AreaShape, LeAndPdf, Light, LightCtx, LightId, LightLanes, LightSample, SampledLight};
+use crate::lights::{
+    AreaLight, AreaShape, LeAndPdf, Light, LightCtx, LightId, LightLanes, LightSample, QuadricLight, SampledLight,
+};
 use lumiris_lanes::area::{Rectangle, many};
 use lumiris_lanes::columns::{Column, Columns3, gather, padded, reserve, scatter};
 use lumiris_lanes::level;
 use lumiris_lanes::light_tree::{GlossyLobes, Receivers};
 use lumiris_numbers::math::light_bound::GlossyLobe;
-use lumiris_numbers::math::{Rgb, Vec3};
+use lumiris_numbers::math::{Rgb, Vec2, Vec3};
 use std::ops::Range;
 
 /// Maximum number of lights for which points are sorted by counting.
@@ -117,6 +119,23 @@ impl LightSamples {
             p_error: self.p_error.vec3(i),
             is_delta: self.is_delta[i],
         })
+    }
+
+    /// Sets sample `i`.
+    #[inline]
+    fn set(&mut self, i: usize, sample: Option<LightSample>) {
+        let Some(LightSample { li, wi, pdf, t, p, n, p_error, is_delta }) = sample else {
+            self.pdf[i] = 0.0;
+            return;
+        };
+        self.wi.set(i, wi);
+        self.li.set_rgb(i, li);
+        self.pdf[i] = pdf;
+        self.p.set(i, p);
+        self.p_error.set(i, p_error);
+        self.n.set(i, n);
+        self.is_far[i] = if t.is_finite() { 0.0 } else { 1.0 };
+        self.is_delta[i] = is_delta;
     }
 
     /// Sets the samples `places` to the first samples of `others`, without points, error bounds and normals if `is_far`.
@@ -296,29 +315,12 @@ impl JobLights {
                 out.is_far[..n].fill(1.0);
                 out.is_delta[..n].fill(false);
             }
-            _ => {
+            light => {
                 for i in 0..n {
-                    self.sample_single(i, light, p.vec3(i), [u[0][i], u[1][i]], out);
+                    out.set(i, light.sample_li(&LightCtx::at(p.vec3(i)), [u[0][i], u[1][i]]));
                 }
             }
         }
-    }
-
-    /// Samples one direction.
-    fn sample_single(&self, i: usize, light: LightId, p: Vec3, u: [f32; 2], out: &mut LightSamples) {
-        let sample = self.lights.get(light as usize).and_then(|l| l.sample_li(&LightCtx::at(p), u));
-        let Some(s) = sample else {
-            out.pdf[i] = 0.0;
-            return;
-        };
-        out.wi.set(i, s.wi);
-        out.li.set_rgb(i, s.li);
-        out.pdf[i] = s.pdf;
-        out.p.set(i, s.p);
-        out.p_error.set(i, s.p_error);
-        out.n.set(i, s.n);
-        out.is_far[i] = if s.t.is_finite() { 0.0 } else { 1.0 };
-        out.is_delta[i] = s.is_delta;
     }
 }
 
@@ -360,6 +362,9 @@ fn sort_by_light(chosen: &[ChosenLight], lights: usize, scratch: &mut Scratch) {
 impl AreaLight {
     /// Samples a point for each of the `n` points `p`; returns false if the shape has no kernel.
     fn sample_many(&self, n: usize, p: &Columns3, u: [&[f32]; 2], out: &mut LightSamples) -> bool {
+        if let AreaShape::Quadric(quadric) = &self.shape {
+            return self.sample_sphere(quadric, n, p, u, out);
+        }
         let len = u[0].len();
         let from = p.get(len);
         let LightSamples { wi, li, pdf, p: points, p_error, n: normals, is_far, is_delta } = out;
@@ -388,6 +393,42 @@ impl AreaLight {
         normals.fill(n, normal);
         is_far[..n].fill(0.0);
         is_delta[..n].fill(false);
+        true
+    }
+
+    /// See [`Self::sample_many`]; returns false if the quadric is not a full sphere.
+    fn sample_sphere(
+        &self,
+        quadric: &QuadricLight,
+        n: usize,
+        p: &Columns3,
+        u: [&[f32]; 2],
+        out: &mut LightSamples,
+    ) -> bool {
+        let Some(sphere) = &quadric.sphere else { return false };
+        let len = u[0].len();
+        let LightSamples { wi, pdf, p: points, p_error, n: outward, .. } = &mut *out;
+        let (wi, points, p_error) = (wi.get_mut(len), points.get_mut(len), p_error.get_mut(len));
+        let mut on_light = many::PointsOnLight { wi, p: points, p_error, pdf: &mut pdf[..len] };
+        many::sample_sphere(level(), sphere, p.get(len), u, outward.get_mut(len), &mut on_light);
+        out.is_far[..n].fill(0.0);
+        out.is_delta[..n].fill(false);
+
+        // Emission and normals; points inside are sampled one by one
+        let is_dark_outside = quadric.reversed && !self.emission.two_sided;
+        for i in 0..n {
+            if out.pdf[i] < 0.0 {
+                out.set(i, self.sample_li(&LightCtx::at(p.vec3(i)), [u[0][i], u[1][i]]));
+                continue;
+            }
+            let outward = out.n.vec3(i);
+            let normal = if quadric.reversed { -outward } else { outward };
+            out.n.set(i, normal);
+            out.li.set_rgb(i, self.emission.l(normal, Vec2::ZERO, -out.wi.vec3(i)));
+            if is_dark_outside {
+                out.pdf[i] = 0.0;
+            }
+        }
         true
     }
 }
@@ -443,6 +484,15 @@ mod tests {
         let local_from_group = group_from_local.inverse();
         let sphere = Shape::Quadric(Quadric { kind, group_from_local, local_from_group, flip_normal: false });
         builder.add_area(3, &sphere, &Emission::constant(Rgb::splat(7.0)));
+
+        // A sphere that contains some of the points, and one that shines to the inside
+        for (geometry, radius, flip_normal, two_sided) in [(4, 0.9, false, true), (5, 1.1, true, false)] {
+            let kind = QuadricKind::Sphere { radius, z_min: -radius, z_max: radius, phi_max: std::f32::consts::TAU };
+            let (group_from_local, local_from_group) = (Affine3A::IDENTITY, Affine3A::IDENTITY);
+            let sphere = Shape::Quadric(Quadric { kind, group_from_local, local_from_group, flip_normal });
+            let emission = Emission { two_sided, ..Emission::constant(Rgb::splat(2.0)) };
+            builder.add_area(geometry, &sphere, &emission);
+        }
         builder.add(Light::Point(PointLight { p: Vec3::new(2.0, 2.0, 2.0), intensity: Rgb::splat(3.0) }));
         builder.add(Light::Distant(DistantLight { wi: Vec3::Z, irradiance: Rgb::WHITE }));
     }

@@ -98,13 +98,18 @@ impl LightSetBuilder {
         let infinite = (0..self.lights.len()).filter(|&i| has_le(&self.lights[i])).map(|i| i as LightId).collect();
         let powers: Vec<f32> = self.lights.par_iter().map(|light| light.power_luminance(scene_radius)).collect();
         let lit = (0..).zip(&powers).filter(|(_, power)| **power > 0.0).map(|(light, _)| light).collect();
+
+        // Geometries that emit
         self.emitting.sort_by_key(|e| e.geometry);
+        let mut place_of = vec![None; self.emitting.last().map_or(0, |e| e.geometry as usize + 1)];
+        (0..).zip(&self.emitting).for_each(|(place, e)| place_of[e.geometry as usize] = Some(place));
         LightSet {
             lights: self.lights,
             infinite,
             powers,
             lit,
             layers: LightLayers::new(&self.groups),
+            place_of,
             emitting: self.emitting,
             emitting_media: self.emitting_media,
             trees: Default::default(),
@@ -127,6 +132,8 @@ pub struct LightSet {
     pub lit: Vec<LightId>,
     /// Layers of the image by groups of lights.
     pub layers: LightLayers,
+    /// For each geometry up to the last that emits, its index in `emitting`, if it emits.
+    place_of: Vec<Option<u32>>,
     /// Sorted by geometry.
     emitting: Vec<EmittingGeometry>,
     /// Emitting media, by medium.
@@ -197,14 +204,14 @@ impl LightSet {
 
     /// True if any primitive of the geometry emits.
     pub fn emits(&self, geometry: GeometryId) -> bool {
-        self.emitting.binary_search_by_key(&geometry, |e| e.geometry).is_ok()
+        self.place_of.get(geometry as usize).is_some_and(Option::is_some)
     }
 
     /// The light that a primitive of a geometry belongs to, if it emits.
     #[inline]
     pub fn light_of(&self, geometry: GeometryId, primitive: u32) -> Option<LightId> {
-        let place = self.emitting.binary_search_by_key(&geometry, |e| e.geometry).ok()?;
-        let e = &self.emitting[place];
+        let place = (*self.place_of.get(geometry as usize)?)?;
+        let e = &self.emitting[place as usize];
         e.light_of_primitive.get(primitive as usize).map(|&i| e.first_light + i)
     }
 

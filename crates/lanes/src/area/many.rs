@@ -3,8 +3,10 @@
 use super::shapes::{Rectangle, barycentric};
 use super::spherical::SphericalSetup;
 use crate::lane::{F, LANES, Vec3s, load, narrowed, or_zero, store, widened};
+use crate::wide::Wide;
 use fearless_simd::{Level, Simd, dispatch, f64x8, prelude::*};
-use lumiris_numbers::math::{Vec3, gamma};
+use lumiris_numbers::math::subtended_cone::SubtendedCone;
+use lumiris_numbers::math::{Sphere, Vec3, gamma};
 
 /// Largest diagonal, relative to the distance of the centre, for sampling by area. Larger rectangles are sampled by
 /// solid angle.
@@ -131,6 +133,53 @@ fn store_points<S: Simd>(
         z: (s * ex.z + t * ey.z + corner.z) * gamma(6) + flatness_error,
     };
     error.store(&mut out.p_error, i);
+}
+
+/// The bound of the rounding error of a point of a sphere with the unit normal `outward`.
+#[inline]
+pub fn sphere_error(sphere: &Sphere, outward: Vec3) -> Vec3 {
+    (sphere.center.abs() + (outward * sphere.radius).abs()) * gamma(8)
+}
+
+/// Samples a direction from each of the points `from` to a sphere, uniform in the cone that it subtends; see
+/// [`sample_rectangle`]. Densities of points inside of the sphere are −1, and their samples undefined. `outward`
+/// receives the outward unit normals.
+pub fn sample_sphere(
+    level: Level,
+    sphere: &Sphere,
+    from: [&[f32]; 3],
+    u: [&[f32]; 2],
+    outward: [&mut [f32]; 3],
+    out: &mut PointsOnLight<'_>,
+) {
+    dispatch!(level, simd => sample_sphere_lanes(simd, sphere, from, u, outward, out));
+}
+
+#[inline(always)]
+fn sample_sphere_lanes<S: Simd>(
+    simd: S,
+    sphere: &Sphere,
+    from: [&[f32]; 3],
+    u: [&[f32]; 2],
+    mut outward: [&mut [f32]; 3],
+    out: &mut PointsOnLight<'_>,
+) {
+    for i in (0..out.pdf.len()).step_by(LANES) {
+        let from = Vec3s::load(simd, from, i).into();
+        let cone = SubtendedCone::new(sphere, from);
+        let point = cone.sample(sphere, from, [Wide(load(simd, u[0], i)), Wide(load(simd, u[1], i))]);
+        let pdf = cone.is_outside.0.select(point.pdf.0, F::splat(simd, -1.0));
+        store(pdf, out.pdf, i);
+        Vec3s::from(point.wi).store(&mut out.wi, i);
+        Vec3s::from(point.p).store(&mut out.p, i);
+
+        // Normals and error bounds
+        let n = Vec3s::from(point.outward);
+        n.store(&mut outward, i);
+        let size = n.times(F::splat(simd, sphere.radius)).abs();
+        let error = Vec3s::splat(simd, sphere.center.abs()).plus(size).times(F::splat(simd, gamma(8)));
+        error.store(&mut out.p_error, i);
+    }
 }
 
 /// Samples a direction from each of the points `from` to a triangle, given by its corners, unit normal and area,

@@ -3,6 +3,7 @@
 use super::support::assert_same_bits;
 use lumiris_lanes::lane::LANES;
 use lumiris_lanes::level;
+use lumiris_lanes::triangle_points::*;
 use lumiris_lanes::vertex::*;
 use lumiris_numbers::estimators::heuristics::{Heuristic, Technique};
 use lumiris_numbers::math::Vec3;
@@ -56,6 +57,22 @@ fn kernels_are_the_same_at_all_levels() {
         let mut out =
             Points { p: [a, b, c], p_error: [d, e, f], n: [g, h, i], facing: [j, k, l], ns: [m, n, o], wo: [p, q, r] };
         points(level, &hits, &mut out);
+    });
+
+    // With derivatives
+    let st: [[Vec<f32>; 2]; 3] = [0, 1, 2].map(|_| [numbers(stream, 3.0), numbers(stream, 3.0)]);
+    let coordinates: Vec<CornerCoordinates> =
+        (0..N / LANES).map(|block| st.each_ref().map(|st| st.each_ref().map(|column| lanes(column, block)))).collect();
+    assert_same_bits::<8>(N, |level, mut columns| {
+        let mut out = vec![TexturedPoints::default(); N / LANES];
+        textured_points(level, &hits, &coordinates, &mut out);
+        for (block, points) in out.iter().enumerate() {
+            let TexturedPoints { derivatives: [u, v], inverse_lengths: [inverse_u, inverse_v], .. } = *points;
+            let rows = [u[0], u[1], u[2], v[0], v[1], v[2], inverse_u, inverse_v];
+            for (column, row) in columns.iter_mut().zip(rows) {
+                column[block * LANES..][..LANES].copy_from_slice(&row);
+            }
+        }
     });
 
     // Segments

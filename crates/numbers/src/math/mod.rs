@@ -6,8 +6,8 @@
 //!
 //! Reading order: [`scalar`], [`rgb`], [`frame`], [`transform`], [`origin`], [`ray`], [`bounds`], [`warp`],
 //! [`sphere_map`], [`octahedral`], [`cumulative`], [`distribution`], [`texel_distribution`], [`bilinear`], [`alias`],
-//! [`hash`], [`noise`], [`number`], [`v3`], [`elementary`], [`light_bound`],
-//! [`expected_visibility`].
+//! [`hash`], [`noise`], [`number`], [`v3`], [`elementary`],
+//! [`subtended_cone`], [`light_bound`], [`expected_visibility`].
 
 pub mod alias;
 pub mod bilinear;
@@ -27,6 +27,7 @@ pub mod ray;
 pub mod rgb;
 pub mod scalar;
 pub mod sphere_map;
+pub mod subtended_cone;
 pub mod texel_distribution;
 pub mod transform;
 pub mod v3;

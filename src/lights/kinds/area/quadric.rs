@@ -7,10 +7,10 @@
 use super::shape_sample::{ShapePoint, ShapeSample, pdf_by_area};
 use crate::geometry::{Quadric, QuadricKind};
 use crate::lights::Sphere;
-use lumiris_numbers::math::warp::{
-    azimuth, direction, pdf_uniform_cone, sample_uniform_cone, sample_uniform_disk_concentric,
-};
-use lumiris_numbers::math::{Bounds3, Frame, Mat3, Vec2, Vec3, gamma, safe_sqrt, sqr};
+use lumiris_lanes::area::many::sphere_error;
+use lumiris_numbers::math::subtended_cone::{ON_SURFACE, SpherePoint, SubtendedCone};
+use lumiris_numbers::math::warp::{azimuth, direction, sample_uniform_disk_concentric};
+use lumiris_numbers::math::{Bounds3, Mat3, Vec2, Vec3, gamma, safe_sqrt, sqr};
 use std::f32::consts::TAU;
 
 /// A quadric that emits.
@@ -23,25 +23,15 @@ pub struct QuadricLight {
     /// Area in world space.
     pub area: f32,
     /// The sphere in world space, if it is a full one.
-    sphere: Option<Sphere>,
+    pub(in crate::lights) sphere: Option<Sphere>,
     /// True if the normal is the reverse of the outward one (of +z for a disk).
-    reversed: bool,
+    pub(in crate::lights) reversed: bool,
 }
 
 /// A point of the local surface, and its normal before flipping.
 struct LocalPoint {
     p: Vec3,
     n: Vec3,
-}
-
-/// The cone that a sphere subtends at a point.
-struct SubtendedCone {
-    /// 1 − cos θmax.
-    one_minus_cos: f32,
-    /// Unit direction to the centre.
-    axis: Vec3,
-    /// sin² θmax.
-    sin2: f32,
 }
 
 /// The plane of a disk.
@@ -88,9 +78,6 @@ fn sphere_radius(kind: &QuadricKind, m: &Mat3) -> Option<f32> {
         squares.iter().all(|s| (s - mean).abs() <= 1e-5 * mean) && dots.iter().all(|d| d.abs() <= 1e-5 * mean);
     (is_full && keeps_angles && mean > 0.0).then(|| radius * mean.sqrt())
 }
-
-/// Relative distance from a sphere within which a point counts as on it.
-const ON_SURFACE: f32 = 1e-5;
 
 impl QuadricLight {
     /// A quadric in world space.
@@ -163,51 +150,19 @@ impl QuadricLight {
 
     /// The cone that the sphere subtends at `from`. `None` if the shape is not a full sphere or `from` is inside.
     #[inline]
-    fn cone(&self, from: Vec3) -> Option<SubtendedCone> {
-        let Sphere { center, radius } = self.sphere?;
-        let d = center - from;
-        let distance = d.length();
-        if distance <= radius * (1.0 + ON_SURFACE) {
-            return None;
-        }
-        let sin2 = sqr(radius / distance);
-        let cos = ((distance - radius) * (distance + radius)).sqrt() / distance;
-        Some(SubtendedCone { one_minus_cos: sin2 / (1.0 + cos), axis: d / distance, sin2 })
+    fn cone(&self, from: Vec3) -> Option<SubtendedCone<f32>> {
+        Some(SubtendedCone::new(&self.sphere?, from.into())).filter(|cone| cone.is_outside)
     }
 
     pub(super) fn sample(&self, from: Vec3, u: [f32; 2]) -> Option<ShapeSample> {
-        match (self.cone(from), self.sphere) {
-            (Some(cone), Some(sphere)) => self.sample_cone(from, u, sphere, cone),
-            _ => ShapeSample::by_area(from, self.sample_point(u)),
-        }
-    }
-
-    fn sample_cone(
-        &self,
-        from: Vec3,
-        u: [f32; 2],
-        Sphere { center, radius }: Sphere,
-        SubtendedCone { one_minus_cos, axis, sin2: sin2_max }: SubtendedCone,
-    ) -> Option<ShapeSample> {
-        // The point is computed from the angle α at the centre, which stays accurate for small and distant spheres: cos
-        // α = sin²θ/sin θmax + cos θ·sqrt(1 − sin²θ/sin²θmax).
-        let w = sample_uniform_cone(u, one_minus_cos);
-        let sin2 = sqr(w.x) + sqr(w.y);
-        let cos_alpha = sin2 / sin2_max.sqrt() + w.z * safe_sqrt(1.0 - sin2 / sin2_max);
-        let sin_alpha = safe_sqrt(1.0 - sqr(cos_alpha));
-        let sin = sin2.sqrt();
-        let radial = if sin > 0.0 { Vec2::new(w.x, w.y) / sin } else { Vec2::ZERO };
-        let frame = Frame::from_z(axis);
-        let outward = frame.to_world((radial * sin_alpha).extend(-cos_alpha)).normalize();
-
-        let p = center + outward * radius;
-        let d = p - from;
-        let t = d.length();
-        let wi = d / t;
-        let pdf = pdf_uniform_cone(one_minus_cos);
+        let (Some(cone), Some(sphere)) = (self.cone(from), self.sphere) else {
+            return ShapeSample::by_area(from, self.sample_point(u));
+        };
+        let SpherePoint { p, outward, wi, t, pdf } = cone.sample(&sphere, from.into(), u);
+        let outward = Vec3::from(outward);
         let n = if self.reversed { -outward } else { outward };
-        let p_error = (center.abs() + (outward * radius).abs()) * gamma(8);
-        (pdf.is_finite() && t > 0.0).then_some(ShapeSample { p, n, p_error, wi, t, pdf })
+        let p_error = sphere_error(&sphere, outward);
+        (pdf > 0.0).then_some(ShapeSample { p: p.into(), n, p_error, wi: wi.into(), t, pdf })
     }
 
     /// A point uniform in the area of the local quadric.
@@ -226,8 +181,8 @@ impl QuadricLight {
     }
 
     pub(super) fn pdf(&self, from: Vec3, p: Vec3) -> f32 {
-        if let Some(SubtendedCone { one_minus_cos, .. }) = self.cone(from) {
-            return pdf_uniform_cone(one_minus_cos);
+        if let Some(cone) = self.cone(from) {
+            return cone.pdf();
         }
         let scaled_n = self.cofactor * self.local_normal(self.quadric.local_from_group.transform_point3(p));
         let jacobian = scaled_n.length();

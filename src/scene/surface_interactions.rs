@@ -1,0 +1,103 @@
+//! Surface interactions of many rays at once.
+
+use super::job::RenderJob;
+use super::surface_interaction::{Arrival, SurfaceInteraction, inverse_lengths};
+use crate::accel::Hit;
+use crate::geometry::{Shape, TriangleMesh};
+use lumiris_lanes::lane::LANES;
+use lumiris_lanes::level;
+use lumiris_lanes::triangle_points::{CornerCoordinates, TexturedPoints, TriangleHits, lane, textured_points};
+use lumiris_numbers::math::{Ray, Vec2};
+
+/// The interactions of a group of arrivals. The points of meshes are computed together; the results are those of
+/// [`SurfaceInteraction::new`], bit for bit.
+#[derive(Debug, Default)]
+pub struct SurfaceInteractions {
+    arrivals: Vec<Arrival>,
+    interactions: Vec<SurfaceInteraction>,
+    /// Hits on meshes, their texture coordinates and their points, one item per vector of lanes.
+    hits: Vec<TriangleHits>,
+    coordinates: Vec<CornerCoordinates>,
+    points: Vec<TexturedPoints>,
+}
+
+impl SurfaceInteractions {
+    /// Maximum number of rays of a group. More would displace the texels that are requested for it from the cache.
+    pub const GROUP: usize = 32;
+
+    /// Adds an arrival to the group.
+    #[inline]
+    pub fn push(&mut self, arrival: Arrival) {
+        self.arrivals.push(arrival);
+    }
+
+    /// The interactions of the arrivals added since the last call, in their order. Requests the texels of their
+    /// materials.
+    pub fn find(&mut self, job: &RenderJob) -> &[SurfaceInteraction] {
+        self.compute_points(job);
+        let SurfaceInteractions { arrivals, interactions, points, .. } = self;
+        let mut row = 0;
+        interactions.clear();
+        interactions.extend(arrivals.drain(..).map(|arrival| {
+            let Hit { primitive, instance, uv, .. } = arrival.hit;
+            let Some(mesh) = mesh_of(job, &arrival.hit) else { return SurfaceInteraction::new(job, &arrival) };
+            let (points, k) = (&points[row / LANES], row % LANES);
+            row += 1;
+            let (surface, wo) = (mesh.surface_hit_of_lane(primitive as usize, uv, points, k), lane(&points.wo, k));
+            if instance == Hit::NO_INSTANCE {
+                let inverse_lengths = Vec2::new(points.inverse_lengths[0][k], points.inverse_lengths[1][k]);
+                return SurfaceInteraction::at(job, &arrival, surface, wo, inverse_lengths);
+            }
+            let placed = surface.transformed(&job.world.scene.geometry.world_from_group_at(instance, arrival.ray.time));
+            SurfaceInteraction::at(job, &arrival, placed, wo, inverse_lengths(&placed))
+        }));
+        interactions.iter().for_each(|interaction| interaction.prefetch(job));
+        interactions
+    }
+
+    /// Calls `visit` with each of the items whose ray hits a surface, and the interaction. `hits` are the first hits of
+    /// these rays.
+    pub fn visit<'p, P>(
+        &mut self,
+        job: &RenderJob,
+        items: &'p [P],
+        ray: impl Fn(&P) -> &Ray,
+        hits: &[Option<Hit>],
+        mut visit: impl FnMut(&'p P, &SurfaceInteraction),
+    ) {
+        for (items, hits) in items.chunks(Self::GROUP).zip(hits.chunks(Self::GROUP)) {
+            let met = || items.iter().zip(hits).filter_map(|(item, hit)| Some((item, hit.as_ref()?)));
+            met().for_each(|(item, hit)| self.push(Arrival::of_ray(ray(item), hit)));
+            met().zip(self.find(job)).for_each(|((item, _), interaction)| visit(item, interaction));
+        }
+    }
+
+    /// Computes the points of meshes in the spaces of their groups, in the order of their arrivals.
+    fn compute_points(&mut self, job: &RenderJob) {
+        let SurfaceInteractions { arrivals, hits, coordinates, points, .. } = self;
+        let mut count = 0;
+        for Arrival { ray, hit, .. } in arrivals {
+            let Some(mesh) = mesh_of(job, hit) else { continue };
+            let (block, k) = (count / LANES, count % LANES);
+            if block == hits.len() {
+                hits.push(TriangleHits::default());
+                coordinates.push(CornerCoordinates::default());
+                points.push(TexturedPoints::default());
+            }
+            mesh.gather_hit(hit.primitive as usize, hit.uv, ray.d, &mut hits[block], k);
+            mesh.gather_coordinates(hit.primitive as usize, &mut coordinates[block], k);
+            count += 1;
+        }
+        let blocks = ..count.div_ceil(LANES);
+        textured_points(level(), &hits[blocks], &coordinates[blocks], &mut points[blocks]);
+    }
+}
+
+/// The mesh of a hit.
+#[inline]
+fn mesh_of<'j>(job: &'j RenderJob, hit: &Hit) -> Option<&'j TriangleMesh> {
+    match &job.world.scene.geometry.geometries[hit.geometry as usize].shape {
+        Shape::Mesh(mesh) => Some(mesh),
+        Shape::Quadric(_) | Shape::Bilinear(_) | Shape::Curves(_) => None,
+    }
+}
