@@ -69,9 +69,7 @@ pub(super) fn random_quadric(s: &mut Pcg32, kind: u32) -> Shape {
         1 => QuadricKind::Disk { height: 0.1, radius, inner_radius: 0.05, phi_max },
         _ => QuadricKind::Cylinder { radius, z_min: -0.5, z_max: 0.5, phi_max },
     };
-    let group_from_local = random_placement(s);
-    let local_from_group = group_from_local.inverse();
-    Shape::Quadric(Quadric { kind, group_from_local, local_from_group, flip_normal: false })
+    Shape::Quadric(Quadric::new(kind, random_placement(s), false))
 }
 
 pub(super) fn random_patches(s: &mut Pcg32, count: u32) -> Shape {

@@ -7,6 +7,7 @@
 //!
 //! `integrators/camera_sampler.rs` draws the positions; `render/tile_samples.rs` adds the weighted samples.
 
+use lumiris_numbers::math::distribution::PlaceInBin;
 use lumiris_numbers::math::warp::sample_tent;
 use lumiris_numbers::math::{PiecewiseConstant1D, Vec2};
 use std::f32::consts::PI;
@@ -155,7 +156,8 @@ impl PixelFilter {
             return AxisSampler::Point;
         }
         let is_negative = values.iter().map(|&v| v < 0.0).collect();
-        AxisSampler::Table { r, distribution: PiecewiseConstant1D::new(&absolute), is_negative, weight }
+        let (bin_width, distribution) = (2.0 * r / n as f32, PiecewiseConstant1D::new(&absolute));
+        AxisSampler::Table { r, bin_width, distribution, is_negative, weight }
     }
 }
 
@@ -164,7 +166,7 @@ enum AxisSampler {
     Point,
     Box { r: f32 },
     Tent { r: f32 },
-    Table { r: f32, distribution: PiecewiseConstant1D, is_negative: Vec<bool>, weight: f32 },
+    Table { r: f32, bin_width: f32, distribution: PiecewiseConstant1D, is_negative: Vec<bool>, weight: f32 },
 }
 
 /// A sample of a filter along one axis.
@@ -181,10 +183,10 @@ impl AxisSampler {
             AxisSampler::Point => with_weight_one(0.0),
             AxisSampler::Box { r } => with_weight_one((2.0 * u - 1.0) * r),
             AxisSampler::Tent { r } => with_weight_one(sample_tent(u, *r)),
-            AxisSampler::Table { r, distribution, is_negative, weight } => match distribution.sample(u) {
-                Some(s) => AxisSample {
-                    offset: (2.0 * s.x - 1.0) * r,
-                    weight: if is_negative[s.index] { -weight } else { *weight },
+            AxisSampler::Table { r, bin_width, distribution, is_negative, weight } => match distribution.place(u) {
+                Some(PlaceInBin { index, fraction }) => AxisSample {
+                    offset: (index as f32 + fraction) * bin_width - r,
+                    weight: if is_negative[index] { -weight } else { *weight },
                 },
                 None => with_weight_one(0.0),
             },
@@ -205,7 +207,7 @@ impl AxisSampler {
             AxisSampler::Box { r } if x.abs() <= *r => 0.5 / r,
             AxisSampler::Tent { r } if x.abs() <= *r => (r - x.abs()) / (r * r),
             AxisSampler::Box { .. } | AxisSampler::Tent { .. } => 0.0,
-            AxisSampler::Table { r, distribution, is_negative, weight } => {
+            AxisSampler::Table { r, distribution, is_negative, weight, .. } => {
                 let place = (x / r + 1.0) * 0.5;
                 if !(0.0..1.0).contains(&place) {
                     return 0.0;

@@ -65,9 +65,53 @@ pub struct Quadric {
     /// xor reflection. Normals therefore point outward (+z for a disk), reflected or not, unless `ReverseOrientation`
     /// is set.
     pub flip_normal: bool,
+    ball: Ball,
+}
+
+/// A ball that contains a quadric, in the space of its group.
+#[derive(Clone, Copy, Debug)]
+struct Ball {
+    center: DVec3,
+    /// Infinite for disks and cylinders.
+    radius_squared: f64,
+}
+
+impl Ball {
+    /// The ball of a quadric that rays are transformed to by `local_from_group`.
+    fn new(kind: &QuadricKind, local_from_group: &Affine3A) -> Self {
+        let DAffine3 { matrix3: m, translation: center } = local_from_group.as_daffine3().inverse();
+        let QuadricKind::Sphere { radius, .. } = *kind else { return Ball { center, radius_squared: f64::INFINITY } };
+
+        // No eigenvalue of MᵀM is above its largest sum of magnitudes in a row [Gershgorin]
+        let squares = (m.transpose() * m).abs();
+        let rows = squares.x_axis + squares.y_axis + squares.z_axis;
+        Ball { center, radius_squared: rows.max_element() * f64::from(radius).powi(2) }
+    }
+
+    /// True if the part of a ray from `o` to o + t_max d is surely outside, far beyond the effect of rounding: a shadow
+    /// segment to a sphere ends before it.
+    #[inline]
+    fn is_missed(&self, o: DVec3, d: DVec3, t_max: f64) -> bool {
+        let from = o - self.center;
+        let (a, b) = (d.length_squared(), from.dot(d));
+        let nearest = if -b >= a * t_max { from + d * t_max } else { from - d * (b.min(0.0) / a) };
+        nearest.length_squared() > self.radius_squared * OUTSIDE
+    }
 }
 
 impl Quadric {
+    /// A quadric with its transform. See [`Self::flip_normal`].
+    pub fn new(kind: QuadricKind, group_from_local: Affine3A, flip_normal: bool) -> Self {
+        let local_from_group = group_from_local.inverse();
+        Quadric { kind, group_from_local, local_from_group, flip_normal, ball: Ball::new(&kind, &local_from_group) }
+    }
+
+    /// The same quadric with another [`Self::flip_normal`].
+    #[must_use]
+    pub fn with_flip(self, flip_normal: bool) -> Self {
+        Quadric { flip_normal, ..self }
+    }
+
     /// Bounds of the full quadric (the sweep angle is not used to tighten them).
     pub fn bounds(&self) -> Bounds3 {
         let local = match self.kind {
@@ -107,12 +151,12 @@ impl Quadric {
     /// The arguments are the point, its t and its index.
     #[inline]
     fn first<T>(&self, ray: &Ray, take: impl Fn(DVec3, f32, usize) -> Option<T>) -> Option<T> {
-        let local_from_group = self.local_from_group.as_daffine3();
-        let o = local_from_group.transform_point3(ray.o.as_dvec3());
-        let d = local_from_group.transform_vector3(ray.d.as_dvec3());
-        if self.kind.is_beyond(o, d, f64::from(ray.t_max)) {
+        let (o, d) = (ray.o.as_dvec3(), ray.d.as_dvec3());
+        if self.ball.is_missed(o, d, f64::from(ray.t_max)) {
             return None;
         }
+        let local_from_group = self.local_from_group.as_daffine3();
+        let (o, d) = (local_from_group.transform_point3(o), local_from_group.transform_vector3(d));
         let roots = self.kind.roots(o, d)?;
 
         // Below this parameter a hit is rounding noise: o is the sum of terms of this size.
@@ -177,16 +221,6 @@ impl QuadricKind {
             QuadricKind::Disk { height, .. } => height.abs(),
         };
         DVec3::new(self.radius(), self.radius(), f64::from(z))
-    }
-
-    /// True if a segment from `o` to o + t_max d surely ends before it reaches a sphere, as shadow segments to the
-    /// sphere itself do. It then comes nearer to the centre all the way, and its end is outside, far beyond the effect
-    /// of rounding.
-    #[inline]
-    fn is_beyond(&self, o: DVec3, d: DVec3, t_max: f64) -> bool {
-        let QuadricKind::Sphere { radius, .. } = *self else { return false };
-        let approaches = -o.dot(d) >= d.length_squared() * t_max;
-        approaches && (o + d * t_max).length_squared() > f64::from(radius).powi(2) * OUTSIDE
     }
 
     /// Parameters of the intersections of the line o + t d with the full quadric, in ascending order.
@@ -369,8 +403,7 @@ mod tests {
     }
 
     fn placed(kind: QuadricKind, group_from_local: Affine3A) -> Quadric {
-        let local_from_group = group_from_local.inverse();
-        Quadric { kind, group_from_local, local_from_group, flip_normal: swaps_handedness(&group_from_local) }
+        Quadric::new(kind, group_from_local, swaps_handedness(&group_from_local))
     }
 
     fn random_placement(s: &mut Pcg32) -> Affine3A {
@@ -423,6 +456,31 @@ mod tests {
             }
         }
         None
+    }
+
+    #[test]
+    fn rays_outside_of_the_ball_hit_nothing() {
+        let mut s = pcg32([3, 0, 4]);
+        let (mut missed, mut met) = (0, 0);
+        for k in 0..20_000 {
+            // The ball of a sphere that is scaled evenly is the sphere
+            let rotation = glam::Quat::from_axis_angle(random_point(&mut s).normalize_or(Vec3::X), 2.0);
+            let even = Affine3A::from_rotation_translation(rotation, random_point(&mut s) * 5.0);
+            let placement = if k % 5 == 0 { random_placement(&mut s) } else { even };
+            let quadric = placed(kinds()[k % 2], placement);
+            // Segments of any length to a point near the surface, from inside or outside
+            let to_group = |p: Vec3| quadric.group_from_local.transform_point3(p);
+            let target = to_group(random_point(&mut s).normalize_or(Vec3::X) * 1.3 * (1.0 + 1e-6 * s.random::<f32>()));
+            let o = to_group(random_point(&mut s) * 3.0);
+            let t_max = [0.9999, 1.0, 1.5, f32::INFINITY][k % 4];
+            let ray = Ray { o, d: target - o, t_max, time: 0.0 };
+            let unbounded = Quadric { ball: Ball { radius_squared: f64::INFINITY, ..quadric.ball }, ..quadric };
+            let is_missed = quadric.ball.is_missed(o.as_dvec3(), ray.d.as_dvec3(), f64::from(t_max));
+            assert!(!is_missed || unbounded.distance(&ray).is_none(), "{quadric:?} {ray:?}");
+            missed += usize::from(is_missed);
+            met += usize::from(unbounded.distance(&ray).is_some());
+        }
+        assert!(missed > 1000 && met > 1000, "{missed} {met}");
     }
 
     #[test]

@@ -8,7 +8,7 @@ use super::{
     DistantLight, Emission, EmissionImage, EmissionSample, EnvironmentFilter, EnvironmentMap, EnvironmentMapping,
     ImageLight, ImageMapping, Light, LightCtx, PointLight, Portal, PortalLight, Sphere, SpotLight, area_lights_of,
 };
-use crate::geometry::{BilinearMesh, Quadric, QuadricKind, Shape, TriangleMesh};
+use crate::geometry::{BilinearMesh, QuadricKind, Shape, TriangleMesh};
 use lumiris_numbers::math::warp::azimuth;
 use lumiris_numbers::math::{Affine3A, Frame, Mat3, Rgb, Vec3};
 use lumiris_test_support::random::{Pcg32, RngExt, pcg32};
@@ -21,7 +21,7 @@ const SCENE: Sphere = Sphere { center: Vec3::new(0.2, -0.1, 0.4), radius: 2.5 };
 
 fn sphere(flip_normal: bool, placement: Affine3A) -> Shape {
     let kind = QuadricKind::Sphere { radius: 0.6, z_min: -0.6, z_max: 0.6, phi_max: TAU };
-    Shape::Quadric(Quadric { flip_normal, ..quadric(kind, placement) })
+    Shape::Quadric(quadric(kind, placement).with_flip(flip_normal))
 }
 
 fn bent_patch() -> BilinearMesh {

@@ -209,8 +209,7 @@ mod tests {
 
     fn sphere(center: Vec3, radius: f32, flip_normal: bool) -> Shape {
         let kind = QuadricKind::Sphere { radius, z_min: -radius, z_max: radius, phi_max: std::f32::consts::TAU };
-        let group_from_local = Affine3A::from_translation(center);
-        Shape::Quadric(Quadric { kind, group_from_local, local_from_group: group_from_local.inverse(), flip_normal })
+        Shape::Quadric(Quadric::new(kind, Affine3A::from_translation(center), flip_normal))
     }
 
     fn shapes() -> Vec<Shape> {

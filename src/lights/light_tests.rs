@@ -59,7 +59,7 @@ pub(super) fn patch_surface(corners: [Vec3; 4]) -> Surface {
 }
 
 pub(super) fn quadric(kind: QuadricKind, placement: Affine3A) -> Quadric {
-    Quadric { kind, group_from_local: placement, local_from_group: placement.inverse(), flip_normal: false }
+    Quadric::new(kind, placement, false)
 }
 
 /// Coordinates (z or squared radius, φ), both scaled to their ranges.
@@ -345,7 +345,7 @@ fn one_sided_lights_emit_on_the_side_of_their_normal() {
     let tube = QuadricKind::Cylinder { radius: 1.0, z_min: -1.0, z_max: 1.0, phi_max: std::f32::consts::TAU };
     let far = Vec3::new(0.4, 0.3, 5.0);
     let lit = |kind, placement: Affine3A, flip_normal, p: Vec3| {
-        let q = Quadric { flip_normal, ..quadric(kind, placement) };
+        let q = quadric(kind, placement).with_flip(flip_normal);
         let light = area_lights_of(&Shape::Quadric(q), &Emission::constant(Rgb::WHITE)).lights.remove(0);
         (0..64).any(|i| {
             let u = [(i % 8) as f32 / 8.0 + 0.03, (i / 8) as f32 / 8.0 + 0.03];

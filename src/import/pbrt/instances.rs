@@ -3,7 +3,7 @@
 use super::descriptions::{InstanceDesc, ObjectDesc};
 use super::layout::{Groups, Layout};
 use super::make_shapes::placed_quadric;
-use crate::geometry::{ClusterId, Clusters, Group, GroupId, Instance, Member, Quadric, Shape};
+use crate::geometry::{ClusterId, Clusters, Group, GroupId, Instance, Member, Shape};
 use lumiris_formats::source::Span;
 use lumiris_numbers::math::origin::rebased;
 use lumiris_numbers::math::transform::{compose_placements, swaps_handedness};
@@ -70,7 +70,7 @@ pub(super) fn flattened(shape: &Shape, world_from_group: &Affine3A) -> Option<Sh
         Shape::Quadric(q) => {
             let placed = placed_quadric(q.kind, &(*world_from_group * q.group_from_local))?;
             let reverse = q.flip_normal ^ swaps_handedness(&q.group_from_local);
-            Some(Shape::Quadric(Quadric { flip_normal: placed.flip_normal ^ reverse, ..placed }))
+            Some(Shape::Quadric(placed.with_flip(placed.flip_normal ^ reverse)))
         }
         Shape::Curves(_) => None,
     }

@@ -63,7 +63,7 @@ impl ShapeMaker<'_> {
                 let placement = placement(DVec3::ZERO);
                 let quadric = placed_quadric(kind, &placement.group_from_object)
                     .ok_or_else(|| "the shape is flattened".to_owned())?;
-                Ok(placement.made(Shape::Quadric(Quadric { flip_normal: placement.flip, ..quadric })))
+                Ok(placement.made(Shape::Quadric(quadric.with_flip(placement.flip))))
             }
             ShapeSource::Mesh(data) => {
                 let placement = placement(data.origin);
@@ -176,10 +176,8 @@ impl ShapeDesc {
 /// A transformed quadric; `None` if the transform flattens it, except for a disk along its axis.
 pub(super) fn placed_quadric(kind: QuadricKind, m: &Affine3A) -> Option<Quadric> {
     let with = |kind, m: Affine3A| {
-        let local_from_group = m.inverse();
-        let flip_normal = swaps_handedness(&m);
-        let quadric = Quadric { kind, group_from_local: m, local_from_group, flip_normal };
-        (m.matrix3.determinant() != 0.0 && local_from_group.is_finite()).then_some(quadric)
+        let quadric = Quadric::new(kind, m, swaps_handedness(&m));
+        (m.matrix3.determinant() != 0.0 && quadric.local_from_group.is_finite()).then_some(quadric)
     };
     let flat_disk = || {
         let QuadricKind::Disk { height, radius, inner_radius, phi_max } = kind else { return None };

@@ -479,20 +479,14 @@ mod tests {
             &mesh(&[Vec3::ONE, Vec3::new(2.0, 1.0, 1.5), Vec3::new(1.0, 2.0, 1.0)], vec![[0, 1, 2]]),
             &both,
         );
-        let group_from_local = Affine3A::from_translation(Vec3::new(-1.0, 1.0, 2.0));
-        let kind = QuadricKind::Sphere { radius: 0.4, z_min: -0.4, z_max: 0.4, phi_max: std::f32::consts::TAU };
-        let local_from_group = group_from_local.inverse();
-        let sphere = Shape::Quadric(Quadric { kind, group_from_local, local_from_group, flip_normal: false });
-        builder.add_area(3, &sphere, &Emission::constant(Rgb::splat(7.0)));
-
-        // A sphere that contains some of the points, and one that shines to the inside
-        for (geometry, radius, flip_normal, two_sided) in [(4, 0.9, false, true), (5, 1.1, true, false)] {
+        let sphere = |radius: f32, center: Vec3, flip_normal: bool| {
             let kind = QuadricKind::Sphere { radius, z_min: -radius, z_max: radius, phi_max: std::f32::consts::TAU };
-            let (group_from_local, local_from_group) = (Affine3A::IDENTITY, Affine3A::IDENTITY);
-            let sphere = Shape::Quadric(Quadric { kind, group_from_local, local_from_group, flip_normal });
-            let emission = Emission { two_sided, ..Emission::constant(Rgb::splat(2.0)) };
-            builder.add_area(geometry, &sphere, &emission);
-        }
+            Shape::Quadric(Quadric::new(kind, Affine3A::from_translation(center), flip_normal))
+        };
+        builder.add_area(3, &sphere(0.4, Vec3::new(-1.0, 1.0, 2.0), false), &Emission::constant(Rgb::splat(7.0)));
+        // A sphere that contains some of the points, and one that shines to the inside
+        builder.add_area(4, &sphere(0.9, Vec3::ZERO, false), &both);
+        builder.add_area(5, &sphere(1.1, Vec3::ZERO, true), &Emission::constant(Rgb::splat(2.0)));
         builder.add(Light::Point(PointLight { p: Vec3::new(2.0, 2.0, 2.0), intensity: Rgb::splat(3.0) }));
         builder.add(Light::Distant(DistantLight { wi: Vec3::Z, irradiance: Rgb::WHITE }));
     }

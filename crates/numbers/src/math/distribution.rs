@@ -89,6 +89,15 @@ impl Bin {
     }
 }
 
+/// A point in one of equal bins.
+#[derive(Clone, Copy, Debug)]
+pub struct PlaceInBin {
+    /// Index of the bin.
+    pub index: usize,
+    /// Relative position in the bin, in [0, 1).
+    pub fraction: f32,
+}
+
 /// A running integral and its guide.
 #[derive(Clone, Copy, Debug)]
 pub struct Running<'a> {
@@ -200,13 +209,17 @@ impl PiecewiseConstant1D {
     /// The point of cumulative probability `u`; `None` if the function is 0.
     #[inline]
     pub fn sample(&self, u: f32) -> Option<Sample1D> {
-        if self.integral <= 0.0 {
-            return None;
-        }
+        let PlaceInBin { index, fraction } = self.place(u)?;
+        let x = place_in_bin(index, fraction, self.values.len());
+        Some(Sample1D { x, pdf: self.values[index] / self.integral, index })
+    }
+
+    /// The same point, by its bin.
+    #[inline]
+    pub fn place(&self, u: f32) -> Option<PlaceInBin> {
         let u = clamped(u);
         let bin = self.running().bin(u);
-        let (x, index) = (place_in_bin(bin.index, bin.fraction(u), self.values.len()), bin.index);
-        Some(Sample1D { x, pdf: self.values[index] / self.integral, index })
+        (self.integral > 0.0).then(|| PlaceInBin { index: bin.index, fraction: bin.fraction(u) })
     }
 
     #[inline(always)]

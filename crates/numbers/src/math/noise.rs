@@ -26,24 +26,51 @@ fn permuted(i: usize) -> usize {
     usize::from(PERMUTATION[i & 255])
 }
 
-/// Dot product of the gradient at a lattice corner and the offset from it.
-#[inline]
-fn corner(cell: [usize; 3], offset: Vec3) -> f32 {
-    let hash = permuted(permuted(permuted(cell[0]) + cell[1]) + cell[2]) & 15;
-    let Vec3 { x, y, z } = offset;
-    let u = if hash < 8 || hash == 12 || hash == 13 { x } else { y };
-    let v = if hash < 4 || hash == 12 || hash == 13 { y } else { z };
-    (if hash & 1 == 0 { u } else { -u }) + if hash & 2 == 0 { v } else { -v }
+/// Gradients at lattice corners: to the middles of the edges of a cube, four of them twice.
+const GRADIENTS: [[f32; 3]; 16] = [
+    [1.0, 1.0, 0.0],
+    [-1.0, 1.0, 0.0],
+    [1.0, -1.0, 0.0],
+    [-1.0, -1.0, 0.0],
+    [1.0, 0.0, 1.0],
+    [-1.0, 0.0, 1.0],
+    [1.0, 0.0, -1.0],
+    [-1.0, 0.0, -1.0],
+    [0.0, 1.0, 1.0],
+    [0.0, -1.0, 1.0],
+    [0.0, 1.0, -1.0],
+    [0.0, -1.0, -1.0],
+    [1.0, 1.0, 0.0],
+    [-1.0, 1.0, 0.0],
+    [0.0, 1.0, -1.0],
+    [0.0, -1.0, -1.0],
+];
+
+/// ⌊x⌋ and the rest.
+struct Split {
+    /// ⌊x⌋ modulo 256.
+    cell: usize,
+    rest: f32,
+}
+
+impl Split {
+    #[inline]
+    fn new(x: f64) -> Self {
+        // Not `f64::floor`, a function call without SSE 4.1
+        let truncated = x as i64;
+        let base = if truncated as f64 > x { truncated - 1 } else { truncated };
+        Split { cell: (base & 255) as usize, rest: (x - base as f64) as f32 }
+    }
 }
 
 /// Noise of frequency 1 in about −1..1; it is 0 at all integer points.
 pub fn noise(p: DVec3) -> f32 {
-    let base = p.floor();
-    let f = (p - base).as_vec3();
-    let cell: [usize; 3] = std::array::from_fn(|axis| (base[axis] as i64 & 255) as usize);
+    let [x, y, z] = [p.x, p.y, p.z].map(Split::new);
+    let f = Vec3::new(x.rest, y.rest, z.rest);
+    // The dot product of the gradient at a lattice corner and the offset from it
     let at = |dx: usize, dy: usize, dz: usize| {
-        let lattice = [(cell[0] + dx) & 255, (cell[1] + dy) & 255, (cell[2] + dz) & 255];
-        corner(lattice, f - Vec3::new(dx as f32, dy as f32, dz as f32))
+        let hash = permuted(permuted(permuted(x.cell + dx) + y.cell + dy) + z.cell + dz) & 15;
+        Vec3::from_array(GRADIENTS[hash]).dot(f - Vec3::new(dx as f32, dy as f32, dz as f32))
     };
     let w = f * f * f * (f * (f * 6.0 - 15.0) + 10.0);
     let lerp = |t: f32, a: f32, b: f32| a + t * (b - a);

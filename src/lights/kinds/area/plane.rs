@@ -87,7 +87,7 @@ mod tests {
         let mesh = |p: Vec<Vec3>, indices| Shape::Mesh(TriangleMesh::new(p, indices).unwrap());
         let patch = BilinearMesh { positions: vec![a, b, c, d], indices: vec![[0, 1, 2, 3]], ..Default::default() };
         let kind = QuadricKind::Disk { height: 0.0, radius: 1.5, inner_radius: 0.0, phi_max: std::f32::consts::TAU };
-        let disk = Quadric { kind, group_from_local: *m, local_from_group: m.inverse(), flip_normal: false };
+        let disk = Quadric::new(kind, *m, false);
         [
             mesh(vec![a, b, c], vec![[0, 1, 2]]),
             mesh(vec![a, b, d, c], vec![[0, 1, 2], [0, 2, 3]]),
