@@ -7,7 +7,7 @@
 //!
 //! `integrators/camera_sampler.rs` draws the positions; `render/tile_samples.rs` adds the weighted samples.
 
-use lumiris_numbers::math::distribution::PlaceInBin;
+use lumiris_numbers::math::distribution::BinPosition;
 use lumiris_numbers::math::warp::sample_tent;
 use lumiris_numbers::math::{PiecewiseConstant1D, Vec2};
 use std::f32::consts::PI;
@@ -184,7 +184,7 @@ impl AxisSampler {
             AxisSampler::Box { r } => with_weight_one((2.0 * u - 1.0) * r),
             AxisSampler::Tent { r } => with_weight_one(sample_tent(u, *r)),
             AxisSampler::Table { r, bin_width, distribution, is_negative, weight } => match distribution.place(u) {
-                Some(PlaceInBin { index, fraction }) => AxisSample {
+                Some(BinPosition { index, fraction }) => AxisSample {
                     offset: (index as f32 + fraction) * bin_width - r,
                     weight: if is_negative[index] { -weight } else { *weight },
                 },

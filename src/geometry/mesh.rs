@@ -131,7 +131,8 @@ impl TriangleMesh {
         SurfaceHit { p, p_error, n, ns, dpdu, dpdv, dpdus, dpdvs, uv, vertex }
     }
 
-    /// The same, from lane `k` of the computed `points`.
+    /// The same, from lane `k` of the `points` that were computed for it, see [`Self::gather_hit`] and
+    /// [`Self::gather_coordinates`].
     pub fn surface_hit_of_lane(&self, i: usize, uv: [f32; 2], points: &TexturedPoints, k: usize) -> SurfaceHit {
         let ns = lane(&points.ns, k);
         let derivatives = points.derivatives.each_ref().map(|rows| lane(rows, k));
@@ -342,6 +343,11 @@ mod tests {
             if k % 7 == 0 {
                 mesh.tangents = vec![random(); 3];
             }
+            match k % 11 {
+                0 => mesh.indices = vec![[0, 1, 1]],
+                1 if !mesh.normals.is_empty() => mesh.normals = vec![Vec3::ZERO; 3],
+                _ => {}
+            }
             let (uv, d) = ([random().x.abs() * 0.5, random().y.abs() * 0.5], random());
 
             // Computed in one of the lanes
@@ -350,8 +356,13 @@ mod tests {
             mesh.gather_coordinates(0, &mut coordinates, k % LANES);
             let mut points = [TexturedPoints::default()];
             textured_points(level(), &[hits], &[coordinates], &mut points);
-            let (lane, single) = (mesh.surface_hit_of_lane(0, uv, &points[0], k % LANES), mesh.surface_hit(0, uv));
-            assert_eq!(format!("{lane:?}"), format!("{single:?}"), "{k} {mesh:?}");
+            let [points] = &points;
+            let (found, single) = (mesh.surface_hit_of_lane(0, uv, points, k % LANES), mesh.surface_hit(0, uv));
+            assert_eq!(format!("{found:?}"), format!("{single:?}"), "{k} {mesh:?}");
+            assert_eq!(lane(&points.wo, k % LANES), -d.normalize());
+            let lengths = [single.dpdu, single.dpdv].map(|v| 1.0 / v.length());
+            let inverse = points.inverse_lengths.map(|row| row[k % LANES]);
+            assert!(inverse == lengths || inverse == [0.0; 2] && single.dpdu == tangents(single.ns)[0], "{k} {mesh:?}");
         }
     }
 

@@ -65,37 +65,42 @@ pub struct Quadric {
     /// xor reflection. Normals therefore point outward (+z for a disk), reflected or not, unless `ReverseOrientation`
     /// is set.
     pub flip_normal: bool,
-    ball: Ball,
+    /// For spheres.
+    ball: Option<Ball>,
 }
 
-/// A ball that contains a quadric, in the space of its group.
+/// A ball that contains a sphere, in the space of its group.
 #[derive(Clone, Copy, Debug)]
 struct Ball {
     center: DVec3,
-    /// Infinite for disks and cylinders.
+    /// Square of its radius, with a margin for the rounding of the centre.
     radius_squared: f64,
 }
 
 impl Ball {
-    /// The ball of a quadric that rays are transformed to by `local_from_group`.
-    fn new(kind: &QuadricKind, local_from_group: &Affine3A) -> Self {
+    /// Rounding of squared distances, relative to the squares of the numbers that they are differences of.
+    const ROUNDING: f64 = 1e-14;
+
+    /// The ball of a sphere that rays are transformed to by `local_from_group`; `None` for other quadrics.
+    fn new(kind: &QuadricKind, local_from_group: &Affine3A) -> Option<Self> {
+        let QuadricKind::Sphere { radius, .. } = *kind else { return None };
         let DAffine3 { matrix3: m, translation: center } = local_from_group.as_daffine3().inverse();
-        let QuadricKind::Sphere { radius, .. } = *kind else { return Ball { center, radius_squared: f64::INFINITY } };
 
         // No eigenvalue of MᵀM is above its largest sum of magnitudes in a row [Gershgorin]
         let squares = (m.transpose() * m).abs();
         let rows = squares.x_axis + squares.y_axis + squares.z_axis;
-        Ball { center, radius_squared: rows.max_element() * f64::from(radius).powi(2) }
+        let radius_squared = rows.max_element() * f64::from(radius).powi(2) * OUTSIDE;
+        Some(Ball { center, radius_squared: radius_squared + center.length_squared() * Self::ROUNDING })
     }
 
-    /// True if the part of a ray from `o` to o + t_max d is surely outside, far beyond the effect of rounding: a shadow
-    /// segment to a sphere ends before it.
+    /// True if the part of a ray from `o` to o + t_max d is outside. Shadow segments to a spherical light are: they end
+    /// just before the sphere.
     #[inline]
     fn is_missed(&self, o: DVec3, d: DVec3, t_max: f64) -> bool {
         let from = o - self.center;
         let (a, b) = (d.length_squared(), from.dot(d));
         let nearest = if -b >= a * t_max { from + d * t_max } else { from - d * (b.min(0.0) / a) };
-        nearest.length_squared() > self.radius_squared * OUTSIDE
+        nearest.length_squared() > self.radius_squared + from.length_squared() * Self::ROUNDING
     }
 }
 
@@ -152,7 +157,7 @@ impl Quadric {
     #[inline]
     fn first<T>(&self, ray: &Ray, take: impl Fn(DVec3, f32, usize) -> Option<T>) -> Option<T> {
         let (o, d) = (ray.o.as_dvec3(), ray.d.as_dvec3());
-        if self.ball.is_missed(o, d, f64::from(ray.t_max)) {
+        if self.ball.is_some_and(|ball| ball.is_missed(o, d, f64::from(ray.t_max))) {
             return None;
         }
         let local_from_group = self.local_from_group.as_daffine3();
@@ -327,8 +332,8 @@ impl QuadricKind {
     }
 }
 
-/// Squared distances from the centre of a sphere, relative to its squared radius, beyond which a point is outside
-/// whatever the rounding.
+/// Squared distance from the centre of a sphere, relative to its squared radius, from which on a point is outside
+/// despite rounding, if no coordinates are much larger.
 const OUTSIDE: f64 = 1.0 + 1e-9;
 
 /// The azimuth of a point of a quadric.
@@ -467,15 +472,16 @@ mod tests {
             let rotation = glam::Quat::from_axis_angle(random_point(&mut s).normalize_or(Vec3::X), 2.0);
             let even = Affine3A::from_rotation_translation(rotation, random_point(&mut s) * 5.0);
             let placement = if k % 5 == 0 { random_placement(&mut s) } else { even };
-            let quadric = placed(kinds()[k % 2], placement);
+            let quadric = placed(kinds()[k / 4 % 2], placement);
             // Segments of any length to a point near the surface, from inside or outside
             let to_group = |p: Vec3| quadric.group_from_local.transform_point3(p);
             let target = to_group(random_point(&mut s).normalize_or(Vec3::X) * 1.3 * (1.0 + 1e-6 * s.random::<f32>()));
-            let o = to_group(random_point(&mut s) * 3.0);
+            let distance = if k % 7 == 0 { 1e6 } else { 3.0 };
+            let o = to_group(random_point(&mut s) * distance);
             let t_max = [0.9999, 1.0, 1.5, f32::INFINITY][k % 4];
             let ray = Ray { o, d: target - o, t_max, time: 0.0 };
-            let unbounded = Quadric { ball: Ball { radius_squared: f64::INFINITY, ..quadric.ball }, ..quadric };
-            let is_missed = quadric.ball.is_missed(o.as_dvec3(), ray.d.as_dvec3(), f64::from(t_max));
+            let unbounded = Quadric { ball: None, ..quadric };
+            let is_missed = quadric.ball.unwrap().is_missed(o.as_dvec3(), ray.d.as_dvec3(), f64::from(t_max));
             assert!(!is_missed || unbounded.distance(&ray).is_none(), "{quadric:?} {ray:?}");
             missed += usize::from(is_missed);
             met += usize::from(unbounded.distance(&ray).is_some());

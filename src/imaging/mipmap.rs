@@ -11,7 +11,7 @@ use super::oiio::{ImageFile, Values};
 use super::texels::{Level, NearestByte, Texels};
 use super::tiles::TileStore;
 use super::{ColorEncoding, Image};
-use lumiris_numbers::math::{DVec2, Rgb, Vec2};
+use lumiris_numbers::math::{DVec2, Rgb, Vec2, scalar};
 use std::sync::Arc;
 
 /// Wrap mode: values outside the image.
@@ -297,7 +297,7 @@ impl MipMap {
     /// `st` without whole periods of the axes on which the image repeats: an f32 then resolves the fraction, and
     /// lookups need no division.
     pub fn within_periods(&self, st: DVec2) -> Vec2 {
-        let within = |wrap: AxisWrap, x: f64| if wrap == AxisWrap::Repeat { fraction(x) } else { x };
+        let within = |wrap: AxisWrap, x: f64| if wrap == AxisWrap::Repeat { x - scalar::floor(x) } else { x };
         let [s, t] = self.wrap.axes().unwrap_or([AxisWrap::Clamp; 2]);
         Vec2::new(within(s, st.x) as f32, within(t, st.y) as f32)
     }
@@ -392,16 +392,6 @@ fn floor(v: f32) -> f32 {
     if v.abs() < WHOLE { near - if near > v { 1.0 } else { 0.0 } } else { v }
 }
 
-/// v − ⌊v⌋; NaN if `v` is not finite. Rounds as [`floor`] does.
-#[inline]
-fn fraction(v: f64) -> f64 {
-    /// All floats from here on are integers.
-    const WHOLE: f64 = (1_u64 << 52) as f64;
-    let large = WHOLE.copysign(v);
-    let near = (v + large) - large;
-    if v.abs() < WHOLE { v - near + if near > v { 1.0 } else { 0.0 } } else { v - v }
-}
-
 /// The integer `v`, saturated to 32 bits, so that absurd or non-finite coordinates wrap somewhere instead of
 /// overflowing.
 #[inline]
@@ -454,9 +444,14 @@ mod tests {
         let repeat = map(Wrap::Repeat);
         for (st, expected) in [(-0.25, 0.75), (0.25, 0.25), (7.5, 0.5), (-3.0, 0.0), (1e9 + 0.125, 0.125), (1e300, 0.0)]
         {
-            assert_eq!(repeat.within_periods(DVec2::new(st, -st)).x, expected, "{st}");
+            let found = repeat.within_periods(DVec2::new(st, -st));
+            assert_eq!(found, Vec2::new(expected, (1.0 - expected) % 1.0), "{st}");
         }
-        assert!(repeat.within_periods(DVec2::new(f64::NAN, f64::INFINITY)).is_nan());
+        let found = repeat.within_periods(DVec2::new(f64::NAN, f64::INFINITY));
+        assert!(found.x.is_nan() && found.y.is_nan());
+        for wrap in [Wrap::Clamp, Wrap::Black, Wrap::OctahedralSphere] {
+            assert_eq!(map(wrap).within_periods(DVec2::new(-3.5, 7.25)), Vec2::new(-3.5, 7.25));
+        }
         let mixed = map(Wrap::Axes([AxisWrap::Mirror, AxisWrap::Repeat]));
         assert_eq!(mixed.within_periods(DVec2::new(3.25, 3.25)), Vec2::new(3.25, 0.25));
     }

@@ -131,11 +131,8 @@ impl VertexSearch {
             let (mut paths, hits, traced): (Paths, _, _) =
                 (std::mem::take(&mut self.active), std::mem::take(&mut self.hits), std::mem::take(&mut self.traced));
             let lengths = std::mem::take(&mut self.lengths);
-            for group in (0..traced.len())
-                .step_by(SurfaceInteractions::GROUP)
-                .map(|first| first..traced.len().min(first + SurfaceInteractions::GROUP))
-            {
-                for i in group {
+            for first in (0..traced.len()).step_by(SurfaceInteractions::GROUP) {
+                for i in first..traced.len().min(first + SurfaceInteractions::GROUP) {
                     let (index, hit, length) = (traced[i], hits[i], lengths[i]);
                     let is_done =
                         hit.is_some_and(|hit| self.add_plain_mesh_hit(&mut at, &mut paths, index, &hit, length));

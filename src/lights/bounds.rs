@@ -179,8 +179,8 @@ impl Cone {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use lumiris_numbers::math::warp::{sample_uniform_cone, sample_uniform_sphere};
-    use lumiris_numbers::math::{Frame, ONE_MINUS_EPSILON};
+    use lumiris_numbers::math::Frame;
+    use lumiris_numbers::math::warp::{direction, sample_uniform_sphere};
     use lumiris_test_support::random::{RngExt, pcg32};
 
     #[test]
@@ -206,7 +206,7 @@ mod tests {
             let Cone { axis, cos } = a.union(b);
             assert!(axis.is_finite() && (axis.length() - 1.0).abs() < 1e-5 && cos.is_finite());
             for c in [a, b] {
-                let edge = sample_uniform_cone([ONE_MINUS_EPSILON, stream.random::<f32>()], 1.0 - c.cos);
+                let edge = direction(c.cos, std::f32::consts::TAU * stream.random::<f32>());
                 let w = Frame::from_z(c.axis).to_world(edge);
                 assert!(w.dot(axis) >= cos - 2e-6, "{a:?} {b:?} -> {axis} {cos}");
             }

@@ -30,9 +30,7 @@ pub use choice::sample_columns;
 pub use choice::set::{LightSet, LightSetBuilder};
 pub use infinite_columns::LightLanes;
 pub use irradiance::Irradiances;
-pub use kinds::area::{
-    AlphaMask, AreaLight, AreaShape, Emission, EmissionImage, EmissionMapping, QuadricLight, area_lights_of,
-};
+pub use kinds::area::{AlphaMask, AreaLight, AreaShape, Emission, EmissionImage, EmissionMapping, area_lights_of};
 pub use kinds::distant::DistantLight;
 pub use kinds::environment::{self, EnvironmentFilter, EnvironmentMap, EnvironmentMapping};
 pub use kinds::image_light::{ImageLight, ImageMapping};

@@ -44,12 +44,15 @@ impl SurfaceInteractions {
             let (points, k) = (&points[row / LANES], row % LANES);
             row += 1;
             let (surface, wo) = (mesh.surface_hit_of_lane(primitive as usize, uv, points, k), lane(&points.wo, k));
-            if instance == Hit::NO_INSTANCE {
-                let inverse_lengths = Vec2::new(points.inverse_lengths[0][k], points.inverse_lengths[1][k]);
-                return SurfaceInteraction::at(job, &arrival, surface, wo, inverse_lengths);
+            let inverse = Vec2::new(points.inverse_lengths[0][k], points.inverse_lengths[1][k]);
+            if instance != Hit::NO_INSTANCE {
+                let set = &job.world.scene.geometry;
+                let placed = surface.transformed(&set.world_from_group_at(instance, arrival.ray.time));
+                return SurfaceInteraction::at(job, &arrival, placed, wo, inverse_lengths(&placed));
             }
-            let placed = surface.transformed(&job.world.scene.geometry.world_from_group_at(instance, arrival.ray.time));
-            SurfaceInteraction::at(job, &arrival, placed, wo, inverse_lengths(&placed))
+            // Without derivatives the surface has other tangents
+            let inverse = if inverse == Vec2::ZERO { inverse_lengths(&surface) } else { inverse };
+            SurfaceInteraction::at(job, &arrival, surface, wo, inverse)
         }));
         interactions.iter().for_each(|interaction| interaction.prefetch(job));
         interactions

@@ -37,6 +37,7 @@ mod ptex;
 mod same_light;
 mod sample_allocation;
 mod subsurface;
+mod surface_interactions;
 mod surfaces;
 mod texture_cache;
 mod texture_pyramids;

@@ -6,9 +6,8 @@
 //! closures and no `map` over arrays: these would be compiled without vector instructions.
 //!
 //! Reading order: [`lane`], [`wide`], [`columns`], [`hilbert`], [`sampler`], [`light`], [`area`], [`environment`],
-//! [`kernels`], [`ris_weights`], [`camera`], [`hits`], [`triangles`],
-//! [`triangle_points`], [`vertex`], [`connections`], [`light_tree`],
-//! [`light_descent`], [`sums`], [`prefetch`].
+//! [`kernels`], [`ris_weights`], [`camera`], [`hits`], [`triangles`], [`triangle_points`], [`vertex`], [`connections`],
+//! [`light_tree`], [`light_descent`], [`sums`], [`prefetch`].
 
 pub mod area;
 pub mod camera;

@@ -170,7 +170,7 @@ fn hit<S: Simd>(simd: S, hits: &TriangleHits) -> Hit<S> {
     let normals = load_three(simd, &hits.normals);
     let blend = normals[0].times(b0).plus(normals[1].times(b1)).plus(normals[2].times(b2));
     let inverse = one / blend.dot(blend).sqrt();
-    let ns = blend.times(inverse).or(inverse.is_finite(), n);
+    let ns = blend.times(inverse).or(inverse.is_finite() & inverse.simd_gt(zero), n);
     let n = reversed(n).or(n.dot(ns).simd_lt(zero), n);
 
     let d = load_rows(simd, &hits.d);
@@ -219,9 +219,8 @@ fn derivatives<S: Simd>(corners: [Vec3s<S>; 3], st: [[F<S>; 2]; 3]) -> [Vec3s<S>
     let spans = narrowed((has_area & is_regular).select(one, zero)).simd_gt(F::splat(simd, 0.0));
     let is_finite = u.x.is_finite() & u.y.is_finite() & u.z.is_finite();
     let is_finite = is_finite & v.x.is_finite() & v.y.is_finite() & v.z.is_finite();
-    let keep = spans & is_finite;
-    let kept = |v: Vec3s<S>| Vec3s { x: or_zero(keep, v.x), y: or_zero(keep, v.y), z: or_zero(keep, v.z) };
-    [kept(u), kept(v)]
+    let none = Vec3s::splat(simd, Vec3::ZERO);
+    [u.or(spans & is_finite, none), v.or(spans & is_finite, none)]
 }
 
 /// 1/|v|; 0 for the zero vector.

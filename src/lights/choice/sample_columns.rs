@@ -1,20 +1,18 @@
 //! One light sample for each of many points, in columns.
 //!
-//! Points that chose the same light are sampled together: rectangles, triangles, spheres and infinite lights by kernels,
-//! other lights one by one. A light that has a kernel always uses it, so the result is bit-identical for any number of
-//! points.
+//! Points that chose the same light are sampled together: rectangles, triangles, spheres and infinite lights by
+//! kernels, other lights one by one. A light that has a kernel always uses it, so the result is bit-identical for any
+//! number of points.
 
 use super::job_lights::JobLights;
 use super::light_sampler::LightSampler;
-use crate::lights::{
-    AreaLight, AreaShape, LeAndPdf, Light, LightCtx, LightId, LightLanes, LightSample, QuadricLight, SampledLight,
-};
+use crate::lights::{AreaLight, AreaShape, LeAndPdf, Light, LightCtx, LightId, LightLanes, LightSample, SampledLight};
 use lumiris_lanes::area::{Rectangle, many};
 use lumiris_lanes::columns::{Column, Columns3, gather, padded, reserve, scatter};
 use lumiris_lanes::level;
 use lumiris_lanes::light_tree::{GlossyLobes, Receivers};
 use lumiris_numbers::math::light_bound::GlossyLobe;
-use lumiris_numbers::math::{Rgb, Vec2, Vec3};
+use lumiris_numbers::math::{Rgb, Sphere, Vec2, Vec3};
 use std::ops::Range;
 
 /// Maximum number of lights for which points are sorted by counting.
@@ -363,7 +361,8 @@ impl AreaLight {
     /// Samples a point for each of the `n` points `p`; returns false if the shape has no kernel.
     fn sample_many(&self, n: usize, p: &Columns3, u: [&[f32]; 2], out: &mut LightSamples) -> bool {
         if let AreaShape::Quadric(quadric) = &self.shape {
-            return self.sample_sphere(quadric, n, p, u, out);
+            let sphere = quadric.sphere.as_ref();
+            return sphere.map(|sphere| self.sample_sphere(sphere, quadric.reversed, n, p, u, out)).is_some();
         }
         let len = u[0].len();
         let from = p.get(len);
@@ -396,16 +395,16 @@ impl AreaLight {
         true
     }
 
-    /// See [`Self::sample_many`]; returns false if the quadric is not a full sphere.
+    /// [`Self::sample_many`] for a sphere; `reversed`: its normals point to the inside.
     fn sample_sphere(
         &self,
-        quadric: &QuadricLight,
+        sphere: &Sphere,
+        reversed: bool,
         n: usize,
         p: &Columns3,
         u: [&[f32]; 2],
         out: &mut LightSamples,
-    ) -> bool {
-        let Some(sphere) = &quadric.sphere else { return false };
+    ) {
         let len = u[0].len();
         let LightSamples { wi, pdf, p: points, p_error, n: outward, .. } = &mut *out;
         let (wi, points, p_error) = (wi.get_mut(len), points.get_mut(len), p_error.get_mut(len));
@@ -415,21 +414,19 @@ impl AreaLight {
         out.is_delta[..n].fill(false);
 
         // Emission and normals; points inside are sampled one by one
-        let is_dark_outside = quadric.reversed && !self.emission.two_sided;
+        let is_dark_outside = reversed && !self.emission.two_sided;
         for i in 0..n {
             if out.pdf[i] < 0.0 {
                 out.set(i, self.sample_li(&LightCtx::at(p.vec3(i)), [u[0][i], u[1][i]]));
-                continue;
-            }
-            let outward = out.n.vec3(i);
-            let normal = if quadric.reversed { -outward } else { outward };
-            out.n.set(i, normal);
-            out.li.set_rgb(i, self.emission.l(normal, Vec2::ZERO, -out.wi.vec3(i)));
-            if is_dark_outside {
+            } else if is_dark_outside {
                 out.pdf[i] = 0.0;
+            } else {
+                let outward = out.n.vec3(i);
+                let normal = if reversed { -outward } else { outward };
+                out.n.set(i, normal);
+                out.li.set_rgb(i, self.emission.l(normal, Vec2::ZERO, -out.wi.vec3(i)));
             }
         }
-        true
     }
 }
 

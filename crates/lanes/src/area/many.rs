@@ -135,12 +135,6 @@ fn store_points<S: Simd>(
     error.store(&mut out.p_error, i);
 }
 
-/// The bound of the rounding error of a point of a sphere with the unit normal `outward`.
-#[inline]
-pub fn sphere_error(sphere: &Sphere, outward: Vec3) -> Vec3 {
-    (sphere.center.abs() + (outward * sphere.radius).abs()) * gamma(8)
-}
-
 /// Samples a direction from each of the points `from` to a sphere, uniform in the cone that it subtends; see
 /// [`sample_rectangle`]. Densities of points inside of the sphere are −1, and their samples undefined. `outward`
 /// receives the outward unit normals.
@@ -172,13 +166,8 @@ fn sample_sphere_lanes<S: Simd>(
         store(pdf, out.pdf, i);
         Vec3s::from(point.wi).store(&mut out.wi, i);
         Vec3s::from(point.p).store(&mut out.p, i);
-
-        // Normals and error bounds
-        let n = Vec3s::from(point.outward);
-        n.store(&mut outward, i);
-        let size = n.times(F::splat(simd, sphere.radius)).abs();
-        let error = Vec3s::splat(simd, sphere.center.abs()).plus(size).times(F::splat(simd, gamma(8)));
-        error.store(&mut out.p_error, i);
+        Vec3s::from(point.p_error).store(&mut out.p_error, i);
+        Vec3s::from(point.outward).store(&mut outward, i);
     }
 }
 

@@ -3,10 +3,12 @@
 use super::support::assert_same_bits;
 use fearless_simd::{Simd, dispatch, f64x8, prelude::*};
 use lumiris_lanes::area::Rectangle;
-use lumiris_lanes::area::many::{PointsOnLight, sample_rectangle, sample_triangle};
+use lumiris_lanes::area::many::{PointsOnLight, sample_rectangle, sample_sphere, sample_triangle};
 use lumiris_lanes::area::spherical::{atan2, sin_cos_turns_f64};
 use lumiris_numbers::math::elementary::SinCos;
-use lumiris_numbers::math::{Vec2, Vec3};
+use lumiris_numbers::math::subtended_cone::{SpherePoint, SubtendedCone};
+use lumiris_numbers::math::v3::V3;
+use lumiris_numbers::math::{Sphere, Vec2, Vec3};
 use lumiris_test_support::random::{RngExt, pcg32};
 use std::array::from_fn;
 use std::f64::consts::TAU;
@@ -34,6 +36,24 @@ fn many_points_are_the_same_at_all_levels() {
             let mut out = PointsOnLight { wi: [wx, wy, wz], p: [x, y, z], p_error: [ex, ey, ez], pdf };
             sample_triangle(level, (corners, Vec3::Y, 1.5), from, u, &mut out);
         });
+        // From inside and outside, and the same as for single points
+        let sphere = Sphere { center: Vec3::new(0.1, 0.2, 0.0), radius: 0.4 };
+        let lanes = assert_same_bits::<13>(len, |level, [wx, wy, wz, x, y, z, ex, ey, ez, pdf, nx, ny, nz]| {
+            let mut out = PointsOnLight { wi: [wx, wy, wz], p: [x, y, z], p_error: [ex, ey, ez], pdf };
+            sample_sphere(level, &sphere, from, u, [nx, ny, nz], &mut out);
+        });
+        for i in 0..len {
+            let p = V3 { x: from[0][i], y: from[1][i], z: from[2][i] };
+            let cone = SubtendedCone::new(&sphere, p);
+            if !cone.is_outside {
+                assert_eq!(lanes[9][i], -1.0);
+                continue;
+            }
+            let SpherePoint { p, p_error, outward, wi, t: _, pdf } = cone.sample(&sphere, p, [u[0][i], u[1][i]]);
+            let [wi, p, p_error, n] = [wi, p, p_error, outward].map(|v| [v.x, v.y, v.z]);
+            let single: Vec<f32> = [wi, p, p_error].concat().into_iter().chain([pdf]).chain(n).collect();
+            assert_eq!(lanes.each_ref().map(|column| column[i]).to_vec(), single);
+        }
     }
 }
 

@@ -13,6 +13,7 @@ mod ris_weights;
 mod sampler;
 mod sums;
 mod support;
+mod triangle_points;
 mod triangles;
 mod two_techniques;
 mod vertex;

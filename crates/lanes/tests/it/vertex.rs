@@ -1,9 +1,7 @@
 //! Tests of `lumiris_lanes::vertex`.
 
 use super::support::assert_same_bits;
-use lumiris_lanes::lane::LANES;
 use lumiris_lanes::level;
-use lumiris_lanes::triangle_points::*;
 use lumiris_lanes::vertex::*;
 use lumiris_numbers::estimators::heuristics::{Heuristic, Technique};
 use lumiris_numbers::math::Vec3;
@@ -37,49 +35,13 @@ fn at(v: &Three, i: usize) -> Vec3 {
 }
 
 #[test]
-fn kernels_are_the_same_at_all_levels() {
-    // Hits
+fn segments_are_the_same_at_all_levels() {
     let stream = &mut pcg32([8, 1, 1]);
-    let (corners, normals) = ([0, 1, 2].map(|_| vectors(stream, 4.0)), [0, 1, 2].map(|_| vectors(stream, 1.0)));
-    let (b, d) = ([numbers(stream, 0.5), numbers(stream, 0.5)], directions(stream));
-    let lanes = |from: &[f32], block: usize| -> [f32; LANES] { std::array::from_fn(|k| from[block * LANES + k]) };
-    let rows = |from: &Three, block: usize| from.each_ref().map(|column| lanes(column, block));
-    let hits: Vec<TriangleHits> = (0..N / LANES)
-        .map(|block| TriangleHits {
-            corners: corners.each_ref().map(|p| rows(p, block)),
-            normals: normals.each_ref().map(|n| rows(n, block)),
-            b: b.each_ref().map(|b| lanes(b, block)),
-            orientation: [1.0; LANES],
-            d: rows(&d, block),
-        })
-        .collect();
-    assert_same_bits::<18>(N, |level, [a, b, c, d, e, f, g, h, i, j, k, l, m, n, o, p, q, r]| {
-        let mut out =
-            Points { p: [a, b, c], p_error: [d, e, f], n: [g, h, i], facing: [j, k, l], ns: [m, n, o], wo: [p, q, r] };
-        points(level, &hits, &mut out);
-    });
-
-    // With derivatives
-    let st: [[Vec<f32>; 2]; 3] = [0, 1, 2].map(|_| [numbers(stream, 3.0), numbers(stream, 3.0)]);
-    let coordinates: Vec<CornerCoordinates> =
-        (0..N / LANES).map(|block| st.each_ref().map(|st| st.each_ref().map(|column| lanes(column, block)))).collect();
-    assert_same_bits::<8>(N, |level, mut columns| {
-        let mut out = vec![TexturedPoints::default(); N / LANES];
-        textured_points(level, &hits, &coordinates, &mut out);
-        for (block, points) in out.iter().enumerate() {
-            let TexturedPoints { derivatives: [u, v], inverse_lengths: [inverse_u, inverse_v], .. } = *points;
-            let rows = [u[0], u[1], u[2], v[0], v[1], v[2], inverse_u, inverse_v];
-            for (column, row) in columns.iter_mut().zip(rows) {
-                column[block * LANES..][..LANES].copy_from_slice(&row);
-            }
-        }
-    });
-
-    // Segments
+    let corner = vectors(stream, 4.0);
     let (ns, wo, wi) = (directions(stream), directions(stream), directions(stream));
     let (p, p_error) = (vectors(stream, 9.0), vectors(stream, 1e-6).map(|v| v.iter().map(|x| x.abs()).collect()));
     let from = Ends { p: slices(&p), p_error: slices(&p_error), n: slices(&ns) };
-    let to = Ends { p: slices(&corners[0]), p_error: slices(&p_error), n: slices(&wo) };
+    let to = Ends { p: slices(&corner), p_error: slices(&p_error), n: slices(&wo) };
     let is_far: Vec<f32> = (0..N).map(|i| if i % 3 == 0 { 1.0 } else { 0.0 }).collect();
     assert_same_bits::<7>(N, |level, [ox, oy, oz, dx, dy, dz, t_max]| {
         segments(level, &from, slices(&wi), &to, &is_far, &mut Rays { o: [ox, oy, oz], d: [dx, dy, dz], t_max });

@@ -6,8 +6,8 @@
 //!
 //! Reading order: [`scalar`], [`rgb`], [`frame`], [`transform`], [`origin`], [`ray`], [`bounds`], [`warp`],
 //! [`sphere_map`], [`octahedral`], [`cumulative`], [`distribution`], [`texel_distribution`], [`bilinear`], [`alias`],
-//! [`hash`], [`noise`], [`number`], [`v3`], [`elementary`],
-//! [`subtended_cone`], [`light_bound`], [`expected_visibility`].
+//! [`hash`], [`noise`], [`number`], [`v3`], [`elementary`], [`subtended_cone`], [`light_bound`],
+//! [`expected_visibility`].
 
 pub mod alias;
 pub mod bilinear;

@@ -1,6 +1,7 @@
 //! Gradient noise in three dimensions [Perlin 2002], with the permutation of that paper, so that clouds match other
 //! renderers.
 
+use super::scalar::floor;
 use super::{DVec3, Vec3};
 
 /// A permutation of 0..=255.
@@ -56,10 +57,8 @@ struct Split {
 impl Split {
     #[inline]
     fn new(x: f64) -> Self {
-        // Not `f64::floor`, a function call without SSE 4.1
-        let truncated = x as i64;
-        let base = if truncated as f64 > x { truncated - 1 } else { truncated };
-        Split { cell: (base & 255) as usize, rest: (x - base as f64) as f32 }
+        let base = floor(x);
+        Split { cell: (base as i64 & 255) as usize, rest: (x - base) as f32 }
     }
 }
 
@@ -91,6 +90,20 @@ pub fn gradient(p: DVec3) -> Vec3 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn gradients_follow_the_bits_of_the_hash() {
+        for (hash, gradient) in GRADIENTS.iter().enumerate() {
+            // The rule of the paper, in the paper's names
+            let dot = |x: f32, y: f32, z: f32| {
+                let u = if hash < 8 || hash == 12 || hash == 13 { x } else { y };
+                let v = if hash < 4 || hash == 12 || hash == 13 { y } else { z };
+                (if hash & 1 == 0 { u } else { -u }) + if hash & 2 == 0 { v } else { -v }
+            };
+            assert_eq!(*gradient, [dot(1.0, 0.0, 0.0), dot(0.0, 1.0, 0.0), dot(0.0, 0.0, 1.0)], "{hash}");
+        }
+        assert_eq!((noise(DVec3::splat(1e19)), noise(DVec3::splat(-1e300))), (0.0, 0.0));
+    }
 
     #[test]
     fn noise_is_continuous_vanishes_on_the_lattice_and_has_no_bias() {

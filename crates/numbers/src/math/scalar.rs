@@ -3,6 +3,17 @@
 /// Largest f32 below one; random numbers are clamped to it so that `u < 1` holds after arithmetic.
 pub const ONE_MINUS_EPSILON: f32 = 1.0 - f32::EPSILON / 2.0;
 
+/// ⌊x⌋. Without SSE 4.1, `f64::floor` is a function call.
+#[inline]
+pub fn floor(x: f64) -> f64 {
+    /// All floats from here on are integers.
+    const WHOLE: f64 = (1_u64 << 52) as f64;
+    // Adding and subtracting rounds
+    let large = WHOLE.copysign(x);
+    let near = (x + large) - large;
+    if x.abs() < WHOLE { near - if near > x { 1.0 } else { 0.0 } } else { x }
+}
+
 /// `x²`.
 #[inline]
 pub fn sqr(x: f32) -> f32 {

@@ -4,6 +4,7 @@
 use super::bounds::Sphere;
 use super::elementary::{SinCos, sin_cos_turn};
 use super::number::Number;
+use super::scalar::gamma;
 use super::v3::V3;
 use std::f32::consts::TAU;
 
@@ -14,7 +15,7 @@ pub const ON_SURFACE: f32 = 1e-5;
 #[derive(Clone, Copy, Debug)]
 pub struct SubtendedCone<N: Number> {
     /// 1 − cos θmax, which is accurate for small cones.
-    pub one_minus_cos: N,
+    one_minus_cos: N,
     /// sin² θmax.
     sin2: N,
     /// Unit direction to the centre.
@@ -28,6 +29,8 @@ pub struct SubtendedCone<N: Number> {
 pub struct SpherePoint<N> {
     /// The point.
     pub p: V3<N>,
+    /// Bound of its rounding error.
+    pub p_error: V3<N>,
     /// Outward unit normal.
     pub outward: V3<N>,
     /// Unit direction to the point.
@@ -79,12 +82,14 @@ impl<N: Number> SubtendedCone<N> {
         let around = x.times(cos_phi * sin_alpha).plus(y.times(sin_phi * sin_alpha));
         let outward = around.minus(self.axis.times(cos_alpha)).unit();
 
-        let radius = zero.constant(sphere.radius);
-        let p = splat(sphere.center, radius).plus(outward.times(radius));
+        let (center, offset) = (splat(sphere.center, zero), outward.times(zero.constant(sphere.radius)));
+        let p = center.plus(offset);
+        let p_error = center.magnitude().plus(offset.magnitude()).times(zero.constant(gamma(8)));
         let d = p.minus(from);
         let t = d.dot(d).root();
         let pdf = self.pdf();
-        SpherePoint { p, outward, wi: d.times(one / t), t, pdf: pdf.or_zero(pdf.finite() & t.above(zero)) }
+        let pdf = pdf.or_zero(pdf.finite() & t.above(zero));
+        SpherePoint { p, p_error, outward, wi: d.times(one / t), t, pdf }
     }
 }
 

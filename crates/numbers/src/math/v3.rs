@@ -59,6 +59,12 @@ impl<N: Number> V3<N> {
         V3 { x: self.x * s, y: self.y * s, z: self.z * s }
     }
 
+    /// Absolute values of the components.
+    #[inline(always)]
+    pub fn magnitude(self) -> Self {
+        V3 { x: self.x.magnitude(), y: self.y.magnitude(), z: self.z.magnitude() }
+    }
+
     /// Replaces z.
     #[inline(always)]
     pub fn with_z(self, z: N) -> Self {

@@ -98,29 +98,6 @@ pub fn invert_uniform_sphere(w: Vec3) -> [f32; 2] {
     [(1.0 - w.z) * 0.5, azimuth(w) / TAU]
 }
 
-/// Uniform in the cone about +z given by `one_minus_cos` = 1 − cos θ_max, which keeps its precision for small cones.
-#[inline]
-pub fn sample_uniform_cone(u: [f32; 2], one_minus_cos: f32) -> Vec3 {
-    let x = u[0] * one_minus_cos;
-    let sin_theta = safe_sqrt(x * (2.0 - x));
-    let (sin_phi, cos_phi) = (TAU * u[1]).sin_cos();
-    Vec3::new(sin_theta * cos_phi, sin_theta * sin_phi, 1.0 - x)
-}
-
-/// Density of [`sample_uniform_cone`] per steradian, for directions inside the cone.
-#[inline]
-pub fn pdf_uniform_cone(one_minus_cos: f32) -> f32 {
-    1.0 / (TAU * one_minus_cos)
-}
-
-/// Inverse of [`sample_uniform_cone`].
-#[inline]
-pub fn invert_uniform_cone(w: Vec3, one_minus_cos: f32) -> [f32; 2] {
-    // 1 − cos θ = sin²θ / (1 + cos θ), without cancellation near the axis.
-    let x = (sqr(w.x) + sqr(w.y)) / (1.0 + w.z);
-    [x / one_minus_cos, azimuth(w) / TAU]
-}
-
 /// Barycentric coordinates (b0, b1) uniform over a triangle, by the low-distortion map of [Heitz 2019].
 #[inline]
 pub fn sample_uniform_triangle(u: [f32; 2]) -> [f32; 2] {
@@ -197,9 +174,6 @@ mod tests {
         assert_inverts("hemisphere", |u| invert_uniform_hemisphere(sample_uniform_hemisphere(u)));
         assert_inverts("sphere", |u| invert_uniform_sphere(sample_uniform_sphere(u)));
         assert_inverts("triangle", |u| invert_uniform_triangle(sample_uniform_triangle(u)));
-        for c in [1e-6, 0.01, 0.7, 2.0] {
-            assert_inverts("cone", |u| invert_uniform_cone(sample_uniform_cone(u, c), c));
-        }
         assert_inverts("tent", |u| [invert_tent(sample_tent(u[0], 1.5), 1.5), u[1]]);
     }
 
@@ -251,9 +225,6 @@ mod tests {
         assert_direction_density(sample_cosine_hemisphere, pdf_cosine_hemisphere);
         assert_direction_density(sample_uniform_hemisphere, pdf_uniform_hemisphere);
         assert_direction_density(sample_uniform_sphere, |_| pdf_uniform_sphere());
-        // A cone that ends on a cell border: cos θ = 0.5.
-        let in_cone = |w: Vec3| if w.z >= 0.5 { pdf_uniform_cone(0.5) } else { 0.0 };
-        assert_direction_density(|u| sample_uniform_cone(u, 0.5), in_cone);
     }
 
     #[test]

@@ -7,7 +7,6 @@
 use super::shape_sample::{ShapePoint, ShapeSample, pdf_by_area};
 use crate::geometry::{Quadric, QuadricKind};
 use crate::lights::Sphere;
-use lumiris_lanes::area::many::sphere_error;
 use lumiris_numbers::math::subtended_cone::{ON_SURFACE, SpherePoint, SubtendedCone};
 use lumiris_numbers::math::warp::{azimuth, direction, sample_uniform_disk_concentric};
 use lumiris_numbers::math::{Bounds3, Mat3, Vec2, Vec3, gamma, safe_sqrt, sqr};
@@ -158,11 +157,10 @@ impl QuadricLight {
         let (Some(cone), Some(sphere)) = (self.cone(from), self.sphere) else {
             return ShapeSample::by_area(from, self.sample_point(u));
         };
-        let SpherePoint { p, outward, wi, t, pdf } = cone.sample(&sphere, from.into(), u);
+        let SpherePoint { p, p_error, outward, wi, t, pdf } = cone.sample(&sphere, from.into(), u);
         let outward = Vec3::from(outward);
         let n = if self.reversed { -outward } else { outward };
-        let p_error = sphere_error(&sphere, outward);
-        (pdf > 0.0).then_some(ShapeSample { p: p.into(), n, p_error, wi: wi.into(), t, pdf })
+        (pdf > 0.0).then_some(ShapeSample { p: p.into(), n, p_error: p_error.into(), wi: wi.into(), t, pdf })
     }
 
     /// A point uniform in the area of the local quadric.
