@@ -7,7 +7,7 @@
 use crate::accel::{Coherence, Hit, RayBatch};
 use crate::lights::LightId;
 use crate::media::{FlightSampler, MediumId, Segment};
-use crate::scene::{Arrival, RenderJob, SurfaceInteraction};
+use crate::scene::{RayHit, RenderJob, SurfaceInteraction};
 use lumiris_numbers::math::ray::SEGMENT_END;
 use lumiris_numbers::math::{Ray, Rgb, Vec3};
 use lumiris_numbers::samplers::SampleStream;
@@ -128,7 +128,7 @@ impl Crossed {
                 return false;
             }
             Some(hit) => {
-                let interaction = SurfaceInteraction::new(job, &Arrival::of_ray(&self.ray, hit));
+                let interaction = SurfaceInteraction::new(job, &RayHit::of_ray(&self.ray, hit));
                 if interaction.scatter(job).is_some() {
                     self.transmittance = Rgb::BLACK;
                     return false;

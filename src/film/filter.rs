@@ -183,13 +183,15 @@ impl AxisSampler {
             AxisSampler::Point => with_weight_one(0.0),
             AxisSampler::Box { r } => with_weight_one((2.0 * u - 1.0) * r),
             AxisSampler::Tent { r } => with_weight_one(sample_tent(u, *r)),
-            AxisSampler::Table { r, bin_width, distribution, is_negative, weight } => match distribution.place(u) {
-                Some(BinPosition { index, fraction }) => AxisSample {
-                    offset: (index as f32 + fraction) * bin_width - r,
-                    weight: if is_negative[index] { -weight } else { *weight },
-                },
-                None => with_weight_one(0.0),
-            },
+            AxisSampler::Table { r, bin_width, distribution, is_negative, weight } => {
+                match distribution.bin_position(u) {
+                    Some(BinPosition { index, fraction }) => AxisSample {
+                        offset: (index as f32 + fraction) * bin_width - r,
+                        weight: if is_negative[index] { -weight } else { *weight },
+                    },
+                    None => with_weight_one(0.0),
+                }
+            }
         }
     }
 

@@ -16,7 +16,7 @@ use crate::lights::LightCtx;
 use crate::materials::SurfaceBsdf;
 use crate::materials::dispersion::{WavelengthSample, sample_wavelength};
 use crate::media::{EmissionLookup, EmissionLookups, End, Flight, FlightSampler, Segment, Sides};
-use crate::scene::{Arrival, RenderJob, SurfaceInteraction, SurfaceInteractions};
+use crate::scene::{RayHit, RenderJob, SurfaceInteraction, SurfaceInteractions};
 use lumiris_lanes::{level, sampler};
 use lumiris_numbers::math::{Rgb, Vec3};
 use lumiris_numbers::samplers::SampleStream;
@@ -185,7 +185,7 @@ impl VertexSearch {
             Some(hit) => {
                 let TracedPath { state: path, ray, .. } = paths.traced(index);
                 self.reached.push(index);
-                self.surfaces.push(Arrival { ray, hit: *hit, width: path.width, spread: path.spread });
+                self.surfaces.push(RayHit { ray, hit: *hit, width: path.width, spread: path.spread });
             }
             None if self.adds_emission(at.vertex, &paths.states[index as usize]) => self.escaped.push(index),
             None => {}

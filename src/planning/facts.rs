@@ -8,7 +8,7 @@ use crate::accel::{Coherence, RayBatch};
 use crate::bsdfs::Bsdf;
 use crate::integrators::camera_sampler::CameraSampler;
 use crate::lights::{LightCtx, SampleOfLight};
-use crate::scene::{Arrival, RenderJob, SurfaceInteraction};
+use crate::scene::{RayHit, RenderJob, SurfaceInteraction};
 use lumiris_numbers::math::hash::{pcg4d, unit_f32};
 use lumiris_numbers::math::ray::SEGMENT_END;
 use lumiris_numbers::math::warp::sample_cosine_hemisphere;
@@ -147,8 +147,8 @@ fn hits(job: &RenderJob, rays: &[Ray]) -> Vec<Option<SurfaceInteraction>> {
     let (mut batch, mut hits) = (RayBatch::default(), Vec::new());
     batch.set(rays.iter());
     job.world.accel.intersect(&batch, Coherence::Incoherent, &mut hits);
-    let arrivals = rays.iter().zip(&hits).map(|(ray, hit)| Some(Arrival::of_ray(ray, hit.as_ref()?)));
-    arrivals.map(|arrival| Some(SurfaceInteraction::new(job, &arrival?))).collect()
+    let ray_hits = rays.iter().zip(&hits).map(|(ray, hit)| Some(RayHit::of_ray(ray, hit.as_ref()?)));
+    ray_hits.map(|ray_hit| Some(SurfaceInteraction::new(job, &ray_hit?))).collect()
 }
 
 /// True if the only lobe of a surface is diffuse.

@@ -15,6 +15,6 @@ pub use input::{Choices, FilmSettings, Scene, Surface};
 pub use job::RenderJob;
 pub use pixel_samples::PixelSamples;
 pub use sample_count_map::SampleCountMap;
-pub use surface_interaction::{Arrival, SurfaceInteraction};
+pub use surface_interaction::{RayHit, SurfaceInteraction};
 pub use surface_interactions::SurfaceInteractions;
 pub use world::{AccelKind, EmitterHit, EmitterScratch, World};

@@ -11,7 +11,7 @@ use lumiris_numbers::math::{Ray, Vec2, Vec3};
 
 /// A ray with its first hit.
 #[derive(Clone, Copy, Debug)]
-pub struct Arrival {
+pub struct RayHit {
     /// The ray.
     pub ray: Ray,
     /// The hit.
@@ -22,11 +22,11 @@ pub struct Arrival {
     pub spread: f32,
 }
 
-impl Arrival {
+impl RayHit {
     /// The first hit of a ray that is not part of a path from the camera.
     #[inline]
     pub fn of_ray(ray: &Ray, hit: &Hit) -> Self {
-        Arrival { ray: *ray, hit: *hit, width: 0.0, spread: 0.0 }
+        RayHit { ray: *ray, hit: *hit, width: 0.0, spread: 0.0 }
     }
 }
 
@@ -48,12 +48,12 @@ pub struct SurfaceInteraction {
 }
 
 impl SurfaceInteraction {
-    /// The interaction of an arrival.
-    pub fn new(job: &RenderJob, arrival: &Arrival) -> Self {
-        let Arrival { ray, hit, .. } = arrival;
+    /// The interaction of a ray with the surface that it hits.
+    pub fn new(job: &RenderJob, ray_hit: &RayHit) -> Self {
+        let RayHit { ray, hit, .. } = ray_hit;
         let set = &job.world.scene.geometry;
         let surface = set.surface_hit_of_ray(hit.geometry, hit.primitive, hit.instance, hit.uv, ray);
-        Self::at(job, arrival, surface, -ray.d.normalize(), inverse_lengths(&surface))
+        Self::at(job, ray_hit, surface, -ray.d.normalize(), inverse_lengths(&surface))
     }
 
     /// The interaction at a surface point. `inverse_lengths` are 1/|∂p/∂u| and 1/|∂p/∂v|.
@@ -61,8 +61,8 @@ impl SurfaceInteraction {
     /// The texture footprint is the pixel that sees the point directly, for every kind of path. Light paths, photons
     /// and shadow rays must evaluate the same surface as the camera paths that they are combined with.
     #[inline]
-    pub(super) fn at(job: &RenderJob, arrival: &Arrival, surface: SurfaceHit, wo: Vec3, inverse_lengths: Vec2) -> Self {
-        let Arrival { ray, hit, width, spread } = arrival;
+    pub(super) fn at(job: &RenderJob, ray_hit: &RayHit, surface: SurfaceHit, wo: Vec3, inverse_lengths: Vec2) -> Self {
+        let RayHit { ray, hit, width, spread } = ray_hit;
         let distance = hit.t * ray.d.length();
         let seen = job.world.scene.camera.pixel_width(surface.p, ray.time);
         let uv_width = inverse_lengths * (seen * job.settings().sampling.footprint());

@@ -1,7 +1,7 @@
 //! Surface interactions of many rays at once.
 
 use super::job::RenderJob;
-use super::surface_interaction::{Arrival, SurfaceInteraction, inverse_lengths};
+use super::surface_interaction::{RayHit, SurfaceInteraction, inverse_lengths};
 use crate::accel::Hit;
 use crate::geometry::{Shape, TriangleMesh};
 use lumiris_lanes::lane::LANES;
@@ -9,11 +9,11 @@ use lumiris_lanes::level;
 use lumiris_lanes::triangle_points::{CornerCoordinates, TexturedPoints, TriangleHits, lane, textured_points};
 use lumiris_numbers::math::{Ray, Vec2};
 
-/// The interactions of a group of arrivals. The points of meshes are computed together; the results are those of
+/// The interactions of a group of rays with surfaces. The points of meshes are computed together; the results are those of
 /// [`SurfaceInteraction::new`], bit for bit.
 #[derive(Debug, Default)]
 pub struct SurfaceInteractions {
-    arrivals: Vec<Arrival>,
+    ray_hits: Vec<RayHit>,
     interactions: Vec<SurfaceInteraction>,
     /// Hits on meshes, their texture coordinates and their points, one item per vector of lanes.
     hits: Vec<TriangleHits>,
@@ -25,34 +25,33 @@ impl SurfaceInteractions {
     /// Maximum number of rays of a group. More would displace the texels that are requested for it from the cache.
     pub const GROUP: usize = 32;
 
-    /// Adds an arrival to the group.
+    /// Adds a ray to the group.
     #[inline]
-    pub fn push(&mut self, arrival: Arrival) {
-        self.arrivals.push(arrival);
+    pub fn push(&mut self, ray_hit: RayHit) {
+        self.ray_hits.push(ray_hit);
     }
 
-    /// The interactions of the arrivals added since the last call, in their order. Requests the texels of their
-    /// materials.
+    /// The interactions of the rays added since the last call, in their order. Requests the texels of the materials.
     pub fn find(&mut self, job: &RenderJob) -> &[SurfaceInteraction] {
         self.compute_points(job);
-        let SurfaceInteractions { arrivals, interactions, points, .. } = self;
+        let SurfaceInteractions { ray_hits, interactions, points, .. } = self;
         let mut row = 0;
         interactions.clear();
-        interactions.extend(arrivals.drain(..).map(|arrival| {
-            let Hit { primitive, instance, uv, .. } = arrival.hit;
-            let Some(mesh) = mesh_of(job, &arrival.hit) else { return SurfaceInteraction::new(job, &arrival) };
+        interactions.extend(ray_hits.drain(..).map(|ray_hit| {
+            let Hit { primitive, instance, uv, .. } = ray_hit.hit;
+            let Some(mesh) = mesh_of(job, &ray_hit.hit) else { return SurfaceInteraction::new(job, &ray_hit) };
             let (points, k) = (&points[row / LANES], row % LANES);
             row += 1;
             let (surface, wo) = (mesh.surface_hit_of_lane(primitive as usize, uv, points, k), lane(&points.wo, k));
             let inverse = Vec2::new(points.inverse_lengths[0][k], points.inverse_lengths[1][k]);
             if instance != Hit::NO_INSTANCE {
                 let set = &job.world.scene.geometry;
-                let placed = surface.transformed(&set.world_from_group_at(instance, arrival.ray.time));
-                return SurfaceInteraction::at(job, &arrival, placed, wo, inverse_lengths(&placed));
+                let placed = surface.transformed(&set.world_from_group_at(instance, ray_hit.ray.time));
+                return SurfaceInteraction::at(job, &ray_hit, placed, wo, inverse_lengths(&placed));
             }
             // Without derivatives the surface has other tangents
             let inverse = if inverse == Vec2::ZERO { inverse_lengths(&surface) } else { inverse };
-            SurfaceInteraction::at(job, &arrival, surface, wo, inverse)
+            SurfaceInteraction::at(job, &ray_hit, surface, wo, inverse)
         }));
         interactions.iter().for_each(|interaction| interaction.prefetch(job));
         interactions
@@ -70,16 +69,16 @@ impl SurfaceInteractions {
     ) {
         for (items, hits) in items.chunks(Self::GROUP).zip(hits.chunks(Self::GROUP)) {
             let met = || items.iter().zip(hits).filter_map(|(item, hit)| Some((item, hit.as_ref()?)));
-            met().for_each(|(item, hit)| self.push(Arrival::of_ray(ray(item), hit)));
+            met().for_each(|(item, hit)| self.push(RayHit::of_ray(ray(item), hit)));
             met().zip(self.find(job)).for_each(|((item, _), interaction)| visit(item, interaction));
         }
     }
 
-    /// Computes the points of meshes in the spaces of their groups, in the order of their arrivals.
+    /// Computes the points of meshes in the spaces of their groups, in the order of their ray_hits.
     fn compute_points(&mut self, job: &RenderJob) {
-        let SurfaceInteractions { arrivals, hits, coordinates, points, .. } = self;
+        let SurfaceInteractions { ray_hits, hits, coordinates, points, .. } = self;
         let mut count = 0;
-        for Arrival { ray, hit, .. } in arrivals {
+        for RayHit { ray, hit, .. } in ray_hits {
             let Some(mesh) = mesh_of(job, hit) else { continue };
             let (block, k) = (count / LANES, count % LANES);
             if block == hits.len() {

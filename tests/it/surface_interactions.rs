@@ -3,7 +3,7 @@
 use lumiris::accel::{Coherence, Hit, RayBatch};
 use lumiris::import::cache::FileCache;
 use lumiris::import::{LoadOptions, load_text};
-use lumiris::scene::{AccelKind, Arrival, RenderJob, SurfaceInteraction, SurfaceInteractions};
+use lumiris::scene::{AccelKind, RayHit, RenderJob, SurfaceInteraction, SurfaceInteractions};
 use lumiris_numbers::math::warp::sample_uniform_sphere;
 use lumiris_numbers::math::{Ray, Vec3};
 use lumiris_test_support::random::{RngExt, pcg32};
@@ -77,7 +77,7 @@ fn interactions_of_many_rays_are_those_of_single_rays() {
     assert_eq!(many.len(), met.len());
     for ((ray, found), (expected_ray, hit)) in many.iter().zip(&met) {
         assert_eq!((ray.o, ray.d), (expected_ray.o, expected_ray.d));
-        assert_eq!(*found, format!("{:?}", SurfaceInteraction::new(&job, &Arrival::of_ray(ray, hit))));
+        assert_eq!(*found, format!("{:?}", SurfaceInteraction::new(&job, &RayHit::of_ray(ray, hit))));
     }
     // Every shape was met
     for geometry in 0..job.world.scene.geometry.geometries.len() as u32 {

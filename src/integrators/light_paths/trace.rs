@@ -8,7 +8,7 @@ use crate::integrators::statistics::LightPathStats;
 use crate::lights::LightId;
 use crate::materials::SurfaceBsdf;
 use crate::photons::path_stream::{BATCH, domain, path_stream};
-use crate::scene::{Arrival, RenderJob, SurfaceInteraction, SurfaceInteractions};
+use crate::scene::{RayHit, RenderJob, SurfaceInteraction, SurfaceInteractions};
 use lumiris_numbers::math::ray::{SEGMENT_END, offset_origin};
 use lumiris_numbers::math::{Ray, Rgb, Vec2, Vec3};
 use lumiris_numbers::samplers::SampleStream;
@@ -201,7 +201,7 @@ impl LightPath {
         let ray = Ray { o: projected.o, d: d / distance, t_max: f32::INFINITY, time: self.ray.time };
         let at_camera = SurfaceInteraction::new(
             job,
-            &Arrival { ray, hit: Hit { t: distance, ..at.hit }, width: from.width0, spread: from.spread },
+            &RayHit { ray, hit: Hit { t: distance, ..at.hit }, width: from.width0, spread: from.spread },
         );
         let bsdf = at_camera.scatter(job)?;
         if bsdf.makes_caustics || !bsdf.bsdf.is_evaluated_exactly() {

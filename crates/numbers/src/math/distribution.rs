@@ -209,14 +209,14 @@ impl PiecewiseConstant1D {
     /// The point of cumulative probability `u`; `None` if the function is 0.
     #[inline]
     pub fn sample(&self, u: f32) -> Option<Sample1D> {
-        let BinPosition { index, fraction } = self.place(u)?;
+        let BinPosition { index, fraction } = self.bin_position(u)?;
         let x = place_in_bin(index, fraction, self.values.len());
         Some(Sample1D { x, pdf: self.values[index] / self.integral, index })
     }
 
     /// The same point, by its bin. Sums of index and fraction may be rounded up to the next bin.
     #[inline]
-    pub fn place(&self, u: f32) -> Option<BinPosition> {
+    pub fn bin_position(&self, u: f32) -> Option<BinPosition> {
         let u = clamped(u);
         let bin = self.running().bin(u);
         (self.integral > 0.0).then(|| BinPosition { index: bin.index, fraction: bin.fraction(u) })
